@@ -6,7 +6,6 @@ measures every policy in the box and writes its card anew; `python train.py --sh
 """
 
 import hashlib
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import tyro
 
-from seastar_gym.command import run_command
+from seastar_gym.command import answered, run_command
 from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, load
 from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
@@ -153,13 +152,12 @@ class Options:
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     options = tyro.cli(Options, prog="python -m agents.cards", args=arguments)
-    try:
+
+    def write_all() -> None:
         for file in options.policies or sorted(SHIPPED.parent.glob("*.safetensors")):
             print(write_card(file, options.num_threads), flush=True)
-    except (ValueError, FileNotFoundError) as bad_input:
-        print(bad_input, file=sys.stderr)
-        return 2
-    return 0
+
+    return answered(write_all)
 
 
 if __name__ == "__main__":

@@ -40,7 +40,9 @@ def answered(work: Callable[[], int | None]) -> int:
     """Exit code of a command's work: 2, after a sentence, where it refuses what it was given or lacks a module."""
     try:
         return work() or 0
-    except (ValueError, ImportError, FileNotFoundError) as refusal:
+    except FileNotFoundError as missing:
+        return ended_by_disk(missing)
+    except (ValueError, ImportError) as refusal:
         print(refusal, file=sys.stderr)
         return 2
 

@@ -1,7 +1,6 @@
 """Trains on several machines: python -m agents.rllib --address head:6379 --env-runners 16 --out runs/cluster."""
 
 import logging
-import sys
 from collections.abc import Sequence
 
 import ray
@@ -12,6 +11,7 @@ from agents.rllib.training import Round, Watch, train
 from agents.training import efficiency
 from agents.training.folder import held
 from agents.training.interruption import Interruption
+from seastar_gym.command import answered
 from seastar_gym.executors.on_ray import connect
 
 
@@ -49,8 +49,4 @@ def watch_of(interruption: Interruption) -> Watch:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
-    try:
-        return run(read_options(arguments))
-    except ValueError as wrong:
-        print(wrong, file=sys.stderr)
-        return 2
+    return answered(lambda: run(read_options(arguments)))

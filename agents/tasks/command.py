@@ -23,6 +23,7 @@ from agents.tasks.card import IMITATION, write_card
 from agents.tasks.learning import ENOUGH, LEARNERS, imitate, train
 from agents.training.folder import versions_and_machine
 from seastar_gym import TASKS, SmaPulse
+from seastar_gym.command import answered
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.learned import LearnedPolicy, load, save
 from seastar_gym.evaluation.tasks import swim_episodes
@@ -126,14 +127,13 @@ def put_in_the_box(id: str, options: Options, command: str) -> Path:
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     given = sys.argv[1:] if arguments is None else list(arguments)
-    try:
+
+    def train_all() -> None:
         options = tyro.cli(Options, prog="python -m agents.tasks", args=given)
         for id in options.ids:
             if not options.cards_only:
                 put_in_the_box(id, options, shlex.join(["python", "-m", "agents.tasks", *given]))
             file = file_of(id, options.out)
             print(write_card(id, load(file), file), flush=True)
-    except (ValueError, FileNotFoundError) as bad_input:
-        print(bad_input, file=sys.stderr)
-        return 2
-    return 0
+
+    return answered(train_all)

@@ -11,13 +11,13 @@ reads it, `certificate.for_error(0.01)` is the scene at the fastest setting that
 """
 
 import argparse
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.accuracy.measure import SAMPLES, Progress, certify
+from seastar_gym.command import answered, command_parser
 from seastar_gym.extras import require_extra
 from seastar_gym.files import save_figure, write_json
 from seastar_gym.scene.checks import require_error
@@ -86,11 +86,40 @@ def progress_bar(what: str = "", shown: bool = True) -> Iterator[Progress]:
         yield progress
 
 
+def certify_as_asked(options: argparse.Namespace) -> None:
+    """Measure and write a certificate, and the setting that is asked for."""
+    require_extra("Certificates", "studies", "tqdm")
+    scene = load_scene(options.scene)
+    scene.to_dict()  # now, not after minutes, refuses what a certificate could not hold
+    if options.error is not None:
+        require_error(options.error)
+    if options.chosen is not None and options.error is None:
+        raise ValueError("--chosen writes the scene that --error chooses: give both.")
+    for name in ("out", "chosen"):
+        require_writable(name, getattr(options, name))
+    if options.out.suffix == ".png":
+        raise ValueError(f"{options.out} is where the picture goes: give --out a file such as certificate.json.")
+    with progress_bar() as progress:
+        certificate = certify(scene, options.samples, options.seed, progress)
+    certificate.save(options.out)
+    print(as_text(certificate))
+    print(f"Written: {options.out}")
+    try:
+        draw(certificate, options.out.with_suffix(".png"))
+        print(f"Written: {options.out.with_suffix('.png')}")
+    except ModuleNotFoundError:
+        print('No picture: that needs matplotlib, pip install "seastar-gym[studies]".')
+    if options.error is not None:
+        chosen = certificate.for_error(options.error)
+        print(f"{100 * options.error:g} %: nodes_per_limb={chosen.robot.nodes_per_limb}, {chosen.numerics}")
+        if options.chosen is not None:
+            write_json(options.chosen, chosen.to_dict())
+            print(f"Written: {options.chosen}")
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        "seastar certify", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_parser("seastar certify", __doc__)
     default = "(default: %(default)s)"
     parser.add_argument("scene", nargs="?", type=Path, help="file of the scene, .py or .json (default: the chapter's)")
     parser.add_argument("--error", type=float, help="print the fastest setting that keeps this error, such as 0.01")
@@ -100,35 +129,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
     file = "JSON file for the scene at the setting that --error chooses, which train.py --scene takes"
     parser.add_argument("--chosen", type=Path, help=file)
     options = parser.parse_args(arguments)
-    try:
-        require_extra("Certificates", "studies", "tqdm")
-        scene = load_scene(options.scene)
-        scene.to_dict()  # now, not after minutes, refuses what a certificate could not hold
-        if options.error is not None:
-            require_error(options.error)
-        if options.chosen is not None and options.error is None:
-            raise ValueError("--chosen writes the scene that --error chooses: give both.")
-        for name in ("out", "chosen"):
-            require_writable(name, getattr(options, name))
-        if options.out.suffix == ".png":
-            raise ValueError(f"{options.out} is where the picture goes: give --out a file such as certificate.json.")
-        with progress_bar() as progress:
-            certificate = certify(scene, options.samples, options.seed, progress)
-        certificate.save(options.out)
-        print(as_text(certificate))
-        print(f"Written: {options.out}")
-        try:
-            draw(certificate, options.out.with_suffix(".png"))
-            print(f"Written: {options.out.with_suffix('.png')}")
-        except ModuleNotFoundError:
-            print('No picture: that needs matplotlib, pip install "seastar-gym[studies]".')
-        if options.error is not None:
-            chosen = certificate.for_error(options.error)
-            print(f"{100 * options.error:g} %: nodes_per_limb={chosen.robot.nodes_per_limb}, {chosen.numerics}")
-            if options.chosen is not None:
-                write_json(options.chosen, chosen.to_dict())
-                print(f"Written: {options.chosen}")
-    except (ValueError, ModuleNotFoundError) as bad_input:
-        print(bad_input, file=sys.stderr)
-        return 2
-    return 0
+    return answered(lambda: certify_as_asked(options))

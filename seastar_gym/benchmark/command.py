@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, get_args
 from seastar_gym.benchmark import page
 from seastar_gym.benchmark.jobs import Answer, Job, answers
 from seastar_gym.benchmark.results import Entry, merged, read, write
-from seastar_gym.command import INTERRUPTED, command_parser
+from seastar_gym.command import INTERRUPTED, answered, command_parser
 from seastar_gym.controllers.roster import HELP
 from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.measures import measure_of
@@ -174,24 +174,25 @@ def keep(entries: Sequence[Entry], folder: Path) -> None:
     print(f"Interrupted: {told}.", file=sys.stderr)
 
 
+def measure_all(options: argparse.Namespace, command: str) -> int:
+    """Measure, merge and publish; returns the exit code."""
+    others = [read(file) for file in options.merge]
+    require_measures([entry for entries in others for entry in entries])
+    own, code = benchmark(options) if options.agents else Measured([], 0)
+    entries = merged(*others, own)
+    if code == INTERRUPTED:
+        keep(entries, options.out)
+        return code
+    if not entries:
+        raise ValueError("There is nothing to show: no agent swam a task.")
+    files = publish(entries, options.out, command)
+    print(page.table(entries))
+    print(f"Written to {options.out}: {', '.join(files)}")
+    return code
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     options = parser().parse_args(given)
-    try:
-        others = [read(file) for file in options.merge]
-        require_measures([entry for entries in others for entry in entries])
-        own, code = benchmark(options) if options.agents else Measured([], 0)
-        entries = merged(*others, own)
-        if code == INTERRUPTED:
-            keep(entries, options.out)
-            return code
-        if not entries:
-            raise ValueError("There is nothing to show: no agent swam a task.")
-        files = publish(entries, options.out, shlex.join(["seastar", "benchmark", *given]))
-    except (ValueError, ImportError, FileNotFoundError) as bad_input:
-        print(bad_input, file=sys.stderr)
-        return 2
-    print(page.table(entries))
-    print(f"Written to {options.out}: {', '.join(files)}")
-    return code
+    return answered(lambda: measure_all(options, shlex.join(["seastar", "benchmark", *given])))

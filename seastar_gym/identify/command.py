@@ -18,12 +18,12 @@ With `--synthetic`, the data are simulated with known parameters and 1 mm of noi
 """
 
 import argparse
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from seastar_gym.command import answered
 from seastar_gym.extras import require_extra
 from seastar_gym.files import save_figure, write_json
 from seastar_gym.identify.fit import Estimate, identify
@@ -59,6 +59,30 @@ def draw(estimate: Estimate, measurement: Measurement, file: Path) -> None:
     plt.close(figure)
 
 
+def fit(options: argparse.Namespace) -> None:
+    """Fit, and write what is asked for."""
+    if options.picture is not None:
+        require_extra("Pictures", "studies", "matplotlib")
+    scene = load_scene(options.scene)
+    if options.step is not None or not scene.numerics.named:
+        scene = replace(scene, numerics=Numerics("implicit-midpoint", options.step or STEP))
+    if options.synthetic:
+        measurement = synthetic(scene, TRUTH)
+        print("truth:", ", ".join(f"{name} = {value:g}" for name, value in TRUTH.items()))
+    else:
+        measurement = Measurement.from_csv(options.trajectory, options.commands)
+    begin = time.perf_counter()
+    estimate = identify(scene, options.fit, measurement, largest_delay=options.delay)
+    print(estimate.report(), f"{time.perf_counter() - begin:.1f} s", sep="\n")
+    if options.picture is not None:
+        draw(estimate, measurement, options.picture)
+    if options.out is not None:
+        write_json(options.out, estimate.scene.to_dict())
+    if options.intervals is not None:
+        ends = zip(estimate.names, estimate.lower.tolist(), estimate.upper.tolist(), strict=True)
+        write_json(options.intervals, {name: [low, high] for name, low, high in ends})
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = argparse.ArgumentParser(
@@ -81,28 +105,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if not options.synthetic and options.commands is None:
         parser.error("give a trajectory and its commands, or --synthetic")
-    try:
-        if options.picture is not None:
-            require_extra("Pictures", "studies", "matplotlib")
-        scene = load_scene(options.scene)
-        if options.step is not None or not scene.numerics.named:
-            scene = replace(scene, numerics=Numerics("implicit-midpoint", options.step or STEP))
-        if options.synthetic:
-            measurement = synthetic(scene, TRUTH)
-            print("truth:", ", ".join(f"{name} = {value:g}" for name, value in TRUTH.items()))
-        else:
-            measurement = Measurement.from_csv(options.trajectory, options.commands)
-        begin = time.perf_counter()
-        estimate = identify(scene, options.fit, measurement, largest_delay=options.delay)
-        print(estimate.report(), f"{time.perf_counter() - begin:.1f} s", sep="\n")
-        if options.picture is not None:
-            draw(estimate, measurement, options.picture)
-        if options.out is not None:
-            write_json(options.out, estimate.scene.to_dict())
-        if options.intervals is not None:
-            ends = zip(estimate.names, estimate.lower.tolist(), estimate.upper.tolist(), strict=True)
-            write_json(options.intervals, {name: [low, high] for name, low, high in ends})
-    except (ValueError, OSError, ModuleNotFoundError) as bad_input:
-        print(bad_input, file=sys.stderr)
-        return 2
-    return 0
+    return answered(lambda: fit(options))
