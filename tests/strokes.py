@@ -6,17 +6,14 @@ from typing import Any
 import numpy as np
 
 from seastar_gym import Simulator, State, StrokeReport
+from seastar_gym.simulator.pauses import completed
 
 
 def finished(stroke: Iterator[float], seen: Callable[[float], Any] = lambda time: time) -> tuple[list, StrokeReport]:
     """Run a stroke in parts to its end: (what was seen at every pause, its time [s] given; the report)."""
     found = []
-    while True:
-        try:
-            time = next(stroke)
-        except StopIteration as end:
-            return found, end.value
-        found.append(seen(time))
+    report = completed(stroke, lambda time: found.append(seen(time)))
+    return found, report
 
 
 def ternary(n_strokes: int, n_robots: int, seed: int = 0, n_limbs: int = 5) -> np.ndarray:

@@ -1,7 +1,5 @@
 """`SeastarSwim-v0`: the environment of one robot. Its docstring is the contract that users read."""
 
-import contextlib
-from collections.abc import Generator
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -17,6 +15,7 @@ from seastar_gym.envs.swimming import Outcome, Swimming
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.task_env import TaskEnv, checked_options
 from seastar_gym.scene.checks import require_choice, require_count, require_seed
+from seastar_gym.simulator.pauses import completed
 
 FRAMES_PER_SECOND = 10
 """Pictures per second of simulated time, unless another number is asked for."""
@@ -331,20 +330,16 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
             outcome = self._task.step(command)
             self._extend_trail()
             return outcome
-        with contextlib.closing(self._task.step_in_parts(command, self.frames_per_stroke)) as parts:
-            return self._draw_while_swimming(parts)
-
-    def _draw_while_swimming(self, parts: Generator[float, None, Outcome]) -> Outcome:
         before_the_end = self.decision_period * (1.0 - ROUNDING)
-        while True:
-            try:
-                time_in_decision = next(parts)
-            except StopIteration as finished:
-                self._draw_frame()  # now that it is known whether a waypoint was reached
-                return finished.value
+
+        def draw(time_in_decision: float) -> None:
             self._extend_trail()
             if time_in_decision < before_the_end:
                 self._draw_frame()
+
+        outcome = completed(self._task.step_in_parts(command, self.frames_per_stroke), draw)
+        self._draw_frame()  # now that it is known whether a waypoint was reached
+        return outcome
 
     def _extend_trail(self) -> None:
         if self.render_mode is not None:

@@ -10,11 +10,10 @@ is scored:
     _goal_facts(hub)            entries of info that belong to the task
 """
 
-import contextlib
 import functools
 import operator
 from abc import ABC, abstractmethod
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
@@ -38,6 +37,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror, complete
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
 from seastar_gym.simulator.growth import is_watched
+from seastar_gym.simulator.pauses import completed, pausing
 from seastar_gym.simulator.report import report_of_pieces
 
 Floats = NDArray[np.float64]
@@ -322,7 +322,7 @@ class Swimming(ABC):
         if self._lag is None:
             report = self.simulator.advance(self.decision_period, self._wired(followed))
         else:
-            report = _result(self._swim(self._lag, followed, []))
+            report = completed(self._swim(self._lag, followed, []))
         return self._judge(commands, followed, report)
 
     def step_in_parts(self, commands: Floats, parts: int) -> Generator[float, None, Outcome]:
@@ -332,7 +332,7 @@ class Swimming(ABC):
             report = yield from self.simulator.advance_in_parts(self.decision_period, self._wired(followed), parts)
         else:
             ends = (self.decision_period * np.arange(1, parts + 1) / parts).tolist()
-            report = yield from _at_ends(self._swim(self._lag, followed, ends), ends)
+            report = yield from pausing(self._swim(self._lag, followed, ends), first_after(ends))
         return self._judge(commands, followed, report)
 
     def _swim(self, lag: Lag, commands: Floats, ends: list[float]) -> Generator[float, None, StrokeReport]:
@@ -348,16 +348,14 @@ class Swimming(ABC):
         pauses = ends[(ends > 0.0) & (ends < piece.duration)]
         if self._tracker is not None:
             pauses = np.append(pauses, self._tracker.due_times(self.simulator.time, piece.duration))
+
+        def look(since: float) -> float:
+            if self._tracker is not None:
+                self._tracker.take(self.simulator)
+            return piece.begin + since
+
         steps = self.simulator.advance_pausing(piece.duration, self._wired(piece.commands), pauses)
-        with contextlib.closing(steps):
-            while True:
-                try:
-                    since = next(steps)
-                except StopIteration as over:
-                    return over.value
-                if self._tracker is not None:
-                    self._tracker.take(self.simulator)
-                yield piece.begin + since
+        return (yield from pausing(steps, look))
 
     def warmth(self) -> Floats | None:
         """Contractions or temperatures of wires + and -, 0 to 1, shape (n_robots, n_limbs, 2); None without wires."""
@@ -439,26 +437,20 @@ class Swimming(ABC):
         return {name: values.copy() for name, values in self._known[2].items()}
 
 
-def _result(steps: Generator[float, None, StrokeReport]) -> StrokeReport:
-    """What a generator returns in the end."""
-    try:
-        next(_at_ends(steps, []))
-    except StopIteration as over:
-        return over.value
-    raise AssertionError("It has no ends to stop at.")
+def first_after(ends: list[float]) -> Callable[[float], float | None]:
+    """Of increasing times, only the first that is not before each of the ends: a function for `pausing`."""
+    left = iter(ends)
+    end = next(left, np.inf)
 
+    def look(time: float) -> float | None:
+        nonlocal end
+        if time < end * (1.0 - ROUNDING):
+            return None
+        while end * (1.0 - ROUNDING) <= time:
+            end = next(left, np.inf)
+        return time
 
-def _at_ends(steps: Generator[float, None, StrokeReport], ends: list[float]) -> Generator[float, None, StrokeReport]:
-    """Yields only the first of the increasing times that is not before each of the ends."""
-    with contextlib.closing(steps):
-        while True:
-            try:
-                time = next(steps)
-            except StopIteration as over:
-                return over.value
-            if ends and time >= ends[0] * (1.0 - ROUNDING):
-                ends = [end for end in ends if end * (1.0 - ROUNDING) > time]
-                yield time
+    return look
 
 
 def _messages(status: NDArray[np.int64]) -> NDArray[Any]:

@@ -23,6 +23,7 @@ from seastar_gym.plant.logs import Logs
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
 from seastar_gym.scene.checks import require_file, require_kind, shown
 from seastar_gym.simulator import StrokeReport
+from seastar_gym.simulator.pauses import pausing
 
 
 class PlantTask(SwimTask):
@@ -119,17 +120,15 @@ class PlantTask(SwimTask):
         """One decision, on the plant's clock; yields the time since it began [s] after about every time step."""
         n_steps = math.ceil(self.decision_period / self.scene.numerics.step)
         steps = self.simulator.advance_in_parts(self.decision_period, commands, n_steps)
-        with contextlib.closing(steps), self._stopped_if_interrupted():
+        with self._stopped_if_interrupted():
             self._attempt(lambda: self._begin_decision(commands[0]))
             planned = self._begun + float(self.simulator.time[0])
-            while True:
-                try:
-                    since = next(steps)
-                except StopIteration as over:
-                    report: StrokeReport = over.value
-                    break
-                self._attempt(lambda: self._attend(planned + since))  # noqa: B023 - it is called now
-                yield since
+
+            def attend(since: float) -> float:
+                self._attempt(lambda: self._attend(planned + since))
+                return since
+
+            report = yield from pausing(steps, attend)
         self._known_pictures.look(self.simulator.time)
         self._put_where_seen()
         return report

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from seastar_gym.scene import Numerics, Scene, SmaPulse, Water
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simulator import Simulator, State, StrokeReport
+from seastar_gym.simulator.pauses import completed
 from seastar_gym.simulator.schedule import step_times
 from studies.stability.cases import Case, Sweep
 
@@ -119,12 +120,12 @@ def swim(case: Case, numerics: Numerics, duration: float) -> tuple[Simulator, Fl
     simulator = Simulator(make_scene(case, numerics, duration), len(commands), threads=1)
     disturb(simulator, case.speed, case.shift)
     begin, hubs = simulator.hub_position(), {}
-    stroke = simulator.stroke_in_parts(commands, 10)
-    while True:
-        try:
-            hubs[round(next(stroke) / duration, 6)] = simulator.hub_position()
-        except StopIteration as finished:
-            return simulator, np.array([hubs[0.1], hubs[1.0]]) - begin, finished.value
+
+    def look(time: float) -> None:
+        hubs[round(time / duration, 6)] = simulator.hub_position()
+
+    report = completed(simulator.stroke_in_parts(commands, 10), look)
+    return simulator, np.array([hubs[0.1], hubs[1.0]]) - begin, report
 
 
 def converged_displacements(case: Case, duration: float) -> Floats | None:
