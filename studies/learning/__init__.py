@@ -1,4 +1,4 @@
-"""Trainings in time, and the fastest swims that offline searches find."""
+"""What bounds the speed of learned policies, their ways, and what lateness costs them."""
 
 from seastar_gym.extras import require_extra
 
