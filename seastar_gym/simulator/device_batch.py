@@ -76,6 +76,10 @@ class DeviceBatch(Batch):
     def v(self, rows: Floats) -> None:
         self._on_host["v"] = rows
 
+    @property
+    def arrays(self) -> ModuleType:
+        return self._arrays
+
     def _fetched(self, name: str) -> Floats:
         """Rows of q or v on the host, where they may be changed until the next interval."""
         if name in self._on_device:
@@ -93,6 +97,33 @@ class DeviceBatch(Batch):
         self._put_all()
         rows = self._rows(name)[:, : self.n_node_rows]
         return rows.transpose(0, 2, 1).reshape(-1, self.n_node_rows // 2, 2)[: self.n_robots]
+
+    def filled(self, kernel: Any, numbers: dict[str, Any], n_rows: int) -> Any:
+        """Rows that a kernel fills from q and v of every robot, shape (n_groups, n_rows, 32), on the device.
+
+        kernel: Gets q, v, the rows to fill and `numbers`, in this order, of one lane group. numbers: Named tuples and
+        arrays of shape (k,) that all robots share, plain numbers, and arrays (.., k, N_LANES) of all lane groups.
+        """
+        self._put_all()
+        program = self.filling(kernel, numbers, n_rows)
+        memory, zeros = program.memory, self._arrays.zeros
+        own, shared = zeros((self._n_groups, memory.n_rows, device.N_LANES)), np.zeros(max(memory.n_shared, 1))
+        for name in ("q", "v"):
+            own[:, memory.rows[name]] = self._rows(name)
+        for name, values in [leaf for name, bundle in numbers.items() for leaf in leaves(bundle, name)]:
+            if name in memory.rows:
+                own[:, memory.rows[name]] = self._to_device(values)
+            else:
+                shared[memory.shared[name]] = values
+        code, unused = self._device.load(program), zeros(1)
+        self._device.run(code, own, self._arrays.asarray(shared), unused, unused, self.n_robots)
+        return own[:, memory.rows["rows"]]
+
+    def filling(self, kernel: Any, numbers: dict[str, Any], n_rows: int) -> Program:
+        """The code of `filled`."""
+        of_one = {name: rows[0] if getattr(rows, "ndim", 0) > 1 else rows for name, rows in numbers.items()}
+        rows = {"q": self._on_host["q"][0], "v": self._on_host["v"][0], "rows": np.zeros((n_rows, N_LANES))}
+        return Program(_kernels(), _kernels()(kernel), rows | of_one, ())
 
     def moved(self) -> dict[str, Any]:
         rows = {name: self._rows(name).copy() for name in self._on_device}
