@@ -7,21 +7,18 @@ import pickle
 import re
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any, get_args
+from typing import get_args
 from unittest.mock import Mock
 
-import gymnasium as gym
 import numba
 import numpy as np
 import pytest
 
 from seastar_gym import (
     DomainRandomization,
-    Headings,
     Numerics,
     Scene,
     Seastar,
-    Sight,
     Simulator,
     SmaPulse,
     SmaWires,
@@ -29,7 +26,6 @@ from seastar_gym import (
     Uniform,
 )
 from seastar_gym.envs.buffers import Buffers
-from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simulator import device_batch
@@ -39,12 +35,23 @@ from seastar_gym.sweep.command import main as sweep_command
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.swimming import swim
 from strokes import assert_same, finished
-from studies.gpu import EVERYTHING, NOT_ON_DEVICES, compared, scenes
+from studies.gpu import (
+    EVERYTHING,
+    NOT_ON_DEVICES,
+    batch_on,
+    compared,
+    environments,
+    observed,
+    on_processor,
+    scenes,
+)
 from studies.gpu_code import code_of, code_of_observations
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="devices have compiled code alone")
 
 SMALL = Scene(Seastar(nodes_per_limb=4), actuator=SmaPulse(0.4), numerics=Numerics.preset("fast"))
+AT_FAST = ("pairs", "continuous", "headings", "camera")
+"""Environments of the same scene, whose code is compiled once."""
 N_ROBOTS = 35
 """Robots of a batch: more than one group of a device or a processor, the last of which is not full."""
 
@@ -70,15 +77,6 @@ def pair(scene: Scene, device: str, **options) -> tuple[Simulator, Simulator]:
     """On the processor and on the device; with work, so that few codes are compiled."""
     options["effort"] = True
     return Simulator(scene, N_ROBOTS, **options), Simulator(scene, N_ROBOTS, device=device, **options)
-
-
-def copied(array: Any) -> Any:
-    """An array of the processor or of a device on the processor; anything else as it is."""
-    return array.get() if hasattr(array, "get") else array
-
-
-def batch_of(n_robots: int, **options: Any) -> SeastarSwimVectorEnv:
-    return gym.make_vec("SeastarSwim-v0", n_robots, vectorization_mode="vector_entry_point", **options)
 
 
 def assert_same_reports(one: StrokeReport, other: StrokeReport) -> None:
@@ -109,7 +107,7 @@ def test_states_reports_and_work_are_those_of_the_processor(device):
     for name in ("positions", "velocities"):
         there = both[1].on_device(name)
         assert isinstance(there, np.ndarray) == (device == "scalar")
-        np.testing.assert_array_equal(copied(there), getattr(both[0], name))
+        np.testing.assert_array_equal(on_processor(there), getattr(both[0], name))
 
 
 def test_resets_states_and_strengths_reach_the_device(device):
@@ -170,29 +168,14 @@ def test_a_robot_that_fails_fails_alike_and_alone(device):
 
 
 @pytest.mark.parametrize(
-    "options",
+    "name",
     [
-        {"actions": "pairs", "autoreset_mode": "NextStep"},
-        {"actions": "continuous", "autoreset_mode": "SameStep", "random_heading": True},
-        {"headings": Headings("random"), "autoreset_mode": "SameStep"},
-        {"sight": Sight(10.0, delay=0.1, noise=1e-3), "autoreset_mode": "NextStep"},
+        pytest.param(name, marks=[] if name.partition(", ")[2] in AT_FAST else pytest.mark.slow)
+        for name in environments()
     ],
 )
-def test_environments_observe_and_are_rewarded_alike(device, options):
-    batches = [
-        batch_of(5, scene=SMALL, max_episode_steps=3, device=where, on_device=on_device, **options)
-        for where, on_device in (("cpu", False), ("cpu", True), (device, False), (device, True))
-    ]
-    seen = [[copied(batch.reset(seed=3)[0])] for batch in batches]
-    batches[0].action_space.seed(0)
-    for _ in range(5):
-        actions = batches[0].action_space.sample()
-        for batch, arrays in zip(batches, seen, strict=True):
-            *results, info = batch.step(actions)
-            arrays += map(copied, [*results, *info.get("final_obs", ())])
-    for ours, *others in zip(*seen, strict=True):
-        for theirs in others:
-            np.testing.assert_array_equal(ours, theirs)
+def test_environments_observe_and_are_rewarded_alike(device, name):
+    assert observed(name, device)["same"]
 
 
 ROBOTS = {
@@ -205,18 +188,18 @@ ROBOTS = {
 
 @pytest.mark.parametrize("options", ROBOTS.values(), ids=ROBOTS)
 def test_any_robot_in_any_state_is_observed_alike_on_the_device(device, options):
-    batch, rng = batch_of(N_ROBOTS, device=device, **options), np.random.default_rng(0)
+    batch, rng = batch_on(device, N_ROBOTS, **options), np.random.default_rng(0)
     batch.reset(seed=0)
     for rows, size in ((batch.simulator.q, 0.01), (batch.simulator.v, 0.02)):
         rows += rng.normal(0.0, size, rows.shape)
     here, there = batch._task.observe(), batch._task.observe_on_device()
     assert isinstance(there, np.ndarray) == (device == "scalar") and there.dtype == np.float32
-    np.testing.assert_array_equal(here, copied(there))
+    np.testing.assert_array_equal(here, on_processor(there))
     assert len(np.unique(here, axis=0)) == N_ROBOTS
 
 
 def test_the_state_stays_on_the_device_where_observations_do(device, monkeypatch):
-    batch = batch_of(5, scene=SMALL, device=device, on_device=True)
+    batch = batch_on(device, 5, on_device=True)
     batch.reset(seed=0)
     actions = batch.action_space.sample()
     batch.step(actions)
@@ -226,7 +209,7 @@ def test_the_state_stays_on_the_device_where_observations_do(device, monkeypatch
 
 def test_torch_takes_observations_as_they_are(device):
     torch = pytest.importorskip("torch")
-    observations, _ = batch_of(5, scene=SMALL, device=device, on_device=True).reset(seed=0)
+    observations, _ = batch_on(device, 5, on_device=True).reset(seed=0)
     there = torch.from_dlpack(observations)
     assert there.shape == (5, 186) and there.dtype == torch.float32 and there.is_cuda == (device == "cuda")
     observations[0, 0] = 7.0
@@ -287,15 +270,15 @@ def test_a_device_that_is_not_there_is_refused_in_one_sentence(tmp_path, capsys)
         with pytest.raises(ValueError, match=r'^device="cuda" (needs CuPy|finds no NVIDIA GPU).*\.$'):
             Simulator(SMALL, device="cuda")
         with pytest.raises(ValueError, match=r'^device="cuda" (needs CuPy|finds no NVIDIA GPU).*\.$'):
-            batch_of(5, scene=SMALL, device="cuda", on_device=True)
+            batch_on("cuda", 5, on_device=True)
         assert sweep_command(["robot.n_limbs=3", "--device", "cuda", "--out", str(tmp_path)]) == 2
         assert capsys.readouterr().err.startswith('device="cuda" ')
 
 
 def test_observations_on_a_device_are_refused_where_those_of_the_processor_are_needed():
     with pytest.raises(ValueError, match="on_device must be True or False, not 'cuda'"):
-        batch_of(5, on_device="cuda")
-    batch = batch_of(5, scene=SMALL, device="scalar", on_device=True, autoreset_mode="SameStep")
+        batch_on("cpu", 5, on_device="cuda")
+    batch = batch_on("scalar", 5, on_device=True)
     observations, _ = batch.reset(seed=0)
     flags = np.zeros(5, bool)
     with pytest.raises(ValueError, match="out takes observations of the processor: make the batch without on_device"):
