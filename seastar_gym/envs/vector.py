@@ -44,8 +44,8 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         `info["final_obs"]` and `info["final_info"]`. DISABLED: `reset` with `options={"reset_mask": ...}` is needed
         before the next step.
     threads: Number of threads of the simulator; by default one for every processor.
-    on_device: Whether observations are arrays of the `device`, where they are made: CuPy's on "cuda", which
-        `torch.from_dlpack` takes without a copy. All else is on the processor, and no bit differs.
+    on_device: Whether observations are made on the `device` and stay there: arrays of CuPy on "cuda", which
+        `torch.from_dlpack` takes without a copy. Rewards, flags and info are numpy's. No bit differs.
     render_mode: "rgb_array": `render` returns a picture of every robot, the smaller the more there are;
         `render_robots` draws some of them.
 
