@@ -306,7 +306,7 @@ def run(options: Options, results: Results) -> str | None:
             for name, found in zip(missing, pool.map(compare, missing, [options.device] * len(missing)), strict=True):
                 kept[name] = found
                 told = "same bits" if found["same"] else ", ".join(found["differing"])
-                print(f"{name}: {told}, {found.get('seconds', '')}", flush=True)
+                print(name, told, found.get("seconds", ""), sep=": ", flush=True)
                 results.save()
     if options.device == "cuda":
         measure(results)
