@@ -1,6 +1,7 @@
 """Robots on a GPU: the bits of the processor, speed over the size of the batch, compilation, and a learner.
 
 Every scene is swum on the processor and on the device with the same random commands, and compared to the last bit.
+So are environments whose observations stay on the device.
 With `--device scalar` the device's code swims on the processor, and nothing else is measured: for machines without.
 """
 
@@ -17,6 +18,8 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym import DomainRandomization, Headings, Sight, Uniform
+from seastar_gym.envs.buffers import Buffers
 from seastar_gym.scene import (
     AlongLimb,
     Attachment,
@@ -48,6 +51,7 @@ USUAL = 4096
 N_ROBOTS, N_STROKES = 64, 3
 """Robots that are compared with the processor's, if a scene has no number of its own, and their strokes."""
 EVERYTHING = "all, a body, bent along, contact"
+ON_DEVICE = "cuda, observations left there"
 LEARNER: dict[str, Any] = {"n_steps": 8, "batch_size": 8192, "n_epochs": 4}
 ROBOTS_OF_LEARNER, ROUNDS_OF_LEARNER = 4096, 4
 
@@ -95,6 +99,8 @@ def commands_of(scene: Scene, n_robots: int, n_strokes: int) -> NDArray[np.float
     return commands
 
 
+ROBOTS_OBSERVED, EPISODE = 35, 3
+"""Robots of an environment that is compared, and decisions of its episodes."""
 NOT_ON_DEVICES = "energy_growth"
 """Field of a report that only the processor knows."""
 
@@ -122,6 +128,61 @@ def compared(name: str, device: str) -> dict[str, Any]:
         differing |= {key for key in seen[0] if key != NOT_ON_DEVICES and not same(seen[0][key], seen[1][key])}
     failed = int(both[0].failed.sum())
     return {"same": not differing, "differing": sorted(differing), "failed": failed, "seconds": seconds}
+
+
+def environments() -> dict[str, dict[str, Any]]:
+    """Options of batches whose observations are compared, by name."""
+    numbers = DomainRandomization({"robot.limb_length": Uniform(0.08, 0.12)})
+    found: dict[str, dict[str, Any]] = {
+        "pairs": {"actions": "pairs"},
+        "continuous": {"actions": "continuous", "random_heading": True, "autoreset_mode": "SameStep"},
+        "headings": {"headings": Headings("random"), "autoreset_mode": "SameStep"},
+        "camera": {"sight": Sight(10.0, delay=0.1, noise=1e-3)},
+        "timed": {"decision_period": 0.2},
+        "numbers of each robot": {"randomization": numbers, "autoreset_mode": "SameStep"},
+    }
+    for n_limbs, n_nodes in ((3, 12), (8, 5)):
+        found[f"{n_limbs} limbs"] = {"scene": Scene(Seastar(n_limbs, n_nodes), numerics=Numerics.preset("fast"))}
+    return {f"observations, {name}": options for name, options in found.items()}
+
+
+def batch_on(device: str, n_robots: int, on_device: bool = False, **options: Any) -> gym.vector.VectorEnv:
+    """Batch environment, at "fast" without a scene. on_device: Whether observations stay on the device."""
+    return gym.make_vec(
+        "SeastarSwim-v0", n_robots, vectorization_mode="vector_entry_point", device=device, on_device=on_device,
+        **options,
+    )  # fmt: skip
+
+
+def observed(name: str, device: str) -> dict[str, Any]:
+    """How robots of an environment are seen and rewarded on the device, with observations copied and left there.
+
+    Returns whether all bits are the processor's, and names of what differs, over episodes of EPISODE decisions.
+    """
+    batches = [
+        batch_on(where, ROBOTS_OBSERVED, on_device, max_episode_steps=EPISODE, **environments()[name])
+        for where, on_device in (("cpu", False), (device, False), (device, True))
+    ]
+    batches[0].action_space.seed(0)
+    first, *others = ({"observations": on_processor(batch.reset(seed=0)[0])} for batch in batches)
+    differing: set[str] = set()
+    for _ in range(EPISODE + 2):
+        differing |= {key for other in others for key in first if not same(first[key], other[key])}
+        actions = batches[0].action_space.sample()
+        first, *others = (_decided(batch, actions) for batch in batches)
+    return {"same": not differing, "differing": sorted(differing)}
+
+
+def _decided(batch: gym.vector.VectorEnv, actions: Any) -> dict[str, Any]:
+    """Results of a decision by name, on the processor."""
+    *results, info = batch.step(actions)
+    last = [on_processor(row) for row in info.get("final_obs", ()) if row is not None]
+    return {**dict(zip(Buffers._fields, map(on_processor, results), strict=True)), "final_obs": np.array(last)}
+
+
+def on_processor(array: Any) -> Any:
+    """An array of the processor or of a device, on the processor."""
+    return array.get() if hasattr(array, "get") else array
 
 
 def same(one: Any, other: Any) -> bool:
@@ -174,16 +235,17 @@ def bandwidth() -> float:
     return float(2 * source.nbytes / min(seconds))
 
 
-def decisions(device: str, n_robots: int = 65536) -> dict[str, float]:
+def decisions(device: str, on_device: bool = False, n_robots: int = 65536) -> dict[str, float]:
     """Decisions per second of the batch environment at "fast" with random actions."""
-    batch = gym.make_vec("SeastarSwim-v0", n_robots, vectorization_mode="vector_entry_point", device=device)
+    batch = batch_on(device, n_robots, on_device)
     batch.reset(seed=0)
     batch.action_space.seed(0)
     actions = [batch.action_space.sample() for _ in range(4)]
     batch.step(actions[0])
     began = time.perf_counter()
     for action in actions[1:]:
-        batch.step(action)
+        observations = batch.step(action)[0]
+    on_processor(observations[:1])  # waits for the device
     seconds = time.perf_counter() - began
     batch.close()
     return {"decisions_per_second": rounded(3 * n_robots / seconds), "robots": n_robots}
@@ -196,10 +258,7 @@ def learning(device: str) -> dict[str, float]:
 
     from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 
-    batch = gym.make_vec(
-        "SeastarSwim-v0", ROBOTS_OF_LEARNER, vectorization_mode="vector_entry_point", device=device, actions="pairs",
-        autoreset_mode="SameStep",
-    )  # fmt: skip
+    batch = batch_on(device, ROBOTS_OF_LEARNER, actions="pairs", autoreset_mode="SameStep")
     on_gpu = torch.cuda.is_available() and device == "cuda"
     model = PPO("MlpPolicy", BatchVecEnv(batch), seed=0, device="cuda" if on_gpu else "cpu", **LEARNER)
     per_round = LEARNER["n_steps"] * ROBOTS_OF_LEARNER
@@ -225,30 +284,33 @@ class Options:
     device: str = "cuda"
     """"cuda", or "scalar", which compares bits alone."""
     names: tuple[str, ...] = ()
-    """Scenes to compare; all by default."""
+    """Scenes and environments to compare; all by default."""
     processes: int = os.cpu_count() or 1
-    """Processes that compare scenes at the same time."""
+    """Processes that compare at the same time."""
     out: Path = Path("runs/gpu")
     """Folder of the files."""
 
 
 def run(options: Options, results: Results) -> str | None:
     """Compare all scenes, and measure, but for what is in the file; what is measured is kept at once."""
-    names = options.names or tuple(scenes())
-    require_known("scene", names, scenes())
+    known = scenes() | environments()
+    names = options.names or tuple(known)
+    require_known("scene", names, known)
     if options.device == "cuda":
         results["gpu"] = gpu()
     context = multiprocessing.get_context("spawn")
-    bits = results.setdefault("bits", {})
-    missing = [name for name in names if name not in bits]
+    bits, observations = results.setdefault("bits", {}), results.setdefault("observations", {})
     with ProcessPoolExecutor(options.processes, context) as pool:
-        for name, found in zip(missing, pool.map(compared, missing, [options.device] * len(missing)), strict=True):
-            bits[name] = found
-            print(f"{name}: {'same bits' if found['same'] else found['differing']}, {found['seconds']}", flush=True)
-            results.save()
+        for kept, compare, ours in ((bits, compared, scenes()), (observations, observed, environments())):
+            missing = [name for name in names if name in ours and name not in kept]
+            for name, found in zip(missing, pool.map(compare, missing, [options.device] * len(missing)), strict=True):
+                kept[name] = found
+                told = "same bits" if found["same"] else ", ".join(found["differing"])
+                print(name, told, found.get("seconds", ""), sep=": ", flush=True)
+                results.save()
     if options.device == "cuda":
         measure(results)
-    different = [name for name, found in results["bits"].items() if not found["same"]]
+    different = [name for name, found in (bits | observations).items() if not found["same"]]
     return f"Other bits than the processor's: {', '.join(different)}." if different else None
 
 
@@ -273,6 +335,10 @@ def measure(results: Results) -> None:
                 results[name][device] = measured(device)
                 results.save()
         print(name, results[name], flush=True)
+    if ON_DEVICE not in results["environment"]:
+        results["environment"][ON_DEVICE] = decisions("cuda", on_device=True)
+        results.save()
+    print(ON_DEVICE, results["environment"][ON_DEVICE], flush=True)
 
 
 def share_of_bandwidth(results: Mapping[str, Any], preset: str, n_robots: str) -> float:

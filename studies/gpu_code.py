@@ -13,11 +13,15 @@ from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
+
+from seastar_gym.envs.pictures import observing
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simd.compilation import kept_code
-from seastar_gym.simulator.device_batch import program_of
+from seastar_gym.simd.device import Program
+from seastar_gym.simulator.device_batch import DeviceBatch, program_of
 from studies.frame import Results, Study
 from studies.gpu import EVERYTHING, scenes
 
@@ -40,7 +44,16 @@ def assembler() -> str | None:
 
 def code_of(scene: Scene) -> str:
     """The code for GPUs (PTX) of a scene whose limbs all turn alike, which is kept on the disk."""
-    program = program_of(scene)
+    return _kept(program_of(scene))
+
+
+def code_of_observations(scene: Scene) -> str:
+    """The code for GPUs (PTX) of the observations of a scene's robot, likewise."""
+    batch = DeviceBatch(scene, 1, "scalar", effort=False)
+    return _kept(batch.filling(*observing(batch.coefficients, scene.robot, np.zeros((1, 4)))))
+
+
+def _kept(program: Program) -> str:
     return kept_code(f"{program.key}-{cuda.ARCHITECTURE}.ptx", lambda: cuda.ptx_of(program).encode()).decode()
 
 

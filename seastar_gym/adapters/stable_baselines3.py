@@ -46,6 +46,8 @@ class BatchVecEnv(VecEnv):
         mode = env.metadata.get("autoreset_mode")
         if mode is not AutoresetMode.SAME_STEP:
             raise ValueError(f"Stable-Baselines3 needs autoreset_mode=AutoresetMode.SAME_STEP, not {mode}.")
+        if getattr(env.unwrapped, "on_device", False):
+            raise ValueError("Stable-Baselines3 needs observations on the processor: make the batch without on_device.")
         self.env = env
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
         self.metadata = {**env.metadata, **self.metadata}

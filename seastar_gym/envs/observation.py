@@ -67,6 +67,27 @@ def store_turned(out, row, x, y, c, s):
     store(out, row + 1, y * c - x * s)
 
 
+@kernel
+def observe_group(q, v, out, rest, limb_length, n_limbs, stations, targets, velocity_scale):
+    """Fill the observations of one lane group; arguments as in `observe`, borrowed, those of arrays of one group."""
+    per_length, per_velocity = 1.0 / load(limb_length, 0), 1.0 / velocity_scale
+    velocities = 2 * n_limbs * stations.n_stations
+    c, s = body_axis(rest, q, stations, n_limbs)
+    hub_x, hub_y = load(q, 0), load(q, 1)
+    for limb in range(n_limbs):
+        for station in range(stations.n_stations):
+            row = 2 * (limb * stations.n_stations + station)
+            x, y = at_station(q, stations, limb, station)
+            store_turned(out, row, x * per_length, y * per_length, c, s)
+            vx, vy = at_station(v, stations, limb, station)
+            store_turned(out, velocities + row, vx * per_velocity, vy * per_velocity, c, s)
+    row = 2 * velocities
+    store_turned(out, row, load(v, 0) * per_velocity, load(v, 1) * per_velocity, c, s)
+    for k in range(2):
+        x, y = load(targets, 2 * k) - hub_x, load(targets, 2 * k + 1) - hub_y
+        store_turned(out, row + 2 + 2 * k, x * per_length, y * per_length, c, s)
+
+
 @entry_point
 def observe(rest, limb_length, q, v, stations, targets, velocity_scale, out):
     """Fill the observations of lane groups.
@@ -77,33 +98,14 @@ def observe(rest, limb_length, q, v, stations, targets, velocity_scale, out):
         (n_groups, 4, N_LANES).
     out: Observations, shape (n_groups, observation size, N_LANES).
     """
-    places, per_velocity = borrow(stations), 1.0 / velocity_scale
+    places = borrow(stations)
     n_limbs = n_limbs_of(places.root_weights, places, rest.shape[1])
-    velocities = 2 * n_limbs * stations.n_stations
     for group in range(q.shape[0]):
-        rest_rows = borrow(rest[group % rest.shape[0]])
-        per_length = 1.0 / load(borrow(limb_length[group % limb_length.shape[0]]), 0)
-        position, velocity, target, rows = (
-            borrow(q[group]),
-            borrow(v[group]),
-            borrow(targets[group]),
-            borrow(out[group]),
-        )
-        c, s = body_axis(rest_rows, position, places, n_limbs)
-        hub_x, hub_y = load(position, 0), load(position, 1)
-        hub_vx, hub_vy = load(velocity, 0), load(velocity, 1)
-        for limb in range(n_limbs):
-            for station in range(stations.n_stations):
-                row = 2 * (limb * stations.n_stations + station)
-                x, y = at_station(position, places, limb, station)
-                store_turned(rows, row, x * per_length, y * per_length, c, s)
-                vx, vy = at_station(velocity, places, limb, station)
-                store_turned(rows, velocities + row, vx * per_velocity, vy * per_velocity, c, s)
-        row = 2 * velocities
-        store_turned(rows, row, hub_vx * per_velocity, hub_vy * per_velocity, c, s)
-        for k in range(2):
-            x, y = load(target, 2 * k) - hub_x, load(target, 2 * k + 1) - hub_y
-            store_turned(rows, row + 2 + 2 * k, x * per_length, y * per_length, c, s)
+        own_rest, own_length = borrow(rest[group % rest.shape[0]]), borrow(limb_length[group % limb_length.shape[0]])
+        observe_group(
+            borrow(q[group]), borrow(v[group]), borrow(out[group]), own_rest, own_length, n_limbs, places,
+            borrow(targets[group]), velocity_scale,
+        )  # fmt: skip
 
 
 @entry_point

@@ -1,11 +1,15 @@
 """What the kernels of `observation.py` see of the robots of a simulator, as rows of numbers."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.layout import VELOCITY_SCALE, Layout
-from seastar_gym.envs.observation import body_axes, observe
+from seastar_gym.envs.observation import body_axes, observe, observe_group
 from seastar_gym.envs.stations import stations_of
+from seastar_gym.model.coefficients import Coefficients
+from seastar_gym.scene import Seastar
 from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator
 
@@ -22,6 +26,26 @@ def observed_rows(simulator: Simulator, targets: Floats) -> Floats:
     places = stations_of(robot)
     observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
     return out
+
+
+def rows_on_device(simulator: Simulator, targets: Floats) -> Any:
+    """`observed_rows` on the simulator's device, in its groups, shape (n_groups, k, 32) on another than "cpu"."""
+    if simulator.device == "cpu":
+        return observed_rows(simulator, targets)
+    return simulator.filled_on_device(*observing(simulator.coefficients, simulator.scene.robot, targets))
+
+
+def observing(own: Coefficients, robot: Seastar, targets: Floats) -> tuple[Any, dict[str, Any], int]:
+    """The kernel of observations, its numbers but for the state, and the number of its rows, see `DeviceBatch.filled`.
+
+    own: Of the robots. targets: As in `observed_rows`.
+    """
+    rest, length = (rows[0, :, 0] if own.are_shared else rows for rows in (own.rest, own.limb_length))
+    numbers = {
+        "rest": rest, "limb_length": length, "n_limbs": robot.n_limbs, "stations": stations_of(robot),
+        "targets": to_rows(targets), "velocity_scale": VELOCITY_SCALE,
+    }  # fmt: skip
+    return observe_group, numbers, Layout(robot.n_limbs).size
 
 
 def axes_of(simulator: Simulator) -> Floats:

@@ -15,6 +15,7 @@ import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator
 from dataclasses import replace
+from types import ModuleType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -27,7 +28,7 @@ from seastar_gym.envs.layout import HEADINGS, N_STATIONS, Entry, Layout
 from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
 from seastar_gym.envs.observation import to_float32
 from seastar_gym.envs.options import SwimOptions
-from seastar_gym.envs.pictures import axes_of, lengths_of, observed_rows
+from seastar_gym.envs.pictures import axes_of, lengths_of, observed_rows, rows_on_device
 from seastar_gym.envs.randomization import ACTION_DELAY, LIMB_STRENGTHS, drawn_scene
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.scenery import NOTHING, Scenery
@@ -222,20 +223,34 @@ class Swimming(ABC):
     def observe(self) -> NDArray[np.float32]:
         """Observations, shape (n_robots, size), a fresh array; see layout.py."""
         at, tracker = self.layout, self._tracker
-        if tracker is None and self._is_bare:
-            return self._seen_now()
+        if tracker is None:
+            return self._with_more(self._seen_now(), np)
         found = np.empty((self.n_robots, at.size), np.float32)
         found[:, at.actuators] = self._remembered()
-        if tracker is None:
-            seen = self._seen_now()
-            found[:, at.stations_and_hub] = seen[:, : at.stations_and_hub.stop]
-            found[:, at.further], found[:, at.waypoints] = self._wanted(), seen[:, self._without_more.waypoints]
-            return found
         if at.shows_limbs:
             found[:, at.stations_and_hub] = tracker.of_limbs(lengths_of(self.simulator))
         found[:, at.further] = np.concatenate([self._wanted(), tracker.entries(self.simulator.time)], axis=1)
         away = self._targets().reshape(-1, 2, 2) - tracker.hub[:, None]
         found[:, at.waypoints] = self._in_body_frame(away / lengths_of(self.simulator)[:, None, None]).reshape(-1, 4)
+        return found
+
+    def observe_on_device(self) -> Any:
+        """`observe` as a fresh array of the simulator's device. What a `Sight` shows is copied there."""
+        if self._tracker is not None:
+            return self.simulator.arrays.asarray(self.observe())
+        seen = to_float32(rows_on_device(self.simulator, self._targets()), self.n_robots)
+        return self._with_more(seen, self.simulator.arrays)
+
+    def _with_more(self, seen: Any, arrays: ModuleType) -> Any:
+        """Observations without delay, by what the kernel fills. arrays: Module of its arrays."""
+        if self._is_bare:
+            return seen
+        at = self.layout
+        found = arrays.empty((self.n_robots, at.size), np.float32)
+        found[:, at.stations_and_hub] = seen[:, : at.stations_and_hub.stop]
+        found[:, at.waypoints] = seen[:, self._without_more.waypoints]
+        found[:, at.actuators] = arrays.asarray(self._remembered())
+        found[:, at.further] = arrays.asarray(self._wanted())
         return found
 
     def privileged_observations(self) -> NDArray[np.float32]:

@@ -21,7 +21,7 @@ from seastar_gym.envs.seastar_swim import FRAMES_PER_SECOND
 from seastar_gym.envs.swimming import Swimming
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.task_env import checked_options
-from seastar_gym.scene.checks import require_choice, require_count, require_seed, shown
+from seastar_gym.scene.checks import require_choice, require_count, require_flag, require_seed, shown
 from seastar_gym.simulator.simulator import MAX_ROBOTS
 
 Observations = NDArray[np.float32]
@@ -44,6 +44,8 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         `info["final_obs"]` and `info["final_info"]`. DISABLED: `reset` with `options={"reset_mask": ...}` is needed
         before the next step.
     threads: Number of threads of the simulator; by default one for every processor.
+    on_device: Whether observations are made on the `device` and stay there: arrays of CuPy on "cuda", which
+        `torch.from_dlpack` takes without a copy. Rewards, flags and info are numpy's. No bit differs.
     render_mode: "rgb_array": `render` returns a picture of every robot, the smaller the more there are;
         `render_robots` draws some of them.
 
@@ -56,6 +58,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
     (`waypoints`, `scene`, `np_random`, `render`, ..) they give robot by robot; everything else is common to all robots.
     """
 
+    on_device = False
     metadata = {
         "render_modes": ["rgb_array"], "render_fps": FRAMES_PER_SECOND, "autoreset_mode": AutoresetMode.NEXT_STEP,
     }  # fmt: skip
@@ -69,9 +72,12 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         render_mode: Literal["rgb_array"] | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
+        on_device: bool = False,
         **options: Any,
     ):
         self._set_batch(num_envs, max_episode_steps, render_mode, autoreset_mode)
+        require_flag("on_device", on_device)
+        self.on_device = bool(on_device)
         task = SwimTask(SwimOptions(*given, **options), num_envs, threads)
         timed = unless_strokes(task.options.decision_period, task.scene)
         warn_uncertified(task.scene, task.options.fidelity_of_scene, task.certificate, timed)
@@ -145,7 +151,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
                 self._generators[robot], self._seeds[robot] = seeding.np_random(seeds[robot])
         with self._until_whole():
             self._begin_episodes(mask, chosen.get(self._option))
-        return self._task.observe(), with_masks(self._task.first_info(), mask)
+        return self._observe(), with_masks(self._task.first_info(), mask)
 
     def _checked_mask(self, mask: Any) -> Flags:
         if mask is None:
@@ -172,6 +178,8 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
 
         out: Arrays that the results are written into, and that are returned then; by default fresh ones.
         """
+        if out is not None and self.on_device:
+            raise ValueError("out takes observations of the processor: make the batch without on_device, or copy them.")
         if out is not None:
             require_buffers(out, self.num_envs, self._task.layout.size)
         if not self._running:
@@ -206,10 +214,14 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         if resting.any():
             self._begin_episodes(resting)
         self._needs_reset = terminated | truncated
-        observations, info = self._task.observe(), self._info(outcome.info, resting)
+        observations, info = self._observe(), self._info(outcome.info, resting)
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._needs_reset.any():
             observations, info = self._begin_next_episodes(observations, outcome.info)
         return Buffers(observations, reward, terminated, truncated), info
+
+    def _observe(self) -> Observations:
+        """Observations: numpy's, or the device's if they are asked for."""
+        return self._task.observe_on_device() if self.on_device else self._task.observe()
 
     def action_masks(self) -> Flags:
         """Actions that every robot's wires can follow now, shape (num_envs, k), see `seastar_gym.envs.masks`."""
@@ -240,7 +252,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
             final_obs[robot] = observations[robot]
         final_info = with_masks({name: of_some(values, over) for name, values in strokes.items()}, over)
         self._begin_episodes(over)
-        return self._task.observe(), {
+        return self._observe(), {
             **self._info(strokes, over),
             "final_obs": final_obs,
             "_final_obs": over,

@@ -1,5 +1,6 @@
 """`Batch`: the numbers of all robots in memory, one robot per SIMD lane, and the kernels that advance them."""
 
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -85,6 +86,11 @@ class Batch:
         n_limbs = self._scene.robot.n_limbs
         rotations = Actuation(np.zeros((n_limbs, N_LANES)), np.zeros((n_limbs, N_LANES)))
         return make_work(self.coefficients.rods(0), self._scheme.n_stages), rotations
+
+    @property
+    def arrays(self) -> ModuleType:
+        """Module of the device's arrays."""
+        return np
 
     def read(self, rows: Floats) -> Floats:
         """Copy of rows (n_groups, k, N_LANES) robot by robot, shape (n_robots, k)."""

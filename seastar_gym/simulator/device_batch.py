@@ -14,7 +14,7 @@ from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stroke import cover_intervals
 from seastar_gym.scene import Scene
 from seastar_gym.simd import cuda, device, scalar
-from seastar_gym.simd.device import DeviceKernels, Program, leaves
+from seastar_gym.simd.device import DeviceKernels, Memory, Program, leaves
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator.batch import MOVED, Batch
 
@@ -76,6 +76,10 @@ class DeviceBatch(Batch):
     def v(self, rows: Floats) -> None:
         self._on_host["v"] = rows
 
+    @property
+    def arrays(self) -> ModuleType:
+        return self._arrays
+
     def _fetched(self, name: str) -> Floats:
         """Rows of q or v on the host, where they may be changed until the next interval."""
         if name in self._on_device:
@@ -93,6 +97,28 @@ class DeviceBatch(Batch):
         self._put_all()
         rows = self._rows(name)[:, : self.n_node_rows]
         return rows.transpose(0, 2, 1).reshape(-1, self.n_node_rows // 2, 2)[: self.n_robots]
+
+    def filled(self, kernel: Any, numbers: dict[str, Any], n_rows: int) -> Any:
+        """Rows that a kernel fills from q and v of every robot, shape (n_groups, n_rows, 32), on the device.
+
+        kernel: Gets q, v, the rows to fill and `numbers`, in this order, of one lane group. numbers: Named tuples and
+        arrays of shape (k,) that all robots share, plain numbers, and arrays (.., k, N_LANES) of all lane groups.
+        """
+        self._put_all()
+        program = self.filling(kernel, numbers, n_rows)
+        rows, values = program.memory.rows, [leaf for name in numbers for leaf in leaves(numbers[name], name)]
+        own, shared = self._memory_with(program.memory, values)
+        for name in ("q", "v"):
+            own[:, rows[name]] = self._rows(name)
+        code, unused = self._device.load(program), self._arrays.zeros(1)
+        self._device.run(code, own, shared, unused, unused, self.n_robots)
+        return own[:, rows["rows"]]
+
+    def filling(self, kernel: Any, numbers: dict[str, Any], n_rows: int) -> Program:
+        """The code of `filled`."""
+        of_one = {name: rows[0] if getattr(rows, "ndim", 0) > 1 else rows for name, rows in numbers.items()}
+        rows = {"q": self._on_host["q"][0], "v": self._on_host["v"][0], "rows": np.zeros((n_rows, N_LANES))}
+        return Program(_kernels(), _kernels()(kernel), rows | of_one, ())
 
     def moved(self) -> dict[str, Any]:
         rows = {name: self._rows(name).copy() for name in self._on_device}
@@ -147,23 +173,31 @@ class DeviceBatch(Batch):
         for name in ("q", "v"):
             self._fetched(name)
         memory = self.program(0).memory
-        own = self._arrays.zeros((self._n_groups, memory.n_rows, device.N_LANES))
-        shared = np.zeros(max(memory.n_shared, 1))
-        one = {"scheme": self._scheme, "fallback": SCHEMES["implicit-euler"]}
-        for name, numbers in [leaf for bundle, value in one.items() for leaf in leaves(value, bundle)]:
-            shared[memory.shared[name]] = numbers
+        numbers = leaves(self._scheme, "scheme") + leaves(SCHEMES["implicit-euler"], "fallback")
         groups = range(1 if self.coefficients.are_shared else len(self.peaks))
         of_groups = [
             leaves(self.coefficients.rods(k), "rods") + leaves(self.coefficients.limits(k), "limits") for k in groups
         ]
         for same in zip(*of_groups, strict=True):
             name, first = same[0]
-            if name in memory.rows:
-                own[:, memory.rows[name]] = self._to_device(np.stack([numbers for _, numbers in same]))
-            else:
-                shared[memory.shared[name]] = first
-        self._memory, self._own, self._shared, self._codes = memory, own, self._arrays.asarray(shared), {}
+            numbers.append((name, np.stack([rows for _, rows in same]) if name in memory.rows else first))
+        own, shared = self._memory_with(memory, numbers)
+        self._memory, self._own, self._shared, self._codes = memory, own, shared, {}
         self._coefficients = self.coefficients, self.coefficients.n_changes
+
+    def _memory_with(self, memory: Memory, numbers: list[tuple[str, Floats]]) -> tuple[Any, Any]:
+        """The robots' own memory on the device and the shared one, with numbers in them by name.
+
+        numbers: Of shape (n_groups, k, N_LANES), or (k,) if robots share them.
+        """
+        own = self._arrays.zeros((self._n_groups, memory.n_rows, device.N_LANES))
+        shared = np.zeros(max(memory.n_shared, 1))
+        for name, values in numbers:
+            if name in memory.rows:
+                own[:, memory.rows[name]] = self._to_device(values)
+            else:
+                shared[memory.shared[name]] = values
+        return own, self._arrays.asarray(shared)
 
     def _rows(self, name: str) -> Any:
         """Rows on the device by the name of the kernel's argument, shape (n_groups, k, 32), not a copy."""

@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from itertools import pairwise
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -276,6 +277,19 @@ class Simulator:
         if isinstance(self._batch, DeviceBatch):
             return self._batch.nodes_on_device("q" if name == "positions" else "v")
         return getattr(self, name)
+
+    @property
+    def arrays(self) -> ModuleType:
+        """Module of the device's arrays: CuPy on "cuda", else numpy."""
+        return self._batch.arrays
+
+    def filled_on_device(self, kernel: Any, numbers: dict[str, Any], n_rows: int) -> Any:
+        """Rows that a kernel fills from the state of every robot, on another device than "cpu".
+
+        See `DeviceBatch.filled`.
+        """
+        assert isinstance(self._batch, DeviceBatch)
+        return self._batch.filled(kernel, numbers, n_rows)
 
     @property
     def time(self) -> Floats:

@@ -127,6 +127,11 @@ def test_another_autoreset_mode_is_refused(mode):
         make_batch(autoreset_mode=mode)
 
 
+def test_observations_on_a_device_are_refused():
+    with pytest.raises(ValueError, match="needs observations on the processor: make the batch without on_device"):
+        make_batch(on_device=True)
+
+
 @pytest.mark.parametrize("symmetry", [False, True])
 def test_attributes_and_methods_are_those_of_the_batch(symmetry):
     batch = make_batch(symmetry)

@@ -10,12 +10,22 @@ from dataclasses import replace
 from typing import get_args
 from unittest.mock import Mock
 
-import gymnasium as gym
 import numba
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, StrokeReport
+from seastar_gym import (
+    DomainRandomization,
+    Numerics,
+    Scene,
+    Seastar,
+    Simulator,
+    SmaPulse,
+    SmaWires,
+    StrokeReport,
+    Uniform,
+)
+from seastar_gym.envs.buffers import Buffers
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simulator import device_batch
@@ -25,12 +35,23 @@ from seastar_gym.sweep.command import main as sweep_command
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.swimming import swim
 from strokes import assert_same, finished
-from studies.gpu import EVERYTHING, NOT_ON_DEVICES, compared, scenes
-from studies.gpu_code import code_of
+from studies.gpu import (
+    EVERYTHING,
+    NOT_ON_DEVICES,
+    batch_on,
+    compared,
+    environments,
+    observed,
+    on_processor,
+    scenes,
+)
+from studies.gpu_code import code_of, code_of_observations
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="devices have compiled code alone")
 
 SMALL = Scene(Seastar(nodes_per_limb=4), actuator=SmaPulse(0.4), numerics=Numerics.preset("fast"))
+AT_FAST = ("pairs", "continuous", "headings", "camera")
+"""Environments of the same scene, whose code is compiled once."""
 N_ROBOTS = 35
 """Robots of a batch: more than one group of a device or a processor, the last of which is not full."""
 
@@ -86,8 +107,7 @@ def test_states_reports_and_work_are_those_of_the_processor(device):
     for name in ("positions", "velocities"):
         there = both[1].on_device(name)
         assert isinstance(there, np.ndarray) == (device == "scalar")
-        here = there if device == "scalar" else there.get()
-        np.testing.assert_array_equal(here, getattr(both[0], name))
+        np.testing.assert_array_equal(on_processor(there), getattr(both[0], name))
 
 
 def test_resets_states_and_strengths_reach_the_device(device):
@@ -147,22 +167,53 @@ def test_a_robot_that_fails_fails_alike_and_alone(device):
     assert_same(*both)
 
 
-def test_environments_observe_and_are_rewarded_alike(device):
-    batches = [
-        gym.make_vec(
-            "SeastarSwim-v0", 5, vectorization_mode="vector_entry_point", scene=SMALL, actions="pairs",
-            max_episode_steps=3, device=where,
-        )
-        for where in ("cpu", device)
-    ]  # fmt: skip
-    seen = [[batch.reset(seed=3)[0]] for batch in batches]
-    batches[0].action_space.seed(0)
-    for _ in range(5):
-        actions = batches[0].action_space.sample()
-        for batch, arrays in zip(batches, seen, strict=True):
-            arrays += batch.step(actions)[:4]
-    for ours, theirs in zip(*seen, strict=True):
-        np.testing.assert_array_equal(ours, theirs)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[] if name.partition(", ")[2] in AT_FAST else pytest.mark.slow)
+        for name in environments()
+    ],
+)
+def test_environments_observe_and_are_rewarded_alike(device, name):
+    assert observed(name, device)["same"]
+
+
+ROBOTS = {
+    "three limbs, wires": {"scene": Scene(Seastar(3, nodes_per_limb=7), actuator=SmaWires()), "decision_period": 0.2},
+    "eight limbs": {"scene": Scene(Seastar(8, nodes_per_limb=13))},
+    "limbs in a row on a body": {"scene": scenes()["limbs in a row on a body"]},
+    "numbers of each robot": {"randomization": DomainRandomization({"robot.limb_length": Uniform(0.08, 0.12)})},
+}
+
+
+@pytest.mark.parametrize("options", ROBOTS.values(), ids=ROBOTS)
+def test_any_robot_in_any_state_is_observed_alike_on_the_device(device, options):
+    batch, rng = batch_on(device, N_ROBOTS, **options), np.random.default_rng(0)
+    batch.reset(seed=0)
+    for rows, size in ((batch.simulator.q, 0.01), (batch.simulator.v, 0.02)):
+        rows += rng.normal(0.0, size, rows.shape)
+    here, there = batch._task.observe(), batch._task.observe_on_device()
+    assert isinstance(there, np.ndarray) == (device == "scalar") and there.dtype == np.float32
+    np.testing.assert_array_equal(here, on_processor(there))
+    assert len(np.unique(here, axis=0)) == N_ROBOTS
+
+
+def test_the_state_stays_on_the_device_where_observations_do(device, monkeypatch):
+    batch = batch_on(device, 5, on_device=True)
+    batch.reset(seed=0)
+    actions = batch.action_space.sample()
+    batch.step(actions)
+    monkeypatch.setattr(DeviceBatch, "_fetched", Mock(side_effect=AssertionError))
+    batch.step(actions)
+
+
+def test_torch_takes_observations_as_they_are(device):
+    torch = pytest.importorskip("torch")
+    observations, _ = batch_on(device, 5, on_device=True).reset(seed=0)
+    there = torch.from_dlpack(observations)
+    assert there.shape == (5, 186) and there.dtype == torch.float32 and there.is_cuda == (device == "cuda")
+    observations[0, 0] = 7.0
+    assert there[0, 0] == 7.0
 
 
 def test_designs_of_a_sweep_swim_alike(device):
@@ -218,8 +269,20 @@ def test_a_device_that_is_not_there_is_refused_in_one_sentence(tmp_path, capsys)
     if not has_gpu():
         with pytest.raises(ValueError, match=r'^device="cuda" (needs CuPy|finds no NVIDIA GPU).*\.$'):
             Simulator(SMALL, device="cuda")
+        with pytest.raises(ValueError, match=r'^device="cuda" (needs CuPy|finds no NVIDIA GPU).*\.$'):
+            batch_on("cuda", 5, on_device=True)
         assert sweep_command(["robot.n_limbs=3", "--device", "cuda", "--out", str(tmp_path)]) == 2
         assert capsys.readouterr().err.startswith('device="cuda" ')
+
+
+def test_observations_on_a_device_are_refused_where_those_of_the_processor_are_needed():
+    with pytest.raises(ValueError, match="on_device must be True or False, not 'cuda'"):
+        batch_on("cpu", 5, on_device="cuda")
+    batch = batch_on("scalar", 5, on_device=True)
+    observations, _ = batch.reset(seed=0)
+    flags = np.zeros(5, bool)
+    with pytest.raises(ValueError, match="out takes observations of the processor: make the batch without on_device"):
+        batch.step(np.zeros((5, 5)), out=Buffers(observations, np.zeros(5), flags, flags))
 
 
 # The code for GPUs, without one
@@ -235,7 +298,15 @@ CODES = {scheme: replace(SMALL, numerics=Numerics(scheme, 0.005)) for scheme in 
 
 @pytest.mark.parametrize("scene", [*CODES.values(), scenes()[f"sdirk2, {EVERYTHING}"]], ids=[*CODES, "everything"])
 def test_the_code_for_gpus_rounds_every_operation_by_itself_and_calls_nothing(scene):
-    code = code_of(scene)
+    assert_strict(code_of(scene))
+
+
+@pytest.mark.parametrize("name", ["three limbs", "eight limbs in contact", "limbs in a row on a body"])
+def test_so_does_the_code_of_observations(name):
+    assert_strict(code_of_observations(scenes()[name]))
+
+
+def assert_strict(code: str) -> None:
     found = set(OF_DOUBLES.findall(code))
     assert {"add.rn.f64", "mul.rn.f64", "fma.rn.f64", "div.rn.f64", "sqrt.rn.f64"} <= found
     assert {name for name in found - ROUNDED_TO_NEAREST if not EXACT.fullmatch(name)} == set()

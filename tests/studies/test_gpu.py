@@ -47,7 +47,20 @@ def test_what_the_assembler_tells_is_read():
         gpu_code.facts("nothing")
 
 
-@pytest.mark.skipif(gpu_code.assembler() is None, reason="NVIDIA's assembler is not here: the extra gpu-check has it")
+needs_assembler = pytest.mark.skipif(
+    gpu_code.assembler() is None, reason="NVIDIA's assembler is not here: the extra gpu-check has it"
+)
+
+
+@needs_assembler
+@pytest.mark.parametrize("architecture", gpu_code.ARCHITECTURES)
+def test_the_code_of_observations_spills_nothing(architecture):
+    code = gpu_code.code_of_observations(gpu.scenes()["preset fast"])
+    found = gpu_code.needs(code, architecture, gpu_code.assembler())
+    assert found["stack"] == found["spill_stores"] == found["spill_loads"] == 0 < found["registers"] < 128
+
+
+@needs_assembler
 @pytest.mark.parametrize(
     "name", ["the chapter's scene", *(pytest.param(name, marks=pytest.mark.slow) for name in gpu_code.NAMES[1:])]
 )
