@@ -57,7 +57,7 @@ FINAL = {
         "0e818f3": "damping.json damping.png fidelities.json fidelities.png gaits.json gaits_directions.png "
         "gaits_front.png gaits_lag.png pentagon_from_rest.json pentagon_reheated.json",
         "9cd3be4": "ablations.json ablations.png ringing.json ringing.png",
-        "71299f4": "heading.json heading.png hub.json hub.png in_time.json in_time.png numerical_damping.json",
+        "71299f4": "heading.json heading.png hub.json hub.png numerical_damping.json",
     }.items()
     for file in files.split()
 }

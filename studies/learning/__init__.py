@@ -1,4 +1,4 @@
-"""What bounds the speed of learned policies, their ways, and what lateness costs them."""
+"""Trainings in time, and the fastest swims that offline searches find."""
 
 from seastar_gym.extras import require_extra
 

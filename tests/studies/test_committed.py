@@ -14,7 +14,6 @@ from seastar_gym import Certificate, Scene
 from seastar_gym.controllers.greedy import measure_gaits
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.evaluation.statistics import mean_with_interval
 from seastar_gym.evaluation.tasks import task_ids
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
@@ -197,24 +196,3 @@ def test_the_certificate_of_the_worked_example_is_that_of_the_fitted_scene_and_o
     assert str(chosen) == found["certificate"]["setting"] and certificate.samples == found["settings"]["samples"]
     assert chosen.error(certificate.promised) == found["certificate"]["error"]
     assert chosen.speed == found["certificate"]["times_real_time"]
-
-
-def test_no_seed_of_the_timed_trainings_is_left_out():
-    runs = read("in_time.json")["runs"]
-    assert all(list(found) == [str(seed) for seed in range(len(found))] for found in runs.values())
-
-
-@pytest.mark.parametrize("page", ["results.md", "training.md"])
-def test_pages_quote_the_mean_of_ten_timed_trainings(page):
-    """The fastest training stands beside all ten, and each is named once."""
-    runs = read("in_time.json")["runs"]["0.2 s, coasting"]
-    text = (DOCS / page).read_text(encoding="utf-8")
-    seconds = {
-        fidelity: np.array([run["pentagon"][fidelity]["seconds"] for run in runs.values()])
-        for fidelity in ("fast", "balanced", "reference")
-    }
-    shown = ["{:.1f} [{:.1f}, {:.1f}] s".format(*mean_with_interval(each)) for each in seconds.values()]
-    if page == "results.md":
-        assert f"| 0.2 s | {' | '.join(shown)} |" in text
-        assert "seed 1 |" not in text
-    assert f"{seconds['fast'].mean():.1f}" in text
