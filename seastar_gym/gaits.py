@@ -153,3 +153,36 @@ def lagged_pentagon(decision_period: float) -> Floats:
     swimming = np.tile(side, (LAGGED_SIDES[min(LAGGED_SIDES, key=lambda known: abs(known - lag))], 1))
     resting = np.zeros((LAGGED_REST * len(side), 5))
     return np.concatenate([part for turn in range(5) for part in (np.roll(swimming, turn, axis=1), resting)])
+
+
+# --- evolved gaits ---------------------------------------------------------------------------------------------------
+
+SLOT = 0.05
+"""Time between the decisions of the evolved gaits [s]. No pulse outlasts it: no share is above a half."""
+ALONG = (
+    (0.5, -0.44), (0.5, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (-0.21, 0.0), (0.0, 0.0), (0.0, -0.1),
+    (-0.37, -0.43), (-0.22, 0.0), (0.0, 0.0), (0.0, 0.5), (0.0, 0.36), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0),
+    (0.0, -0.13), (0.0, -0.45), (0.0, 0.0),
+)  # fmt: skip
+"""Evolved gait along limb 1: shares of a pulse of limbs 2 and 3; limbs 5 and 4 do the opposite. It is that of
+docs/gaits.json with slots of 0.05 s and a price of 0.5 mm/J, its pulses parted where they are longer than a slot."""
+AWAY = (
+    (-0.5, 0.0), (-0.35, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.31, 0.0), (0.0, 0.0), (0.0, -0.5),
+    (0.0, -0.47), (0.0, -0.5), (0.0, -0.21), (0.0, -0.14), (0.0, 0.0), (0.0, 0.5), (0.0, 0.29), (0.5, 0.13),
+    (0.03, 0.0), (-0.17, 0.0), (0.0, 0.0),
+)  # fmt: skip
+"""Evolved gait away from limb 1, likewise, of the gait with slots of 0.1 s."""
+
+
+def evolved_gaits(decision_period: float | None) -> Floats:
+    """One period of every evolved gait, along and away from each of five limbs, shape (10, 20, 5).
+
+    decision_period: Of the environment [s], SLOT. ValueError for another one.
+    """
+    if decision_period is None or not np.isclose(decision_period, SLOT, rtol=1e-9):
+        theirs = "strokes" if decision_period is None else f"one every {shown(decision_period)} s"
+        raise ValueError(f"Evolved gaits need a decision every {SLOT:g} s, not {theirs}.")
+    gaits = np.zeros((2, len(ALONG), 5))
+    gaits[:, :, 1:3] = ALONG, AWAY
+    gaits[:, :, 3:] = -gaits[:, :, 2:0:-1]
+    return np.concatenate([np.roll(gaits, limb, axis=2) for limb in range(5)])

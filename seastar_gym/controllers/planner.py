@@ -2,17 +2,20 @@
 
 It has the observations of any agent. An observation is the whole state of the robot and its wires, to single precision,
 so a beam search can begin from it: at each of a few decisions, all pairs of limbs are tried from the best few states so
-far. The planner then swims the first command of the sequence that leaves the shortest rewarded route. A robot of more
+far. The planner then swims the first command of the sequence that leaves the shortest rewarded route. `gait_planner`
+tries whole periods of evolved gaits instead, and decides once a second. A robot of more
 than ten nodes per limb is taken to lie smoothly through the stations that are observed.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.controllers.contract import observed
+from seastar_gym.controllers.contract import observed, starts
 from seastar_gym.controllers.greedy import Searcher, require_search, waypoints_of
 from seastar_gym.envs.commands import checked_decision_period, command_table
 from seastar_gym.envs.headings import Headings, wrapped
@@ -20,13 +23,15 @@ from seastar_gym.envs.layout import HEADINGS, N_STATIONS, VELOCITY_SCALE, Layout
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import body_heading, node_weights, of_beginning
+from seastar_gym.gaits import evolved_gaits
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import complete
-from seastar_gym.scene.checks import require_count, require_kind, require_number
+from seastar_gym.scene.checks import as_finite, require_count, require_kind, require_number
 from seastar_gym.simulator import Simulator, State
 from seastar_gym.simulator.simulator import MAX_THREADS
 
 Floats = NDArray[np.float64]
+Look = Callable[[Floats], None]
 
 
 DEEPEST, WIDEST = 1000, 100_000
@@ -51,6 +56,8 @@ class Budget:
         require_number("coasting", self.coasting, "s", zero_allowed=True)
 
 
+OF_GAITS = Budget(4, 8)
+"""Budget of `gait_planner`: 250 seconds of one robot or fewer for every second."""
 SHARE = 0.2
 """Share of the time between decisions in which the planner is to answer, on two processors."""
 TIMED_BUDGETS = {0.5: Budget(3, 8, 0.5), 0.2: Budget(3, 4, 0.8), 0.1: Budget(2, 3, 0.9)}
@@ -95,15 +102,14 @@ def state_of(observations: NDArray[np.float32], scene: Scene, layout: Layout | N
 
 
 class Branching:
-    """Simulation of every command from every state, the step of a tree search.
+    """Simulation of every move from every state, the step of a tree search.
 
+    moves: Commands of decisions that follow each other, shape (n_moves, n_decisions, n_limbs).
     decision_period: Time between commands [s]. None means a stroke.
     """
 
-    def __init__(
-        self, scene: Scene, commands: Floats, threads: int | None = None, decision_period: float | None = None
-    ):
-        self.scene, self.commands, self.threads = scene, commands, threads
+    def __init__(self, scene: Scene, moves: Floats, threads: int | None = None, decision_period: float | None = None):
+        self.scene, self.moves, self.threads = scene, moves, threads
         self._duration = checked_decision_period(decision_period, scene)
         self._simulators: dict[int, Simulator] = {}
 
@@ -120,16 +126,22 @@ class Branching:
             self._simulators[n] = Simulator(self.scene, n, self.threads)
         return self._simulators[n]
 
-    def __call__(self, states: State) -> State:
-        """States after one decision, shape (states * commands, ...), those of the same state side by side."""
-        return self.each(states, np.broadcast_to(self.commands, (len(states.time), *self.commands.shape)))
+    def __call__(self, states: State, look: Look | None = None) -> State:
+        """States after one move, shape (states * moves, ...), those of the same state side by side.
 
-    def each(self, states: State, commands: Floats) -> State:
-        """States after one decision by commands of their own, shape (states, commands, n_limbs), as of a call."""
-        n_states, n_commands, n_limbs = commands.shape
-        simulator = self._simulator(n_states * n_commands)
-        simulator.set_state(states.of_robots(np.repeat(np.arange(n_states), n_commands)))
-        simulator.advance(self._duration, commands.reshape(-1, n_limbs))
+        look: Called with the positions of nodes [m], shape (states * moves, n_nodes, 2), after every decision.
+        """
+        return self.each(states, np.broadcast_to(self.moves, (len(states.time), *self.moves.shape)), look)
+
+    def each(self, states: State, moves: Floats, look: Look | None = None) -> State:
+        """States after one move of their own, shape (states, n_moves, n_decisions, n_limbs), as of a call."""
+        n_states, n_moves, n_decisions, n_limbs = moves.shape
+        simulator = self._simulator(n_states * n_moves)
+        simulator.set_state(states.of_robots(np.repeat(np.arange(n_states), n_moves)))
+        for commands in np.moveaxis(moves.reshape(-1, n_decisions, n_limbs), 1, 0):
+            simulator.advance(self._duration, commands)
+            if look is not None:
+                look(simulator.positions)
         return simulator.get_state()._replace(commands=None, phase=None)  # the next commands take their place
 
 
@@ -145,17 +157,49 @@ class Targets(NamedTuple):
     turn_after: Floats | None = None
 
 
+SOONER = 1e3
+"""Way that a decision since the arrival counts as [m], so that who arrives first is best."""
+
+
+class Outcome:
+    """What is found of candidates, arrays of shape (n, candidates), while they swim a move.
+
+    way: To go now [m]. passed: Whether the current waypoint is passed. since: Decisions since the arrival at the last
+    waypoint, that of the arrival included; 0 before it.
+    """
+
+    def __init__(self, passed: NDArray[np.bool_]):
+        self.way, self.passed, self.since = np.zeros(passed.shape), passed, np.zeros(passed.shape, np.int64)
+
+    def add(self, way: Floats, passed: NDArray[np.bool_], there: NDArray[np.bool_]) -> None:
+        """Take in what is judged after a decision."""
+        self.way, self.passed = way, passed
+        self.since += there
+
+
+def _checked_moves(moves: ArrayLike | None, n_limbs: int) -> Floats:
+    """Moves, shape (n_moves, n_decisions, n_limbs), by default every pair of limbs; ValueError for what is none."""
+    if moves is None:
+        return command_table("pairs", n_limbs)[:, None]
+    checked = as_finite("moves", moves, (None, None, n_limbs))
+    if checked.ndim != 3 or checked.size == 0:
+        raise ValueError(f"moves must have shape (n_moves, n_decisions, {n_limbs}), not {checked.shape}.")
+    if np.abs(checked).max() > 1.0:
+        raise ValueError("moves must be shares of a pulse from -1 to 1.")
+    return checked
+
+
 class Planner(Searcher):
-    """Agent that runs a beam search over pairs of limbs before every decision.
+    """Agent that runs a beam search over pairs of limbs, or over moves, before every decision or move.
 
     scene: Scene of the search, by default the chapter's at fidelity "fast", with wires if decisions are not strokes.
     waypoint_radius: Radius of the waypoints [m]. budget: Limits of the search, by default those of the decision period.
     threads: Number of threads of the simulator, by default one for every processor. reward: Reward whose route is
     shortened. decision_period: Of the environment [s]. None means a stroke. headings: Those of the environment; what is
-    left to turn is then added to the route, at the price that it has in the reward.
+    left to turn is then added to the route, at the price that it has in the reward. moves: Commands of decisions that
+    follow each other, shares of a pulse of shape (n_moves, n_decisions, n_limbs), such as whole periods of gaits. The
+    planner then decides after every move, and sees no pulse that is under way: pulses should end with their decision.
     """
-
-    actions = "pairs"
 
     def __init__(
         self,
@@ -166,6 +210,7 @@ class Planner(Searcher):
         reward: RewardWeights = RewardWeights(),
         decision_period: float | None = None,
         headings: Headings | None = None,
+        moves: ArrayLike | None = None,
     ):
         require_kind("headings", headings, Headings | None, "Headings, or None")
         require_kind("budget", budget, Budget | None, "a Budget, or None")
@@ -176,14 +221,43 @@ class Planner(Searcher):
             require_count("threads", threads, 1, MAX_THREADS)
         self.waypoint_radius, self.reward, self.decision_period = waypoint_radius, reward, decision_period
         self.budget = budget_for(decision_period) if budget is None else budget
-        self._commands = command_table(self.actions, self.scene.robot.n_limbs)
+        self.actions = "pairs" if moves is None else "continuous"
+        self.moves = _checked_moves(moves, self.scene.robot.n_limbs)
         self._layout = Layout.of(self.scene, entries=() if headings is None else HEADINGS)
-        self._swim_all = Branching(self.scene, self._commands, threads, decision_period)
+        self._swim_all = Branching(self.scene, self.moves, threads, decision_period)
 
     def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
-        """Actions for observations of shape (n, size)."""
+        """Best moves, shape (n,), for observations of shape (n, size)."""
         observations = np.atleast_2d(observed(observations, self._layout.size))
         return self._search(state_of(observations, self.scene, self._layout), self._targets(observations))
+
+    def predict(
+        self,
+        observation: NDArray[np.float32],
+        state: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = False,
+    ) -> tuple[NDArray[Any], Any]:
+        """Actions for observations of shape (size,) or (n, size), and the state for the next call.
+
+        state: Moves under way and how many of their decisions are made, shapes (n,); None before the first decision.
+        The state stays None where moves are one decision long. episode_start: Whether an episode begins, shape (n,).
+        """
+        if self.moves.shape[1] == 1:
+            observations = np.atleast_2d(observed(observation, 1))
+            chosen, state = self.choose(observations), None
+            actions = chosen if self.actions == "pairs" else self.moves[chosen, 0].astype(np.float32)
+        else:
+            observations = np.atleast_2d(observed(observation, self._layout.size))
+            n = len(observations)
+            under_way, made = (np.zeros(n, np.int64), np.zeros(n, np.int64)) if state is None else state
+            made = np.where(starts(episode_start, n), 0, made)
+            chosen, due = under_way.copy(), made == 0
+            if due.any():
+                chosen[due] = self.choose(observations[due])
+            actions = self.moves[chosen, made].astype(np.float32)
+            state = chosen, (made + 1) % self.moves.shape[1]
+        return (actions[0] if np.ndim(observation) == 1 else actions), state
 
     def _targets(self, observations: NDArray[np.float32]) -> Targets:
         """Targets that observations, shape (n, size), tell of."""
@@ -195,29 +269,33 @@ class Planner(Searcher):
         return Targets(*waypoints, turns[:, 0], turns[:, 1])
 
     def _search(self, start: State, targets: Targets) -> NDArray[np.int64]:
-        """First action of the best sequence for every robot, shape (n,)."""
-        current = targets.current
-        robots, n_commands = np.arange(len(current))[:, None], len(self._commands)
+        """First move of the best sequence for every robot, shape (n,)."""
+        n, n_moves = len(targets.current), len(self.moves)
+        robots = np.arange(n)[:, None]
         states, width = start, 1
-        passed = np.zeros((len(current), 1), bool)
-        first = np.zeros((len(current), 1), np.int64)
-        chosen, arrived = np.zeros(len(current), np.int64), np.zeros(len(current), bool)
-        for stroke in range(self.budget.depth):
-            states = self._swim_all(states)
-            way, passed, there = self._judge(states.positions, np.repeat(passed, n_commands, axis=1), targets)
+        passed = np.zeros((n, 1), bool)
+        first = np.zeros((n, 1), np.int64)
+        chosen, arrived = np.zeros(n, np.int64), np.zeros(n, bool)
+        for move in range(self.budget.depth):
+            found = Outcome(np.repeat(passed, n_moves, axis=1))
+            states = self._swim_all(states, partial(self._look, found, targets))
+            way, passed, there = found.way, found.passed, found.since > 0
             if self.budget.coasting > 0.0:
                 way, *_ = self._judge(self._swim_all.coasted(states, self.budget.coasting), passed, targets)
-            first = (
-                np.tile(np.arange(n_commands), (len(current), 1)) if stroke == 0 else np.repeat(first, n_commands, 1)
-            )
+            way = way - SOONER * found.since
+            first = np.tile(np.arange(n_moves), (n, 1)) if move == 0 else np.repeat(first, n_moves, 1)
             best = np.argsort(way, axis=1)[:, : self.budget.beam]
-            # Who arrives within this decision cannot arrive sooner by a longer sequence.
+            # Who arrives within this move cannot arrive sooner by a longer sequence.
             chosen = np.where(arrived, chosen, first[robots[:, 0], best[:, 0]])
             arrived |= there.any(axis=1)
             first, passed = first[robots, best], passed[robots, best]
-            rows = (robots * width * n_commands + best).reshape(-1)
+            rows = (robots * width * n_moves + best).reshape(-1)
             states, width = states.of_robots(rows), best.shape[1]
         return chosen
+
+    def _look(self, found: Outcome, targets: Targets, positions: Floats) -> None:
+        """Judge candidates after a decision."""
+        found.add(*self._judge(positions, found.passed, targets))
 
     def _judge(
         self, positions: Floats, passed: NDArray[np.bool_], targets: Targets
@@ -241,3 +319,12 @@ class Planner(Searcher):
         passed = passed | near
         last = (current == after).all(axis=-1)
         return np.where(passed & ~last, beyond, way), passed, passed & last
+
+
+def gait_planner(decision_period: float | None, budget: Budget = OF_GAITS, threads: int | None = None) -> Planner:
+    """Planner of the chapter's robot with wires that tries one period of every evolved gait, and decides once a second.
+
+    decision_period: Of the environment [s], 0.05 s. ValueError for another one.
+    """
+    moves = evolved_gaits(decision_period)
+    return Planner(budget=budget, threads=threads, decision_period=decision_period, moves=moves)

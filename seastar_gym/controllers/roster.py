@@ -14,7 +14,7 @@ import numpy as np
 from seastar_gym.controllers import foreign, learned, learner_zip
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit
 from seastar_gym.controllers.greedy import GreedyPolicy
-from seastar_gym.controllers.planner import Planner
+from seastar_gym.controllers.planner import Planner, gait_planner
 from seastar_gym.controllers.scripted import GAITS, scripted
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -34,6 +34,7 @@ AGENTS: dict[str, Callable[[Scene, float | None, str | None], Policy]] = {
     "learned": lambda scene, decision_period, task: learned.load(learned.in_the_box(decision_period, task=task)),
     "greedy": lambda scene, decision_period, task: GreedyPolicy(scene, decision_period=decision_period),
     "planner": lambda scene, decision_period, task: Planner(decision_period=decision_period),  # at fidelity "fast"
+    "gait-planner": lambda scene, decision_period, task: gait_planner(decision_period),  # likewise
 }
 """Functions that make the agents that are not scripted, by name, for the scene that they swim in, the time between
 decisions [s], None for strokes, and the name of the task, None for waypoints."""

@@ -91,20 +91,20 @@ def mixed_speed(displacements: Floats, directions: Floats) -> Floats:
 
 def search_path(scene: Scene, waypoints: Floats, actions: Actions, beam: int, max_strokes: int = 400) -> Gaits:
     """Actions of the shortest swim found from rest through all waypoints [m]; empty if none ends within max_strokes."""
-    swim_all = Branching(scene, command_table(actions, scene.robot.n_limbs))
+    swim_all = Branching(scene, command_table(actions, scene.robot.n_limbs)[:, None])
     states, actions_so_far, reached = _at_rest(scene), np.zeros((1, 0), np.intp), np.zeros(1, np.intp)
     legs = np.linalg.norm(np.diff(waypoints, axis=0), axis=1)
     way_after = np.append(np.cumsum(legs[::-1])[::-1], 0.0)
     last = len(waypoints) - 1
     for _ in range(max_strokes):
-        states, reached = swim_all(states), np.repeat(reached, len(swim_all.commands))
+        states, reached = swim_all(states), np.repeat(reached, len(swim_all.moves))
         hub = states.positions[:, 0]
         reached = reached + (np.linalg.norm(waypoints[np.minimum(reached, last)] - hub, axis=1) <= WAYPOINT_RADIUS)
         current, after = np.minimum(reached, last), np.minimum(reached + 1, last)
         to_next = RewardWeights().way_to_next(hub, waypoints[current], waypoints[after], WAYPOINT_RADIUS)
         way = to_next + way_after[after]
         best = np.argsort(way)[:beam]
-        states, actions_so_far = _keep(states, actions_so_far, best, len(swim_all.commands))
+        states, actions_so_far = _keep(states, actions_so_far, best, len(swim_all.moves))
         reached = reached[best]
         if (reached > last).any():
             return actions_so_far[np.argmax(reached > last)]

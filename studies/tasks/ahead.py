@@ -91,13 +91,13 @@ class Ahead:
         period = None if robots.in_strokes else robots.period
         self.commands, self._depth, self._beam = commands, depth, beam
         self.coasting = 0.0 if robots.in_strokes else COASTING
-        self._swim_all = Branching(robots.scene, commands, 1, period)
+        self._swim_all = Branching(robots.scene, commands[..., None, :], 1, period)
 
     def _swum(self, states: State, n: int) -> State:
         """States of n robots after each of the commands, see `Branching`."""
         if self.commands.ndim == 2:
             return self._swim_all(states)
-        return self._swim_all.each(states, np.repeat(self.commands, len(states.time) // n, axis=0))
+        return self._swim_all.each(states, np.repeat(self.commands, len(states.time) // n, axis=0)[..., None, :])
 
     def best(self, states: State, cost: Any) -> NDArray[np.intp]:
         """Number of the first command of the best sequence of every robot, shape (n,).

@@ -5,10 +5,12 @@ import pytest
 
 from seastar_gym import Body, Headings, Numerics, RewardWeights, Scene, Seastar, Simulator, ThermalSma
 from seastar_gym.controllers.greedy import waypoints_of
-from seastar_gym.controllers.planner import Budget, Planner, Targets, state_of
+from seastar_gym.controllers.planner import Budget, Planner, Targets, gait_planner, state_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.symmetry import transform_commands
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.swim import swim
+from seastar_gym.gaits import evolved_gaits
 
 FAST = Scene(numerics=Numerics.preset("fast"))
 
@@ -142,3 +144,60 @@ def test_the_planner_turns_to_either_side_and_keeps_a_heading_that_is_met():
         assert done.finished
         ends.append(done.time[-1])
     assert ends[0] > 2.0 and ends[1] > 2.0 and ends[2] == 0.5
+
+
+def test_evolved_gaits_are_all_turns_and_mirror_images_of_each_and_their_pulses_end_with_their_decisions():
+    """So no pulse is under way that an observation does not tell of."""
+    gaits = evolved_gaits(0.05)
+    assert gaits.shape == (10, 20, 5) and np.abs(gaits).max() == 0.5
+    carried = [np.asarray(transform_commands(gait, element)) for gait in gaits for element in range(10)]
+    assert {gait.tobytes() for gait in np.unique(carried, axis=0) + 0.0} == {gait.tobytes() for gait in gaits + 0.0}
+    for other in (None, 0.1):
+        with pytest.raises(ValueError, match=r"need a decision every 0\.05 s, not "):
+            evolved_gaits(other)
+
+
+def test_over_periods_of_gaits_it_decides_once_a_second_and_swims_round_a_corner_in_nine():
+    planner = gait_planner(0.05, Budget(2, 3), threads=1)
+    chosen = []
+    choose = planner.choose
+    planner.choose = lambda observations: chosen.append(choose(observations)) or chosen[-1]
+    env = SeastarSwimEnv(
+        path=[[0.04, 0.0], [0.04, 0.04]], actions=planner.actions, fidelity="balanced", decision_period=0.05
+    )
+    done = swim("gait-planner", planner, env, max_strokes=400)
+    assert done.finished and done.time[-1] < 9.0
+    assert len(chosen) == np.ceil(done.time[-1])
+
+
+def test_of_moves_that_arrive_the_planner_takes_the_one_that_arrives_first():
+    """Both gaits pass the goal, which lies where the second one is after seven decisions."""
+    fast, slow = evolved_gaits(0.05)[0], 0.0 * evolved_gaits(0.05)[0]
+    slow[7:] = fast[:-7]
+    planner = Planner(waypoint_radius=0.001, budget=Budget(1, 2), threads=1, decision_period=0.05, moves=[slow, fast])
+    start, hubs = Simulator(planner.scene).get_state(), []
+    planner._swim_all(start, lambda positions: hubs.append(positions[:, 0]))
+    goal = np.array(hubs)[10, 1][None]
+    assert planner._search(start, Targets(goal, goal)) == [1]
+    state = None
+    observation = np.zeros((3, planner._layout.size), np.float32)
+    for _ in range(3):
+        actions, state = planner.predict(observation, state)
+    assert actions.shape == (3, 5) and (state[1] == 3).all()
+    _, state = planner.predict(observation, state, episode_start=np.array([False, True, False]))
+    assert state[1].tolist() == [4, 1, 4]
+
+
+@pytest.mark.parametrize(
+    ("moves", "sentence"),
+    [
+        (np.zeros((1, 20, 4)), "moves must be numbers of shape"),
+        (np.zeros((1, 1, 20, 5)), "moves must have shape"),
+        (np.zeros((0, 20, 5)), "moves must have shape"),
+        (np.full((1, 20, 5), 1.5), "moves must be shares of a pulse from -1 to 1"),
+        (np.full((1, 20, 5), np.nan), "moves must be finite numbers"),
+    ],
+)
+def test_what_is_no_move_is_refused(moves, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        Planner(decision_period=0.05, moves=moves)

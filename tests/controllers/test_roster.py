@@ -103,7 +103,7 @@ def test_a_policy_says_its_action_mode_or_takes_that_of_the_environment():
 def test_a_gait_that_does_not_fit_says_so_and_an_unknown_one_what_there_is():
     with assert_refused("are for five limbs, not 4"):
         load_agents(["pentagon"], scene=Scene(Seastar(4)))
-    with assert_refused("Unknown scripted agent 'gallop'", "Others are learned, greedy, planner"):
+    with assert_refused("Unknown scripted agent 'gallop'", "Others are learned, greedy, planner, gait-planner"):
         load_agents(["gallop"])
 
 

@@ -337,5 +337,5 @@ def test_models_go_by_the_names_of_their_files(monkeypatch, tmp_path):
 def test_an_unknown_agent_is_told_every_name(capsys):
     assert main(["--agents", "nobody"]) == 2
     error = capsys.readouterr().err
-    assert "pentagon" in error and "learned, greedy, planner, files" in error and "module:function" in error
+    assert "pentagon" in error and "planner, gait-planner, files" in error and "module:function" in error
     assert error.count("\n") == 1
