@@ -1,20 +1,23 @@
 """How well limbs that press each other are resolved, by stiffness and shape of their contact.
 
 The sequences of the work-precision study are swum with more and more nodes, and with 73, all with steps that leave
-errors of space alone. Other numbers say how far a contact leads from the default's path, how fast two neighbours may
-be thrown at each other before their robot stops, and what a stroke costs over one without contact.
+errors of space alone. Other numbers say how far a contact leads from the default's path, what `certify` says of
+repeated commands, how fast two neighbours may be thrown at each other before their robot stops, and what a stroke costs
+over one without contact.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache, partial
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.accuracy.measure import Swims, errors, path_lengths, swim
+from seastar_gym.accuracy.commands import CLASSES, draw_classes
+from seastar_gym.accuracy.measure import MANY_NODES, SAMPLES, SHORT, Swims, errors, measure, path_lengths, swim
 from seastar_gym.accuracy.setting import at
 from seastar_gym.scene import Contact, Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import DAMPING, PRESETS, Resolution
@@ -33,12 +36,17 @@ KINDS: dict[str, Contact] = {
     "Contact(layer=5.6e-3)": Contact(layer=5.6e-3),
     "Contact(layer=10e-3)": Contact(layer=10e-3),
 }
+BETWEEN = {f"Contact(layer={layer})": Contact(layer=float(layer)) for layer in ("7e-3", "8e-3")}
+"""Contacts of which only the bound of `certify` and the speed are measured."""
 NODES = (10, 19, 37)
 LIMIT = 73
 """Nodes per limb, and of the swims that stand for the continuum."""
 STEPS = {10: 1 * MS, 19: 1 * MS, 37: 0.5 * MS, LIMIT: 0.25 * MS}
-SPEEDS = (1.0, 2.0, 5.0, 10.0, 15.0, 20.0)
+SPEEDS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0)
 """Speeds of tips that are thrown at each other [m/s]."""
+WORST = "repeated ternary"
+"""Class of commands for which `certify` finds the largest errors of contact."""
+CERTIFIED = Resolution("continuum", 19, Numerics("implicit-midpoint", 1 * MS, 1e-7, damping=DAMPING))
 
 
 @cache
@@ -56,6 +64,19 @@ def path_errors(found: Swims, exact: Swims) -> Floats:
 def kept(number: float) -> float | None:
     """Number as the file has it: four digits, none where the solver failed."""
     return None if finite(number) is None else rounded(number)
+
+
+def bound(contact: Contact) -> float | None:
+    """Error that `certify` promises for WORST with CERTIFIED."""
+    drawn = np.split(draw_classes(SAMPLES, 5, 0), len(CLASSES), axis=1)[list(CLASSES).index(WORST)]
+    limit = Resolution("continuum", MANY_NODES, SHORT)
+    found = measure(Scene(contact=contact), [CERTIFIED], limit, lambda *_: SHORT, drawn)
+    return kept((found.space[0].path * 4.0 / 3.0 + found.time[0].path).max())
+
+
+def thrown(contact: Contact) -> float:
+    """Largest of SPEEDS that a robot survives, as it does all below [m/s]; 0 for none."""
+    return max(takewhile(partial(survives, contact), SPEEDS), default=0.0)
 
 
 def survives(contact: Contact, speed: float) -> bool:
@@ -80,28 +101,41 @@ def examine(contact: Contact) -> dict[str, Any]:
         "largest": {nodes: kept(each.max()) for nodes, each in found.items()},
         "median": {nodes: kept(np.median(each)) for nodes, each in found.items()},
         "away": [kept(np.median(away)), kept(away.max())],
-        "speed": max((speed for speed in SPEEDS if survives(contact, speed)), default=0.0),
         "cost": rounded(of_cost[0] / of_cost[1]),
     }
 
 
 def run(_: InDocs, results: Results) -> None:
     """Examine the contacts that are missing."""
-    results.fill({("contacts", name): partial(examine, each) for name, each in KINDS.items()}, str)
+    kinds = KINDS | BETWEEN
+    for what, of, some in (("thrown", thrown, kinds), ("bounds", bound, kinds), ("contacts", examine, KINDS)):
+        results.fill({(what, name): partial(of, each) for name, each in some.items()}, str)
 
 
 def table(results: Mapping[str, Any]) -> str:
     """Table of all contacts in Markdown."""
     nodes = " | ".join(f"N = {n}" for n in NODES)
     lines = [
-        f"| contact | {nodes} | from the default's path | thrown, m/s | cost |",
-        f"|---|{'---:|' * (len(NODES) + 3)}",
+        f"| contact | {nodes} | `certify` | from the default's path | thrown, m/s | cost |",
+        f"|---|{'---:|' * (len(NODES) + 4)}",
     ]
-    for name, row in results["contacts"].items():
+    for name in sorted(KINDS | BETWEEN, key=_layer):
+        bounds, speed = (results[what][name] for what in ("bounds", "thrown"))
+        if name in BETWEEN:
+            lines.append(f"| `{name}` | {'| ' * len(NODES)}{_percent(bounds)} | | {speed:g} | |")
+            continue
+        row = results["contacts"][name]
         each = [f"{_percent(row['largest'][str(n)])}, {_percent(row['median'][str(n)])}" for n in NODES]
         away = ", ".join(map(_percent, reversed(row["away"])))
-        lines.append(f"| `{name}` | {' | '.join(each)} | {away} | {row['speed']:g} | x {row['cost']:.1f} |")
+        lines.append(
+            f"| `{name}` | {' | '.join(each)} | {_percent(bounds)} | {away} | {speed:g} | x {row['cost']:.1f} |"
+        )
     return "\n".join(lines)
+
+
+def _layer(name: str) -> float:
+    """Layer of a contact by its name [m]; 0 for others, which come first."""
+    return (KINDS | BETWEEN)[name].layer or 0.0
 
 
 def _percent(share: float | None) -> str:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seastar_gym.der.contact.coupled import add_contact_product, dot, solve_coupled
+from seastar_gym.der.contact.coupled import add_contact_product, dot, solve_coupled, solver_iterations
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
 from seastar_gym.simd.lanes import N_LANES
@@ -71,6 +71,7 @@ def test_dot_is_the_product_of_rows_robot_by_robot():
 def test_without_contact_the_decrement_is_the_stars():
     one = Lanes(1.0)
     assert solve_coupled.plain(None, NO_WORK, None, one) is one
+    assert not plain(solver_iterations.plain(NO_WORK)).any()
 
 
 def test_few_iterations_solve_it_as_exactly_as_a_step_of_5_ms_allows(monkeypatch):
@@ -108,3 +109,4 @@ def test_whoever_does_not_arrive_in_200_iterations_is_missed(monkeypatch):
     monkeypatch.setitem(solve_coupled.plain.__globals__, "dot", never_less)
     solve_coupled.plain(rods, work, Mask(EVERYONE), alone)
     assert work.contact.missed.all() and len(iterations) == 1 + 200
+    assert np.all(plain(solver_iterations.plain(work)) == 200.0)

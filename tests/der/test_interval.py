@@ -9,12 +9,15 @@ from seastar_gym import Scene, Seastar
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.interval import cover_interval, note_hub_angles
 from seastar_gym.der.stepping.report import (
+    BACKTRACKS,
     COVERED,
     HALVINGS,
     NEWTON_ITERATIONS,
+    REGULARISED,
     REJECTIONS,
     REPORT_ROWS,
     SMALLEST_HUB_T,
+    SOLVER_ITERATIONS,
     STEPS,
 )
 from seastar_gym.der.stepping.scales import Limits
@@ -197,7 +200,7 @@ def test_newton_has_what_the_step_and_the_stroke_leave_it_and_is_counted(monkeyp
     monkeypatch.setitem(solve_stages.plain.__globals__, "minimise", minimise)
     q, v = rows(ROBOT.nodes()), np.full((2 * ROBOT.n_nodes, N_LANES), 0.3)
     work, report = make_work(RODS, 1), np.zeros((len(REPORT_ROWS), N_LANES))
-    report[NEWTON_ITERATIONS] = iterations_before
+    report[NEWTON_ITERATIONS], report[SOLVER_ITERATIONS] = 0.75 * iterations_before, 0.25 * iterations_before
     a, still = np.zeros((2 * ROBOT.n_nodes + 3, N_LANES)), Actuation(*np.zeros((2, 5, N_LANES)))
     step = step_of(limit=limit, retrying=FIRST)
     args = RODS, work, MIDPOINT, still, q, v, a, step, Mask(EVERYONE), stroke_limits(), report
@@ -205,7 +208,8 @@ def test_newton_has_what_the_step_and_the_stroke_leave_it_and_is_counted(monkeyp
     ((robots, limit_asked, start),) = asked
     assert limit_asked == most and np.all(robots == (most > 0.0)) and np.all(lanes(good) == robots)
     assert lanes(guarded).all()  # regularised or shortened
-    np.testing.assert_array_equal(report[:3, 0], [iterations_before + 7.0, 2.0, 3.0])
+    counted = report[[NEWTON_ITERATIONS, REGULARISED, BACKTRACKS], 0]
+    np.testing.assert_array_equal(counted, [0.75 * iterations_before + 7.0, 2.0, 3.0])
     # In still water a robot that tries again starts where it stands, the others where their velocity leads them.
     np.testing.assert_allclose(start - q, 0.005 * v * ~FIRST, rtol=1e-9, atol=1e-15)
 
@@ -271,7 +275,7 @@ def test_every_group_follows_its_own_peaks_through_all_intervals_and_says_why_it
 
     def cover(rods, work, scheme, fallback, rotation, q, v, a, duration, alive, limits, report):
         covered.append((rotation.delta_psi_start.copy(), rotation.delta_psi_end.copy(), duration, q[0, 0]))
-        report[NEWTON_ITERATIONS] += 0.5 * MOST * (np.arange(N_LANES) == 1)
+        report[[NEWTON_ITERATIONS, SOLVER_ITERATIONS]] += 0.25 * MOST * (np.arange(N_LANES) == 1)
         return alive & Mask(np.arange(N_LANES) > 1)
 
     monkeypatch.setitem(stroke.__wrapped__.__globals__, "cover_interval", cover)

@@ -1,11 +1,11 @@
-"""A stroke's work is bounded: no step below 1/4096 of an interval, and no robot beyond its Newton iterations."""
+"""A stroke's work is bounded: no step below 1/4096 of an interval, and no robot beyond its iterations."""
 
 import numpy as np
 import pytest
 
 from hubs import TEN
-from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport
-from seastar_gym.der.stepping.report import STEPS
+from seastar_gym import Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport
+from seastar_gym.der.stepping.report import SOLVER_ITERATIONS, STEPS
 from seastar_gym.model import rods as module
 from seastar_gym.model.rods import make_limits
 from strokes import finished
@@ -106,3 +106,33 @@ def test_the_bound_leaves_room_for_the_strokes_of_every_fidelity():
         scene = Scene(TEN, numerics=Numerics.preset(fidelity))
         report = Simulator(scene).stroke([[1.0, -1.0, 1.0, -1.0, 1.0]])
         assert report.newton_iterations[0] < 0.05 * make_limits(scene).most_iterations
+
+
+def crowd() -> Simulator:
+    """Two robots of twelve limbs that touch, those of the second thrown at each other at 30 m/s."""
+    scene = Scene(Seastar(12, 10), None, SmaPulse(0.2), Numerics("implicit-midpoint", 5e-3), contact=Contact())
+    simulator = Simulator(scene, 2)
+    state = simulator.get_state()
+    speeds = 30.0 * np.random.default_rng(0).uniform(-1.0, 1.0, 12) / scene.robot.limb_length
+    arms = (state.positions[1, 1:] - state.positions[1, 0]).reshape(12, -1, 2)
+    state.velocities[1, 1:] = (np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * speeds[:, None, None]).reshape(-1, 2)
+    simulator.set_state(state)
+    return simulator
+
+
+def test_iterations_of_the_linear_solver_count_where_limbs_touch(monkeypatch):
+    """A crowd needs hundreds of them for a Newton iteration. It fails, and its neighbour keeps every bit."""
+    commands = np.resize([1.0, -1.0], (2, 12))
+    free = crowd()
+    needed = free.stroke(commands).newton_iterations
+    solver = free._batch.report[0, SOLVER_ITERATIONS, :2]
+    most = int(2 * needed.max())
+    assert solver[0] + needed[0] < most < solver[1]
+    monkeypatch.setattr(module, "MOST_ITERATIONS_PER_STEP", 0)
+    monkeypatch.setattr(module, "MOST_ITERATIONS", most)
+    bound = crowd()
+    report = bound.stroke(commands)
+    assert report.status.tolist() == [SolverStatus.CONVERGED, SolverStatus.ITERATION_LIMIT]
+    assert report.newton_iterations[1] < needed[1]
+    np.testing.assert_array_equal(bound.positions[0], free.positions[0])
+    np.testing.assert_array_equal(bound.velocities[0], free.velocities[0])

@@ -94,11 +94,12 @@ def test_no_crossing_by_the_worst_commands(fidelity, robot, peak_angle):
         assert (status == 0).all()
 
 
+@pytest.mark.parametrize("contact", [Contact(), Contact(layer=10e-3)], ids=["default", "layer"])
 @pytest.mark.parametrize("fidelity", ["fast", "balanced", "chapter"])
 @pytest.mark.parametrize("peak_angle", [0.75, 0.85, 0.94])
-def test_limbs_driven_past_each_other_do_not_cross(peak_angle, fidelity):
+def test_limbs_driven_past_each_other_do_not_cross(peak_angle, fidelity, contact):
     """Up to the largest peak angle that a scene accepts; where hub hinges come near pi, robots may fail, and say so."""
-    scene = Scene(TEN, actuator=SmaPulse(peak_angle), numerics=Numerics.preset(fidelity), contact=Contact())
+    scene = Scene(TEN, actuator=SmaPulse(peak_angle), numerics=Numerics.preset(fidelity), contact=contact)
     simulator = Simulator(scene, len(DISTINCT))
     for _ in range(2):
         crossed, status = crossed_on_the_way(simulator, DISTINCT, 40)

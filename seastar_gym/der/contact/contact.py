@@ -104,11 +104,12 @@ class Rim(NamedTuple):
 
 
 class ContactWork(NamedTuple):
-    """Memory of contact; rows per coordinate of points but for `listed`, `slots`, `own`, `missed` and `touching`.
+    """Memory of contact; rows per coordinate of points but for those from `listed` to `touching`.
 
     share: Largest number of pairs of node and edge that one robot can list. own: Number that it has listed.
     listed: Number of pairs that all robots together have listed, then node and edge of each; sides of a body follow the
         limbs' edges. slots: SLOT_ROWS of each.
+    solves: Iterations of the conjugate gradients in this stage, see linear/coupled.py.
     missed: 1 for robots whose pairs did not all fit into their share, or whose step was not found.
     touching: 1 for robots that touch.
     ends: Positions at which contact is looked for [m]. seen: These positions along the gap between two limbs and
@@ -121,6 +122,7 @@ class ContactWork(NamedTuple):
     listed: np.ndarray
     slots: np.ndarray
     own: np.ndarray
+    solves: np.ndarray
     missed: np.ndarray
     touching: np.ndarray
     ends: np.ndarray
@@ -205,6 +207,7 @@ def memory(contact: Contact | None, n_limbs: int, edges: int, n_points: int) -> 
         listed=aligned_rows(2 * capacity + 1),
         slots=rows(SLOT_ROWS * capacity),
         own=rows(1),
+        solves=rows(1),
         missed=rows(1),
         touching=rows(1),
         ends=rows(),

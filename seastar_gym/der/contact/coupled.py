@@ -39,6 +39,14 @@ def dot(rods, a, b):
 
 
 @kernel
+def solver_iterations(work):
+    """Iterations of the conjugate gradients in this stage, robot by robot; none in scenes without contact."""
+    if work.contact is None:
+        return splat(0.0)
+    return load(work.contact.solves, 0)
+
+
+@kernel
 def solve_coupled(rods, work, robots, decrement):
     """The Newton step of the robots in the mask, node by node into work.contact.x [m], where pairs are listed.
 
@@ -68,6 +76,7 @@ def solve_coupled(rods, work, robots, decrement):
     left, iterations = dot(rods, r, z), 0
     running = running & (left > ACCURACY * decrement)
     while any_lane(running) and iterations < MOST_ITERATIONS:
+        store(contact.solves, 0, load(contact.solves, 0) + select(running, 1.0, zero))
         for row in range(rows):
             store(w, row, load(Hp, row))
         add_contact_product(rods, work, p, 1.0, w)

@@ -47,6 +47,7 @@ def freeze_contact(rods, work, stage, q_0):
     reach = add_product(MARGIN * load(rods.contact.widest, 0), 2.0, sqrt(moved))
     store_number(work.contact.listed, 0, 0.0)
     store(work.contact.missed, 0, 0.0)
+    store(work.contact.solves, 0, 0.0)
     store(work.contact.own, 0, 0.0)
     for pair in range(rods.contact.n_pairs):
         right = int(load_number(rods.contact.pairs, 2 * pair))

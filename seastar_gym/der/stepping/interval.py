@@ -5,11 +5,11 @@ from seastar_gym.der.star import tail_node
 from seastar_gym.der.stepping.report import (
     COVERED,
     HALVINGS,
-    NEWTON_ITERATIONS,
     REJECTIONS,
     SMALLEST_HUB_T,
     STEPS,
     add_to_report,
+    iterations_spent,
 )
 from seastar_gym.der.stepping.stages import SIZE, forget_accelerations, memory_row
 from seastar_gym.der.stepping.steps import MOST_HALVINGS, SMALLEST_FRACTION, Step, try_step
@@ -85,7 +85,7 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
         add_to_report(report, COVERED, select(accepted, step.h, zero))
         start = select(accepted, start + size, start)
         size = select(rejected & (size > SMALLEST_FRACTION), 0.5 * size, size)
-        spent = load(report, NEWTON_ITERATIONS) >= limits.most_iterations
+        spent = iterations_spent(report) >= limits.most_iterations
         failed = stuck & ((halvings >= MOST_HALVINGS) | spent)
         halvings += select(stuck, one, zero)
         if limits.adaptive:

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 from seastar_gym.der.body.body import freeze_body
 from seastar_gym.der.body.forces import add_work_on_body
+from seastar_gym.der.contact.coupled import solver_iterations
 from seastar_gym.der.contact.crossing import those_uncrossed
 from seastar_gym.der.contact.near_pairs import freeze_contact
 from seastar_gym.der.stepping.guard import (
@@ -24,7 +25,9 @@ from seastar_gym.der.stepping.report import (
     ENERGY_CUTS,
     NEWTON_ITERATIONS,
     REGULARISED,
+    SOLVER_ITERATIONS,
     add_to_report,
+    iterations_spent,
 )
 from seastar_gym.der.stepping.stages import (
     LAST_STEP,
@@ -105,7 +108,7 @@ def solve_stages(rods, work, scheme, actuation, q, v, a, step, active, limits, r
         freeze_fluid(rods, work)
         set_natural_hub_angles(rods, work, actuation, step.start + load_number(scheme.c, k) * step.size)
         freeze_strains(rods, work, stage.q_hat)
-        left = limits.most_iterations - load(report, NEWTON_ITERATIONS)
+        left = limits.most_iterations - iterations_spent(report)
         most, good = select(left < step.iteration_limit, left, step.iteration_limit), good & (left > 0.0)
         good, phi, iterations, regularised, backtracks = minimise(rods, work, stage, good, tolerance, most)
         settle_momentum(rods, work, scheme, k, stage, q, v, step.h, good)
@@ -114,6 +117,7 @@ def solve_stages(rods, work, scheme, actuation, q, v, a, step, active, limits, r
         if scheme.dissipative:
             guarded = guarded | those_that_may_gain(rods, work, stage, phi, good & ~guarded)
         add_to_report(report, NEWTON_ITERATIONS, iterations)
+        add_to_report(report, SOLVER_ITERATIONS, solver_iterations(work))
         add_to_report(report, REGULARISED, regularised)
         add_to_report(report, BACKTRACKS, backtracks)
         if k < scheme.n_stages - 1:

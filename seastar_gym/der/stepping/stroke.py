@@ -4,7 +4,7 @@ from seastar_gym.der.body.body import move_roots
 from seastar_gym.der.energy import fill_moments
 from seastar_gym.der.geometry import larger
 from seastar_gym.der.stepping.interval import cover_interval
-from seastar_gym.der.stepping.report import MOMENTS, NEWTON_ITERATIONS, PEAK_MOMENT, WORK
+from seastar_gym.der.stepping.report import MOMENTS, PEAK_MOMENT, WORK, iterations_spent
 from seastar_gym.simd.compilation import entry_point, kernel
 from seastar_gym.simd.lanes import absolute, add_product, borrow, load, load_number, select, splat, store
 
@@ -69,7 +69,7 @@ def cover_intervals(
         alive = cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, alive, limits, report)
         if asked:
             end_effort(rods, work, actuation, q, alive, effort)
-    spent = load(report, NEWTON_ITERATIONS) >= limits.most_iterations
+    spent = iterations_spent(report) >= limits.most_iterations
     reason = select(spent, splat(SPENT), splat(STUCK))
     store(failed, 0, select(alive, splat(0.0), larger(status, reason)))
 
