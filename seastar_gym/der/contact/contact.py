@@ -109,7 +109,7 @@ class ContactWork(NamedTuple):
     share: Largest number of pairs of node and edge that one robot can list. own: Number that it has listed.
     listed: Number of pairs that all robots together have listed, then node and edge of each; sides of a body follow the
         limbs' edges. slots: SLOT_ROWS of each.
-    solves: Iterations of the conjugate gradients in this stage, see linear/coupled.py.
+    solves: Iterations of the conjugate gradients in this stage, see coupled.py.
     missed: 1 for robots whose pairs did not all fit into their share, or whose step was not found.
     touching: 1 for robots that touch.
     ends: Positions at which contact is looked for [m]. seen: These positions along the gap between two limbs and
