@@ -81,12 +81,17 @@ def evaluate(
             say(f"{done.agent}: {remark}")
     if folder is not None:
         write_csv(results(swims), folder / "evaluation.csv")
-        draw_traces(swims, waypoint_radius, folder / "traces.png")
+        fluid = swum_in.of_robot(0).fluid
+        current = None if fluid is None else fluid.current
+        draw_traces(swims, waypoint_radius, folder / "traces.png", current)
         files = ["evaluation.csv", "traces.png", *(file.name for file in videos.values())]
         if report is not None:
             from seastar_gym.evaluation.report.page import write_report
 
-            write_report(folder / "report.html", path, swims, playbacks, waypoint_radius, report)
+            films = {name: file.name for name, file in videos.items()}
+            write_report(
+                folder / "report.html", path, swims, playbacks, waypoint_radius, report, current=current, films=films
+            )
             files.append("report.html")
         say(f"Written to {folder}: {', '.join(files)}")
     return swims
