@@ -36,6 +36,7 @@ from seastar_gym.scene.robot import Seastar
 from seastar_gym.scene.section import Disc
 from seastar_gym.scene.serial import from_dict, register_part, to_dict
 from seastar_gym.scene.shape import cross_at_rest, n_hub_hinges, natural_hub_angle, turn_per_hinge
+from seastar_gym.scene.summary import scene_html, short_repr
 
 if TYPE_CHECKING:
     from seastar_gym.accuracy import Certificate
@@ -88,6 +89,12 @@ class Scene:
         self._check_coefficients()
         self._check_contact()
         self._check_body()
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+    def _repr_html_(self) -> str:
+        return scene_html(self)
 
     def _check_strengths(self) -> None:
         require_numbers("limb_strengths", self.limb_strengths, "1")
