@@ -1,6 +1,8 @@
 """Every block of Python on README and the pages of the guide runs, in short form, and their links lead somewhere."""
 
 import ast
+import doctest
+import importlib
 import json
 import re
 import shlex
@@ -79,6 +81,20 @@ def test_every_block_of_python_runs(page, monkeypatch, request):
     monkeypatch.setitem(sys.modules, module.__name__, module)  # where dataclasses look for their names
     for block in blocks(page):
         exec(compile(block, page.name, "exec"), vars(module))
+
+
+EXAMPLES = [file for file in sorted((ROOT / "seastar_gym").rglob("*.py")) if ">>> " in file.read_text("utf-8")]
+
+
+@pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
+def test_examples_in_docstrings_give_what_they_say(file):
+    module = importlib.import_module(".".join(file.relative_to(ROOT).with_suffix("").parts))
+    failed, tried = doctest.testmod(module, optionflags=doctest.ELLIPSIS)
+    assert tried and not failed
+
+
+def test_scenes_paths_and_statistics_have_examples():
+    assert {"scene", "paths", "statistics"} <= {file.stem for file in EXAMPLES}
 
 
 CERTIFYING = sorted({match[1] for page in PAGES for match in CERTIFY.finditer(page.read_text(encoding="utf-8"))})
