@@ -71,7 +71,7 @@ def wait(show: Show) -> None:
     """Show that something begins: machine code of the simulator takes a while to load, and longer to be made."""
     canvas = Canvas(SIZE, 24)
     canvas.begin((250, 252, 254))
-    for line, text in enumerate(("Starting ...", "For the first time on a machine, the simulator is compiled.")):
+    for line, text in enumerate(("Starting ...", "The first start on a machine compiles the simulator.")):
         canvas.write(text, (SIZE[0] / 2, SIZE[1] / 2 + 40 * line), (58, 64, 74), (0.5, 0.5))
     canvas.finish()
     show(canvas.pixels())
