@@ -83,7 +83,7 @@ def imports_of(*paths: Path) -> set[str]:
             modules |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
             modules.add(node.module)
-    beside = {path.stem for folder in ("tests", "docs") for path in (ROOT / folder).rglob("*.py")}
+    beside = {path.stem for folder in ("tests", "docs", "examples") for path in (ROOT / folder).rglob("*.py")}
     folders = {path.stem for path in (ROOT / "tests").rglob("*")}
     own = {"seastar_gym", "agents", "studies", "train", *beside, *folders, *WITH_ROS}
     packages = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names - own
@@ -113,7 +113,7 @@ def test_every_base_dependency_is_imported_by_the_package():
         (["studies"], ["train", "sweep", "test", "data", "mujoco"]),
         (["agents", "train.py"], ["train", "rllib"]),
         (["tests"], ["test", "browser", "ray", "learners"]),
-        (["docs"], ["docs", "learners"]),
+        (["docs", "examples"], ["docs", "learners"]),
     ],
 )
 def test_every_import_has_its_requirement(folders, extras):
@@ -130,7 +130,7 @@ def test_importing_the_package_leaves_out_what_it_does_not_need():
 
 @pytest.mark.parametrize(
     "code, most",
-    [("import seastar_gym", 4), ("from seastar_gym.controllers import load; load()", 41)],
+    [("import seastar_gym", 4), ("from seastar_gym.controllers import load; load()", 42)],
     ids=["the package", "a policy"],
 )
 def test_what_needs_no_compiler_loads_none(code, most):

@@ -1,6 +1,8 @@
 """Every block of Python on README and the pages of the guide runs, in short form, and their links lead somewhere."""
 
 import ast
+import doctest
+import importlib
 import json
 import re
 import shlex
@@ -35,6 +37,7 @@ def blocks(page: Path) -> list[str]:
 
 
 RUN = [page for page in PAGES if blocks(page)]
+NOTEBOOK = ROOT / "examples" / "first_hour.ipynb"
 
 
 @pytest.fixture
@@ -79,6 +82,42 @@ def test_every_block_of_python_runs(page, monkeypatch, request):
     monkeypatch.setitem(sys.modules, module.__name__, module)  # where dataclasses look for their names
     for block in blocks(page):
         exec(compile(block, page.name, "exec"), vars(module))
+
+
+@pytest.mark.usefixtures("short_form")
+def test_the_notebook_of_the_first_hour_runs():
+    """Every cell, the last line of which shows something as a notebook would."""
+    cells = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
+    names: dict[str, object] = {}
+    for cell in (cell for cell in cells if cell["cell_type"] == "code"):
+        assert cell["outputs"] == [] and cell["execution_count"] is None  # as it was written
+        *lines, last = ast.parse("".join(cell["source"])).body
+        exec(compile(ast.Module(lines, []), NOTEBOOK.name, "exec"), names)
+        if isinstance(last, ast.Expr):
+            shown = eval(compile(ast.Expression(last.value), NOTEBOOK.name, "eval"), names)
+            assert len(getattr(shown, "_repr_html_", shown.__repr__)()) < 3000
+        else:
+            exec(compile(ast.Module([last], []), NOTEBOOK.name, "exec"), names)
+    assert 8 <= len(cells) < 24
+
+
+def test_the_links_of_the_notebook_lead_to_files():
+    links = LINK.findall("".join("".join(cell["source"]) for cell in json.loads(NOTEBOOK.read_text("utf-8"))["cells"]))
+    assert len(links) > 4 and all((NOTEBOOK.parent / target).is_file() for target, _ in links)
+
+
+EXAMPLES = [file for file in sorted((ROOT / "seastar_gym").rglob("*.py")) if ">>> " in file.read_text("utf-8")]
+
+
+@pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
+def test_examples_in_docstrings_give_what_they_say(file):
+    module = importlib.import_module(".".join(file.relative_to(ROOT).with_suffix("").parts))
+    failed, tried = doctest.testmod(module, optionflags=doctest.ELLIPSIS)
+    assert tried and not failed
+
+
+def test_scenes_paths_and_statistics_have_examples():
+    assert {"scene", "paths", "statistics"} <= {file.stem for file in EXAMPLES}
 
 
 CERTIFYING = sorted({match[1] for page in PAGES for match in CERTIFY.finditer(page.read_text(encoding="utf-8"))})

@@ -10,7 +10,7 @@ import pytest
 import seastar_gym
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
-FILE = Path(seastar_gym.__file__).parents[1] / "docs" / "ten_lines.py"
+FILE = Path(seastar_gym.__file__).parents[1] / "examples" / "ten_lines.py"
 
 
 @pytest.fixture

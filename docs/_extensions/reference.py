@@ -7,6 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 Definition = ast.ClassDef | ast.FunctionDef
 FIELD = re.compile(r"^([*\w]+(?:, [*\w]+)*): (?=\S)", re.MULTILINE)
+EXAMPLE = re.compile(r"^(>>> .*(?:\n.+)*)", re.MULTILINE)
 HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 
 
@@ -139,5 +140,8 @@ def default(value: ast.expr) -> str:
 
 
 def markdown(text: str) -> str:
-    """Docstring with its arguments as a list, and its headings as words."""
-    return HEADING.sub(r"**\1**", FIELD.sub(r"- **\1**: ", text))
+    """Docstring with its arguments as a list, its headings as words, and its examples as code."""
+    pieces = EXAMPLE.split(text)
+    pieces[::2] = [HEADING.sub(r"**\1**", FIELD.sub(r"- **\1**: ", words)) for words in pieces[::2]]
+    pieces[1::2] = [f"```pycon\n{example}\n```" for example in pieces[1::2]]
+    return "".join(pieces)

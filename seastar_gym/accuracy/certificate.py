@@ -24,6 +24,7 @@ from seastar_gym.scene.checks import (
     require_texts,
     shown,
 )
+from seastar_gym.scene.summary import html_table
 from seastar_gym.version import __version__
 
 FORMAT = 3
@@ -32,8 +33,12 @@ CLASSES_VERSION = 1
 """Version of the classes of commands, see commands.py. Errors of another are of others: certificates lapse."""
 MOST_SAMPLES = 100_000
 """Most sequences of a class that can be asked for."""
+LEVELS = (0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
+"""Errors for which a summary names the fastest setting."""
 REPEATED = ("repeated", "alternating")
 """Beginnings of the names of classes whose commands are repeated."""
+
+HEADS = ("error", "speed", "fastest setting")
 
 
 @dataclass(frozen=True)
@@ -84,6 +89,27 @@ class Certificate:
             require_number("decision_period", self.decision_period, "s")
         if not is_whole_number(self.classes) or not isinstance(self.version, str) or not isinstance(self.machine, str):
             raise ValueError("classes must be a whole number, and version and machine must be words.")
+
+    def __repr__(self) -> str:
+        lines = [f"{error:>8} {speed:>9}  {setting}" for error, speed, setting in (HEADS, *self._fastest())]
+        return "\n".join([f"<{self._title}>", *lines])
+
+    def _repr_html_(self) -> str:
+        return html_table(self._title, HEADS, self._fastest())
+
+    @property
+    def _title(self) -> str:
+        own = "the chapter's robot and water" if self.scene.is_chapters else shown(self.scene)
+        return f"Certificate of {own}, version {self.version}: {len(self.settings)} settings, {self.samples} swims each"
+
+    def _fastest(self) -> list[tuple[str, str, str]]:
+        """Error [%], speed [times real time] and name of the fastest setting within each of LEVELS, none twice."""
+        enduring = [each for each in self.settings if each.endures]
+        within = [[each for each in enduring if each.error(self.promised) <= level] for level in LEVELS]
+        fastest = dict.fromkeys(id(max(some, key=lambda each: each.speed)) for some in within if some)
+        known = {id(each): each for each in enduring}
+        chosen = [known[number] for number in fastest]
+        return [(f"{100.0 * each.error(self.promised):.2g} %", f"{each.speed:,.0f} x", str(each)) for each in chosen]
 
     def confidence(self, share: float = 0.05) -> float:
         """Confidence that at most this share of all sequences of a class errs by more than the error of the class."""

@@ -121,7 +121,9 @@ def drive(options: argparse.Namespace) -> int:
     policy, planned, arguments = plan(options)
     options.out.mkdir(parents=True, exist_ok=True)
     picture = options.out / "plan.png"
-    draw_traces([planned], RADIUS, picture)
+    fluid = arguments["scene"].fluid
+    current = None if fluid is None else fluid.current
+    draw_traces([planned], RADIUS, picture, current)
     heat = planned.heating_time.sum()
     print(f"Plan: {planned.result}, {heat:.1f} s of heat in {planned.strokes} decisions, drawn in {picture}.")
     if options.dry or not (options.yes or agreed()):
@@ -133,7 +135,7 @@ def drive(options: argparse.Namespace) -> int:
             swum = _swim("driven", policy, env, options)
         finally:
             env.close()
-    draw_traces([planned, swum], RADIUS, options.out / "driven.png")
+    draw_traces([planned, swum], RADIUS, options.out / "driven.png", current)
     text = report(options, planned, swum, env)
     write_atomically(options.out / "report.md", text)
     print(f"Driven: {swum.result}. {env.stopped or 'The guard had nothing to stop.'} Written: {options.out}.")

@@ -55,6 +55,9 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--out", type=Path, help="folder for evaluation.csv and traces.png; with --sets a CSV file")
     found.add_argument("--video", action=flag, default=False, help="write a video of every agent")
     found.add_argument("--report", action=flag, default=False, help="write report.html, one page with all of it")
+    found.add_argument(
+        "--trajectory", action=flag, default=False, help="write trajectories.csv: time, hub and heat of every stroke"
+    )
     report = found.add_argument_group("what the report shows, too")
     report.add_argument("--runs", nargs="+", type=Path, default=[], help="trainings (default: those of learned agents)")
     report.add_argument("--trials", type=Path, help="CSV file that --sets wrote")
@@ -79,8 +82,8 @@ def require_sound(options: argparse.Namespace) -> None:
         raise ValueError(f"--max-strokes must be at least 1, not {options.max_strokes}.")
     if options.sets is None and len(options.fidelity) > 1:
         raise ValueError("Several fidelities are for --sets: name one.")
-    if (options.video or options.report) and (options.out is None or options.sets is not None):
-        raise ValueError("A video or a report needs a folder, --out, and a path, no --sets.")
+    if (options.video or options.report or options.trajectory) and (options.out is None or options.sets is not None):
+        raise ValueError("A video, a report or a trajectory needs a folder, --out, and a path, no --sets.")
 
 
 def limit_of(options: argparse.Namespace) -> int:
@@ -98,6 +101,7 @@ def compared(options: argparse.Namespace, command: str) -> None:
     evaluate(
         agents, path, seed=options.seed, max_strokes=limit_of(options), waypoint_radius=options.waypoint_radius,
         scene=own, decision_period=options.decision_period, out=options.out, video=options.video,
+        trajectory=options.trajectory,
         report=remarks(agents, options, command) if options.report else None,
         fidelity=fidelity if own is None else None, random_heading=options.random_heading,
     )  # fmt: skip

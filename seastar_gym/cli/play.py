@@ -4,24 +4,30 @@ Keys act at the next decision, and as long as they are held. Without a display, 
 word per decision, and --film writes what is seen.
 """
 
+from __future__ import annotations
+
 import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from seastar_gym.cli.keys import Steering, known_keys, typed
-from seastar_gym.cli.played import PlayedEnv
-from seastar_gym.cli.screen import Show, rate, screen
-from seastar_gym.cli.swim import outcome, show_all
+from seastar_gym.cli.screen import Show, outcome, rate, screen, show_all, wait
 from seastar_gym.command import answered, command_parser
 from seastar_gym.envs.canvas import import_pygame
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.scene.checks import require_number
 
+if TYPE_CHECKING:
+    from seastar_gym.cli.played import PlayedEnv
+
 AGAIN, HELP, END = "z", "f1", "escape"
 """Keys that begin anew, show or hide the help, and end the game."""
+
+N_LIMBS = 5
+"""Limbs of the robot that is played."""
 
 Held = Callable[[], set[str] | None]
 """Function that gives the keys for the next decision; None ends the game."""
@@ -97,10 +103,14 @@ def play(options: argparse.Namespace) -> str:
         require_number(f"--{name.replace('_', '-')}", getattr(options, name), "1")
     if options.film is not None and options.keys is None:
         raise ValueError('A film needs the keys that are pressed: --keys "a a*5 1w up .".')
-    number, fps = rate(options.film, options.decision_period, options.speed)
-    env = PlayedEnv(path=load_path(options.path), decision_period=options.decision_period, frames_per_stroke=number)
-    words = None if options.keys is None else iter(list(typed(options.keys, env.scene.robot.n_limbs)))
+    path, (number, fps) = load_path(options.path), rate(options.film, options.decision_period, options.speed)
+    words = None if options.keys is None else iter(list(typed(options.keys, N_LIMBS)))
     with screen(options.film, fps) as show:
+        if options.film is None:
+            wait(show)
+        from seastar_gym.cli.played import PlayedEnv  # numba, which takes a second, once there is a window
+
+        env = PlayedEnv(path=path, decision_period=options.decision_period, frames_per_stroke=number)
         if words is None:
             keyboard = Keyboard(env)
             info = game(env, keyboard.watch(show), keyboard, options.seed)

@@ -4,10 +4,14 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from seastar_gym.envs.canvas import import_pygame
+from seastar_gym.envs.canvas import Canvas, import_pygame
 from seastar_gym.envs.window import Window
 from seastar_gym.evaluation.films import Picture, film, film_format
+
+if TYPE_CHECKING:
+    import gymnasium as gym
 
 SIZE = (960, 720)
 """Width and height of a window [px]."""
@@ -61,3 +65,28 @@ def _window(fps: float) -> Iterator[Show]:
 
     yield show
     window.close()
+
+
+def wait(show: Show) -> None:
+    """Show that something begins: machine code of the simulator takes a while to load, and longer to be made."""
+    canvas = Canvas(SIZE, 24)
+    canvas.begin((250, 252, 254))
+    for line, text in enumerate(("Starting ...", "The first start on a machine compiles the simulator.")):
+        canvas.write(text, (SIZE[0] / 2, SIZE[1] / 2 + 40 * line), (58, 64, 74), (0.5, 0.5))
+    canvas.finish()
+    show(canvas.pixels())
+
+
+def show_all(env: "gym.Env[Any, Any]", show: Show) -> bool:
+    """Show the pictures since the last call; False once nobody looks any more."""
+    pictures: Any = env.render()
+    return all(show(picture) for picture in pictures or ())
+
+
+def outcome(env: Any, info: dict[str, Any]) -> str:
+    """How an episode went, in words: waypoints, or whether a task without them was done."""
+    if "waypoint_index" in info:
+        how = f"{info['waypoint_index']} of {len(env.waypoints)} waypoints"
+    else:
+        how = "done" if info["is_success"] else "not done"
+    return f"{how} in {info['time']:.1f} s"

@@ -12,7 +12,7 @@ from typing import Any, get_args
 
 import gymnasium as gym
 
-from seastar_gym.cli.screen import Show, rate, screen
+from seastar_gym.cli.screen import Show, outcome, rate, screen, show_all
 from seastar_gym.command import answered, command_parser
 from seastar_gym.controllers.contract import Policy, actions_in
 from seastar_gym.controllers.roster import HELP, load_agent
@@ -125,21 +125,6 @@ def show_episode(
 
     rollout(env, policy, seeds=seed, until=limit, on_step=look)
     return last
-
-
-def show_all(env: gym.Env[Any, Any], show: Show) -> bool:
-    """Show the pictures since the last call; False once nobody looks any more."""
-    pictures: Any = env.render()
-    return all(show(picture) for picture in pictures or ())
-
-
-def outcome(env: Any, info: dict[str, Any]) -> str:
-    """How an episode went, in words: waypoints, or whether a task without them was done."""
-    if "waypoint_index" in info:
-        how = f"{info['waypoint_index']} of {len(env.waypoints)} waypoints"
-    else:
-        how = "done" if info["is_success"] else "not done"
-    return f"{how} in {info['time']:.1f} s"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

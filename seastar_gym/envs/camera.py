@@ -28,6 +28,13 @@ class Camera:
         pixels: FloatArray = self._middle + (np.asarray(points) - self._centre) * [self.scale, -self.scale]
         return pixels
 
+    @property
+    def in_view(self) -> FloatArray:
+        """Lower left and upper right corner of what the viewport shows [m], shape (2, 2)."""
+        half = 0.5 * np.array(self.viewport[2:]) / self.scale
+        corners: FloatArray = np.array([self._centre - half, self._centre + half])
+        return corners
+
     def sees(self, points: FloatArray) -> bool:
         """Whether all points [m], shape (n, 2), lie in the viewport."""
         left, top, width, height = self.viewport

@@ -2,12 +2,15 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.swimming import Swimming
+from seastar_gym.scene.currents import AnyCurrent
+from seastar_gym.scene.per_robot import chosen
 from seastar_gym.simulator import Simulator
 
 FloatArray = NDArray[np.float64]
@@ -35,6 +38,8 @@ class Frame:
     """Places where limbs begin on a body [m], shape (n_limbs, 2); None where they begin at the hub."""
     outline: FloatArray | None = None
     """Outline of the body [m], shape (n, 2); None without one."""
+    current: AnyCurrent | None = None
+    """Current of the water; None for water at rest."""
 
 
 def body_of(simulator: Simulator) -> tuple[FloatArray | None, FloatArray | None]:
@@ -58,6 +63,7 @@ def frames_of(task: Swimming, commands: FloatArray, trails: Mapping[int, FloatAr
     simulator = task.simulator
     positions, time, warmth = simulator.positions, simulator.time, task.warmth()
     roots, outlines = body_of(simulator)
+    fluid = simulator.scene.fluid
     for robot, trail in trails.items():
         yield Frame(
             positions=positions[robot],
@@ -69,4 +75,5 @@ def frames_of(task: Swimming, commands: FloatArray, trails: Mapping[int, FloatAr
             scenery=task.scenery(robot),
             roots=None if roots is None else roots[robot],
             outline=None if outlines is None else outlines[robot],
+            current=None if fluid is None else chosen(fluid.current, itemgetter(robot)),
         )

@@ -85,6 +85,12 @@ def make_path(path: str | ArrayLike, rng: np.random.Generator) -> Waypoints:
 
     rng: Generator of paths that are drawn, such as "random". ValueError: the name is unknown, or the array is not one
     or more finite points of the plane.
+
+    >>> make_path("square", np.random.default_rng(0))
+    array([[0.2, 0. ],
+           [0.2, 0.2],
+           [0. , 0.2],
+           [0. , 0. ]])
     """
     require_kind("rng", rng, np.random.Generator, "a numpy Generator")
     if not isinstance(path, str):
@@ -141,6 +147,9 @@ def cross_track_error(position: ArrayLike, start: ArrayLike, end: ArrayLike) -> 
     """Distance [m], shape (...), of a position from the segment between start and end [m], each of shape (..., 2).
 
     Beyond an end of the segment, or where the segment is a single point, it is the distance from that end.
+
+    >>> float(cross_track_error([0.1, 0.03], [0.0, 0.0], [0.2, 0.0]))
+    0.03
     """
     position, start, end = (np.asarray(point, dtype=np.float64) for point in (position, start, end))
     if _are_few(position, start, end):
@@ -157,7 +166,11 @@ def cross_track_error(position: ArrayLike, start: ArrayLike, end: ArrayLike) -> 
 
 
 def path_length(start: ArrayLike, waypoints: ArrayLike) -> NDArray[np.float64]:
-    """Length [m], shape (...), of the path from start [m], shape (..., 2), through waypoints [m], shape (..., n, 2)."""
+    """Length [m], shape (...), of the path from start [m], shape (..., 2), through waypoints [m], shape (..., n, 2).
+
+    >>> round(float(path_length([0.0, 0.0], make_path("square", np.random.default_rng(0)))), 3)
+    0.8
+    """
     start, waypoints = np.asarray(start, dtype=np.float64), np.asarray(waypoints, dtype=np.float64)
     first_leg = waypoints[..., 0, :] - start
     later_legs = np.diff(waypoints, axis=-2)

@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.envs.camera import Camera
 from seastar_gym.envs.canvas import Canvas, Colour, mixed
 from seastar_gym.envs.frame import Frame
-from seastar_gym.envs.scenery import NOTHING, Scenery
+from seastar_gym.envs.scenery import NOTHING, Flow, Scenery, flow_of
 from seastar_gym.envs.waypoint_labels import waypoint_labels
 from seastar_gym.envs.window import Window
 from seastar_gym.scene import Seastar
+from seastar_gym.scene.currents import AnyCurrent
 
 FloatArray = NDArray[np.float64]
 
@@ -29,6 +30,7 @@ TRAIL: Colour = (212, 120, 130)
 PLANNED: Colour = (190, 198, 208)
 ROCK: Colour = (176, 168, 158)
 CURRENT_WATER: Colour = (96, 160, 186)
+FLOW: Colour = (176, 209, 224)
 
 DONE, TO_COME, CURRENT = range(3)
 """States of a waypoint."""
@@ -50,7 +52,8 @@ VIEW_MARGIN = 1.1
 REFIT_MARGIN = 0.5
 """Room [limb lengths] gained beyond a robot that left the view, so that the view moves in few steps."""
 
-
+FLOW_SPACING = 4.5
+"""Distance of the arrows of a current [heights of letters]."""
 POINTER = 0.3
 """Length of the arrow of an asked heading [limb lengths]."""
 ROOT = 0.34
@@ -97,6 +100,7 @@ class Renderer:
         self._text_height = max(12, round(0.027 * min(size)))
         self._canvas = Canvas(size, self._text_height)
         self._window = Window()
+        self._flow: tuple[Camera, AnyCurrent | None, Flow] | None = None
         self.reset(waypoints, headings=headings)
 
     def reset(
@@ -154,13 +158,16 @@ class Renderer:
         self._mark_limb_1(frame)
         self._name_heated_limbs(frame)
         self._write_header(frame)
-        self._write_footer(frame.scenery.note)
+        self._write_footer(", ".join(filter(None, (self._flow_in(frame.current).words, frame.scenery.note))))
         self._canvas.finish()
 
     def _paint_background(self, frame: Frame) -> None:
         """Everything below the trail, which stays from picture to picture where there is no scenery."""
-        if self._canvas.begin(WATER, (self.camera, frame.waypoint_index) if frame.scenery is NOTHING else None):
+        shows = (self.camera, frame.waypoint_index, frame.current) if frame.scenery is NOTHING else None
+        if self._canvas.begin(WATER, shows):
             return
+        for arrow in self._flow_in(frame.current).arrows:
+            self._paint_flow(self.camera.to_pixels(arrow))
         self._paint_scenery(frame.scenery)
         self._paint_planned_path()
         self._paint_waypoints(frame.waypoint_index)
@@ -189,6 +196,22 @@ class Renderer:
                 self._canvas.write(ring.label, centre, INK, (0.5, 0.5))
         for arrow in scenery.arrows:
             self._paint_arrow(self.camera.to_pixels(arrow))
+
+    def _flow_in(self, current: AnyCurrent | None) -> Flow:
+        """Arrows of a current over the whole view, kept until it or the view changes."""
+        if self._flow is None or self._flow[0] is not self.camera or self._flow[1] != current:
+            low, high = self.camera.in_view
+            spacing = FLOW_SPACING * self._text_height / self.camera.scale
+            self._flow = self.camera, current, flow_of(current, low, high, spacing)
+        return self._flow[2]
+
+    def _paint_flow(self, ends: FloatArray) -> None:
+        """Faint arrow from ends[0] to ends[1] [px]."""
+        along = ends[1] - ends[0]
+        back = -min(1.0, 0.45 * self._text_height / float(np.hypot(*along))) * along
+        across = 0.6 * back[::-1] * [-1.0, 1.0]
+        self._canvas.polyline(ends, FLOW, width=2)
+        self._canvas.polyline(ends[1] + np.array([back + across, [0.0, 0.0], back - across]), FLOW, width=2)
 
     def _paint_arrow(self, ends: FloatArray) -> None:
         """Arrow from ends[0] to ends[1] [px]; as a dot where it is short."""

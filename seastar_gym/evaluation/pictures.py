@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.envs.scenery import Flow, flow_of
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import save_figure
+from seastar_gym.scene.currents import AnyCurrent
 
 Floats = NDArray[np.float64]
 
@@ -23,15 +25,22 @@ FRAMES_PER_STROKE, FPS = 3, 30
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8c6d1f", "#56b4e9", "#6a3d9a", "#e69f00")
 LINE_STYLES = ("-", "--", ":")
 """Agents beyond the colours begin the colours again in the next style."""
-INK, FAINT_INK, PLANNED = "#3a404a", "#80868f", "#b4bcc8"
+INK, FAINT_INK, PLANNED, FLOW = "#3a404a", "#80868f", "#b4bcc8", "#b0d1e0"
 STROKES_PER_DOT = 10
 STRAY, MARGIN = 0.3, 0.12
 """Room around the path [path extents]: for swims that go astray, and for all."""
+ARROWS = 10
+"""Arrows of a current along the longer side of a picture."""
 MM = 1000.0
 
 
-def draw_traces(swims: Sequence[Swim], waypoint_radius: float, file: Path) -> None:
-    """Writes a PNG picture of the hubs' ways along the path of the first swim. waypoint_radius: [m]."""
+def draw_traces(
+    swims: Sequence[Swim], waypoint_radius: float, file: Path, current: AnyCurrent | None = None
+) -> None:
+    """Writes a PNG picture of the hubs' ways along the path of the first swim, and of a current of the water.
+
+    waypoint_radius: [m].
+    """
     from matplotlib.figure import Figure
 
     path = MM * np.concatenate([np.zeros((1, 2)), swims[0].waypoints])
@@ -40,12 +49,17 @@ def draw_traces(swims: Sequence[Swim], waypoint_radius: float, file: Path) -> No
     figure = Figure(figsize=(6.0, 6.0 * height / width))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     _style_axes(axes)
+    flow = flow_in(current, low, high)
+    if flow.words:
+        start, way = MM * flow.arrows[:, 0], MM * np.diff(flow.arrows, axis=1)[:, 0]
+        axes.quiver(*start.T, *way.T, angles="xy", scale_units="xy", scale=1.0, width=2.5e-3, color=FLOW, zorder=0.5)
     _draw_path(axes, path, MM * waypoint_radius)
     for number, swim in enumerate(swims):
         _draw_trace(axes, swim, number)
+    dots = f"agents, with a dot every {STROKES_PER_DOT} {swims[0].counted_in}"
     axes.legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False, ncols=2, alignment="left",
-        title=f"agents, with a dot every {STROKES_PER_DOT} {swims[0].counted_in}",
+        title=f"{dots}; {flow.words}" if flow.words else dots,
     )  # fmt: skip
     save_figure(figure, file, dpi=160, bbox_inches="tight", pad_inches=0.15)
 
@@ -56,6 +70,11 @@ def view(path: Floats, hubs: Floats) -> tuple[Floats, Floats]:
     low = np.maximum(np.minimum(path.min(axis=0), hubs.min(axis=0)), path.min(axis=0) - STRAY * extent)
     high = np.minimum(np.maximum(path.max(axis=0), hubs.max(axis=0)), path.max(axis=0) + STRAY * extent)
     return low - MARGIN * extent, high + MARGIN * extent
+
+
+def flow_in(current: AnyCurrent | None, low: Floats, high: Floats) -> Flow:
+    """Arrows of a current in a picture between two corners [mm]."""
+    return flow_of(current, low / MM, high / MM, float((high - low).max()) / MM / ARROWS)
 
 
 def _style_axes(axes: Axes) -> None:

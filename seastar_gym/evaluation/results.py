@@ -50,6 +50,21 @@ def results(swims: Sequence[Swim]) -> list[Row]:
     return [{"agent": done.agent, **{name: of(done) for name, of in OF_SWIMS.items()}} for done in swims]
 
 
+def time_series(swims: Sequence[Swim]) -> list[Row]:
+    """Rows of every swim at its start and after every stroke, by the names of a CSV; heat is that of the stroke."""
+    return [
+        {
+            "agent": done.agent, "stroke": k, "time_s": float(done.time[k]),
+            "hub_x_m": float(done.hub[k, 0]), "hub_y_m": float(done.hub[k, 1]),
+            "waypoints_reached": int(done.waypoint_index[k]),
+            "limbs_heated": int(done.limbs_heated[k - 1]) if k else 0,
+            "heating_time_s": float(done.heating_time[k - 1]) if k else 0.0,
+            "energy_J": float(done.energy[k - 1]) if k else 0.0,
+        }
+        for done in swims for k in range(done.strokes + 1)
+    ]  # fmt: skip
+
+
 def statistics(swims: Sequence[Swim]) -> dict[str, Estimate]:
     """Mean measures of a set of swims, by name, with intervals; strokes and seconds are those of finished swims."""
     finished = [done for done in swims if done.finished]

@@ -1,12 +1,14 @@
-"""Coefficients of a current, for the kernels in der/terms/current.py."""
+"""Coefficients of a current, for the kernels in der/terms/current.py, and its velocities."""
 
 import math
 from functools import singledispatch
 
 import numpy as np
+from numpy.typing import NDArray
 
-from seastar_gym.der.terms.current import GRID, LINEAR, VORTEX, Current
+from seastar_gym.der.terms.current import GRID, LINEAR, VORTEX, Current, current_velocity
 from seastar_gym.scene.currents import AnyCurrent, GridCurrent, ShearCurrent, UniformCurrent, Vortex
+from seastar_gym.simd.numpy_lanes import Lanes
 
 
 @singledispatch
@@ -38,3 +40,12 @@ def _(current: GridCurrent) -> Current:
     array = np.array(current.velocities)
     n_x, n_y, _ = array.shape
     return Current(GRID, np.array([*current.corner, 1.0 / current.spacing]), n_x, n_y, array.reshape(-1))
+
+
+def velocities_at(current: AnyCurrent, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Velocities of the fluid [m/s] at points [m], both of shape (n, 2), in a current of one robot."""
+    x, y = (Lanes(points[:, axis]) for axis in (0, 1))
+    found = np.empty(points.shape)
+    for axis, velocity in enumerate(current_velocity.plain(current_rows(current), x, y)):
+        found[:, axis] = velocity.numbers
+    return found

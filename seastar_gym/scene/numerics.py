@@ -1,12 +1,13 @@
 """`Numerics`: scheme, step and tolerances of time stepping, chosen by value or by preset."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Annotated, Literal, NamedTuple, get_args
 
 from seastar_gym.scene.checks import require_choice, require_flag, shown
 from seastar_gym.scene.number import check_numbers, positive, whole, within
 from seastar_gym.scene.robot import NODES, Discretisation
 from seastar_gym.scene.serial import register_part
+from seastar_gym.scene.summary import html_table, short_repr
 
 SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
 Fidelity = Literal["fast", "balanced", "accurate", "reference", "chapter"]
@@ -65,6 +66,13 @@ class Numerics:
             raise ValueError(f'damping needs the scheme "implicit-midpoint", not {shown(self.scheme)}.')
         if not self.named and self not in (DEFAULT, *OLD_DEFAULTS):
             object.__setattr__(self, "named", True)
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+    def _repr_html_(self) -> str:
+        rows = [(each.name, shown(getattr(self, each.name))) for each in fields(self) if each.compare]
+        return html_table("Numerics", ("setting", "value"), rows)
 
     @classmethod
     def preset(cls, fidelity: Fidelity) -> "Numerics":

@@ -36,6 +36,7 @@ from seastar_gym.scene.robot import Seastar
 from seastar_gym.scene.section import Disc
 from seastar_gym.scene.serial import from_dict, register_part, to_dict
 from seastar_gym.scene.shape import cross_at_rest, n_hub_hinges, natural_hub_angle, turn_per_hinge
+from seastar_gym.scene.summary import scene_html, short_repr
 
 if TYPE_CHECKING:
     from seastar_gym.accuracy import Certificate
@@ -57,6 +58,17 @@ class Scene:
     contact: Contact between limbs, and with a body. None lets limbs pass through each other, as in the chapter.
     gravity: Gravitational acceleration in the plane (g_x, g_y) [m/s^2]. Limbs feel their weight minus the buoyancy of
         the fluid that they displace. None means no gravity in the plane.
+
+    >>> from dataclasses import replace
+    >>> from seastar_gym import Scene, Seastar, UniformCurrent, Water
+    >>> scene = Scene(Seastar(n_limbs=8), Water(current=UniformCurrent(u_x=0.002)))
+    >>> scene
+    Scene(robot=Seastar(n_limbs=8), fluid=Water(current=UniformCurrent(u_x=0.002)))
+    >>> replace(scene, fluid=Water()).robot.n_limbs
+    8
+    >>> Scene(Seastar(limb_length=-0.1))
+    Traceback (most recent call last):
+    ValueError: limb_length must be a positive, finite number [m], not -0.1.
     """
 
     robot: Seastar = field(default_factory=Seastar)
@@ -88,6 +100,12 @@ class Scene:
         self._check_coefficients()
         self._check_contact()
         self._check_body()
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+    def _repr_html_(self) -> str:
+        return scene_html(self)
 
     def _check_strengths(self) -> None:
         require_numbers("limb_strengths", self.limb_strengths, "1")
@@ -274,6 +292,9 @@ class Scene:
 
         "fast", "balanced", "accurate" and "reference" are of the continuum, "chapter" is the chapter's discretisation.
         `seastar_gym.accuracy.chapters_certificate().of(scene)` returns the measured errors and speed of each.
+
+        >>> Scene.preset("fast")
+        Scene(robot=Seastar(nodes_per_limb=7, discretisation='continuum'))
         """
         require_choice("fidelity", fidelity, get_args(Fidelity))
         discretisation, nodes_per_limb, numerics = PRESETS[fidelity]
@@ -318,6 +339,12 @@ class Scene:
         certificate: `Certificate` of the scene, or the file of one, whose errors are those of any gait. It lapses where
             the robot or the version of the package differs. None means the package's own, which is of the chapter's
             robot and water.
+
+        >>> Scene.for_error(0.002).robot.nodes_per_limb
+        28
+        >>> Scene.for_error(1e-6)
+        Traceback (most recent call last):
+        ValueError: No measured setting keeps the path error below 0.0001 %: the best, ...
         """
         from seastar_gym.accuracy import as_certificate, chapters_certificate  # these are made of scenes
 

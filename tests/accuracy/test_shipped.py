@@ -86,6 +86,15 @@ def test_the_table_says_over_which_commands_it_was_measured_and_with_which_confi
     assert TABLE.samples == 51 and TABLE.confidence() == pytest.approx(0.93, abs=5e-3)
 
 
+def test_a_certificate_fits_a_screen_and_names_the_fastest_settings():
+    known, shown = chapters_certificate(), repr(chapters_certificate())
+    assert len(shown.splitlines()) < 12 and max(map(len, shown.splitlines())) < 100
+    fastest = known.for_error(0.01)
+    assert str(known.of(fastest)) in shown and str(known.of(fastest)) in known._repr_html_().replace("&quot;", '"')
+    chapters = replace(known, settings=(known.of(Scene.preset("chapter")),))
+    assert len(repr(chapters).splitlines()) == 2  # the heads: its error is beyond all levels
+
+
 def test_a_path_error_is_the_sum_of_space_and_time():
     """Never their difference, although they cancel in some swims."""
     for row in TABLE.settings:

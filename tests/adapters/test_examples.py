@@ -1,4 +1,4 @@
-"""Loops and learners of docs/examples learn for an iteration each on the native batch."""
+"""Loops and learners of examples/ learn for an iteration each on the native batch."""
 
 import runpy
 from pathlib import Path
@@ -10,7 +10,7 @@ import pytest
 from seastar_gym.controllers.learned import load, save
 from seastar_gym.evaluation.swim import swim
 
-EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def example(name):

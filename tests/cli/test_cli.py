@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from seastar_gym import Scene, Seastar, Sight
-from seastar_gym.cli import compile, play, screen
+from seastar_gym.cli import compile, played, screen
 from seastar_gym.cli.main import COMMANDS, main
 from seastar_gym.controllers import learned
 from seastar_gym.scene.serial import to_dict
@@ -205,6 +205,19 @@ class Pressed:
         return self
 
 
+def test_something_shows_before_the_simulator_is_loaded():
+    """Numba and what it compiles take a second at best; pygame does not."""
+    script = (
+        "import sys\nfrom seastar_gym.cli import play, screen\n"
+        "def show(picture): print('numba' in sys.modules, picture.std() > 1.0); return sys.exit()\n"
+        "from contextlib import contextmanager\n"
+        "screen._window = contextmanager(lambda fps: iter([show]))\n"
+        "play.main([])\n"
+    )
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
+    assert result.stdout.split() == ["False", "True"], result.stderr
+
+
 def test_the_keyboard_plays_in_a_window(path, dummy_window, monkeypatch, capsys):
     import pygame
 
@@ -212,8 +225,8 @@ def test_the_keyboard_plays_in_a_window(path, dummy_window, monkeypatch, capsys)
     monkeypatch.setattr(pygame.key, "get_pressed", keys.get_pressed)
     monkeypatch.setattr(pygame.key, "get_just_pressed", lambda: keys)
     seen = []
-    step = play.PlayedEnv.step
-    monkeypatch.setattr(play.PlayedEnv, "step", lambda env, action: seen.append(action.tolist()) or step(env, action))
+    step = played.PlayedEnv.step
+    monkeypatch.setattr(played.PlayedEnv, "step", lambda env, action: seen.append(action.tolist()) or step(env, action))
     assert main(["play", "--path", path, "--speed", "100", "--decision-period", "0.2"]) == 0
     assert seen[0] == [0, 1, 0, 0, 2] and not keys.held
     assert "You reached 0 of 1 waypoints" in capsys.readouterr().out

@@ -18,7 +18,7 @@ from seastar_gym.controllers import in_the_box, load  # noqa: E402
 from seastar_gym.data.dataset import record, write  # noqa: E402
 
 ROOT = Path(__file__).parents[2]
-OFFLINE = runpy.run_path(str(ROOT / "docs" / "examples" / "offline.py"), run_name="offline")
+OFFLINE = runpy.run_path(str(ROOT / "examples" / "offline.py"), run_name="offline")
 SWIM = "SeastarSwim-v0"
 pytestmark = pytest.mark.filterwarnings("ignore")  # of Minari's own, and of the packages that it imports
 

@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seastar_gym import Body, Scene, Seastar, Simulator
+from seastar_gym import Body, Scene, Seastar, Simulator, Water
 from seastar_gym.envs.frame import Frame, body_of
 from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.envs.rendering import (
     CURRENT,
+    FLOW,
     HEATED_MINUS,
     HEATED_PLUS,
     LARGEST,
@@ -22,8 +23,10 @@ from seastar_gym.envs.rendering import (
     STATE_COLOURS,
     Renderer,
 )
-from seastar_gym.envs.scenery import Ring, Scenery
+from seastar_gym.envs.scenery import LONGEST, Ring, Scenery, flow_of
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.waypoint_labels import waypoint_labels
+from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 
 pygame = pytest.importorskip("pygame")
 
@@ -241,6 +244,41 @@ def test_everything_in_a_frame_shows(change):
     assert not np.array_equal(renderer.draw(frame_of()), renderer.draw(replace(frame_of(), **change)))
 
 
+CORNERS = np.array([-0.2, -0.1]), np.array([0.2, 0.3])
+
+
+def test_arrows_of_a_current_lie_along_it_and_are_as_long_as_it_is_fast():
+    vortex = Vortex(1e-3, 0.05, 0.1, 0.03)
+    arrows, words = flow_of(vortex, *CORNERS, 0.04)
+    way, middle = np.diff(arrows, axis=1)[:, 0], arrows.mean(axis=1)
+    from_centre = middle - [0.05, 0.1]
+    speed = 1e-3 / (2 * np.pi) * np.hypot(*from_centre.T) / (0.03**2 + (from_centre**2).sum(axis=1))
+    np.testing.assert_allclose((way * from_centre).sum(axis=1), 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.hypot(*way.T), LONGEST * 0.04 * speed / speed.max())
+    assert len(arrows) == 100 and words == f"current up to {1e3 * speed.max():.3g} mm/s"
+    assert (middle > CORNERS[0]).all() and (middle < CORNERS[1]).all()
+
+
+def test_arrows_of_every_current_show_its_velocity():
+    grid = GridCurrent.from_function(lambda x, y: (0.01 * y, 0.0 * x), (-1.0, 1.0), (-1.0, 1.0), 0.1)
+    np.testing.assert_allclose(
+        flow_of(grid, *CORNERS, 0.05).arrows, flow_of(ShearCurrent(0.01), *CORNERS, 0.05).arrows, atol=1e-12
+    )
+    assert flow_of(UniformCurrent(3e-3, -4e-3), *CORNERS, 0.1).words == "current 5 mm/s"
+    for none in (None, UniformCurrent()):
+        assert flow_of(none, *CORNERS, 0.1).words == "" and not len(flow_of(none, *CORNERS, 0.1).arrows)
+
+
+def test_a_picture_of_a_swim_in_a_current_has_its_arrows():
+    drawn = {}
+    for current in (None, UniformCurrent(u_x=2e-3)):
+        env = SeastarSwimEnv(scene=Scene(fluid=Water(current=current)), render_mode="rgb_array")
+        env.reset(seed=0)
+        drawn[current] = int((np.abs(env.render().astype(int) - FLOW).max(axis=-1) < 8).sum())
+    still, flowing = drawn.values()
+    assert still == 0 and flowing > 2000
+
+
 def test_a_body_is_where_its_robot_is_and_turns_with_it():
     scene = Scene(Seastar(3, 4, body=Body.rectangle(0.06, 0.02)))
     simulator, angles = Simulator(scene, 2), np.array([0.0, 0.7])
@@ -314,7 +352,9 @@ def test_what_is_kept_of_a_picture_shows_in_no_other():
     renderer, far = renderer_of(), frame_of(hub=(0.5, 0.3))
     scenery = Scenery(rings=(Ring(np.array([0.1, 0.1]), 0.02),), note="a note")
     frames = [frame_of(), frame_of(command=(1, 0, 0, 0, -1)), frame_of(hub=(0.02, 0.01), trail=((0, 0), (0.02, 0.01)))]
+    flowing = replace(frame_of(), current=ShearCurrent(0.02))
     frames += [frame_of(waypoint_index=2), far, frame_of(waypoint_index=2), replace(frame_of(), scenery=scenery)]
+    frames += [flowing, frame_of(), replace(flowing, scenery=scenery)]
     for frame in [*frames, *frames[::-1], frames[0], frames[0]]:
         picture, new = renderer.draw(frame), renderer_of()
         new.camera = renderer.camera

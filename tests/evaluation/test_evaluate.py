@@ -213,6 +213,20 @@ def test_nothing_is_written_without_a_folder_and_no_video_on_request(tmp_path, m
     assert {file.name for file in (tmp_path / "there").iterdir()} == {"evaluation.csv", "traces.png"}
 
 
+def test_trajectories_have_a_row_for_every_stroke_of_every_swim(tmp_path):
+    agents = {"a": scripted("straight"), "b": scripted("2-,5+")}
+    swims = evaluate(agents, SHORT, max_strokes=3, out=tmp_path, video=False, trajectory=True, **EASY)
+    with (tmp_path / "trajectories.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["agent"] for row in rows] == [done.agent for done in swims for _ in done.time]
+    for name, values in {"time_s": "time", "waypoints_reached": "waypoint_index"}.items():
+        assert [float(row[name]) for row in rows] == [x for done in swims for x in getattr(done, values)]
+    hub = np.array([[row["hub_x_m"], row["hub_y_m"]] for row in rows], dtype=float)
+    np.testing.assert_array_equal(hub, np.concatenate([done.hub for done in swims]))
+    heat = [[0.0, *done.heating_time] for done in swims]
+    assert [float(row["heating_time_s"]) for row in rows] == [seconds for of_swim in heat for seconds in of_swim]
+
+
 @pytest.mark.parametrize("frames_per_stroke", [1, 3])
 def test_an_environment_draws_as_many_frames_per_stroke_as_asked(frames_per_stroke):
     env = SeastarSwimEnv(fidelity="fast", render_mode="rgb_array_list", frames_per_stroke=frames_per_stroke)

@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from seastar_gym.evaluation.report.page import Remarks, ResultsTable, table_html
 from seastar_gym.evaluation.results import COLUMNS, number
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.evaluation.trials import MEASURED
-from seastar_gym.scene import Scene
+from seastar_gym.scene import Scene, Vortex, Water
 
 MM = 1000.0
 SHORT = [[0.02, 0.0], [0.02, 0.02]]
@@ -190,6 +191,22 @@ def test_damaged_speeds_are_refused_in_a_sentence(text, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+def test_errors_of_a_swim_that_never_arrived_are_grey(text):
+    """The straight gait does not arrive, and no other number of it is grey."""
+    for line in text.splitlines():
+        if line.startswith('<tr><td class="words" data-name="agent">'):
+            grey = re.findall(r'class="faint" title="[^"]+" data-name="(\w+)"', line)
+            assert grey == ["mean_cross_track_error_mm", "largest_cross_track_error_mm"]
+    arrived = {"agent": "a", "strokes_to_finish": 3, "mean_cross_track_error_mm": 1.0}
+    assert "faint" not in table_html(ResultsTable("Results", dict.fromkeys(arrived, "t"), [arrived]))
+
+
+def test_every_column_is_explained(text):
+    terms = " ".join(re.findall(r"<dt>(.*?)</dt>", text))
+    titles = (re.sub(r"^(mean|largest) | \[.*", "", " ".join(title.split())) for title in COLUMNS.values())
+    assert [title for title in titles if title not in f"{terms} agent waypoints reached"] == []
+
+
 # Learning curves
 
 
@@ -211,6 +228,12 @@ def test_a_damaged_curve_is_refused_with_its_line(tmp_path, text, words):
     (tmp_path / "progress.csv").write_text(text)
     with assert_refused(str(tmp_path / "progress.csv"), words):
         read_progress(tmp_path)
+
+
+def test_a_curve_begins_with_the_untrained_policy():
+    figure = curves_figure([Curve.of("a", [[0, 400, 0], *PROGRESS])], {})
+    trace, unfinished = figure.data
+    assert trace.x[0] == unfinished.x[0] == 0 and figure.layout.xaxis.rangemode == "tozero"
 
 
 def test_a_training_without_a_checkpoint_has_no_curve():
@@ -292,6 +315,29 @@ class Watched:
 def page(open_offline, evaluated):
     watched = Watched(open_offline(evaluated[0] / "report.html"))
     yield watched
+    watched.page.context.close()
+
+
+def test_a_current_and_films_are_on_the_page(tmp_path):
+    scene = replace(Scene.preset("fast"), fluid=Water(current=Vortex(1e-3)))
+    agents = {"straight & on": scripted("straight")}
+    evaluate(agents, SHORT, max_strokes=2, scene=scene, out=tmp_path, report=Remarks(), say=lambda text: None)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    (film,) = re.findall(r'Films: <a href="([^"]+)">straight &amp; on</a>', text)
+    assert (tmp_path / film).is_file() and '"name":"current up to' in text
+    (recorded,) = re.findall(r"^const recorded = (.*);$", text, flags=re.MULTILINE)
+    assert np.array(json.loads(recorded)["current"]).shape[1:] == (2, 2)
+
+
+def test_the_dark_mode_has_no_light_picture(open_offline, evaluated):
+    watched = Watched(open_offline(evaluated[0] / "report.html", color_scheme="dark"))
+    watched.page.wait_for_function("document.getElementById('playback').layout.font.color === '#e4e8ee'")
+    papers = watched.page.evaluate("[...document.querySelectorAll('.bg, .main-svg')].map((e) => e.style.fill)")
+    assert not [paper for paper in papers if "255" in paper]
+    assert watched.page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(19, 20, 22)"
+    watched.page.emulate_media(color_scheme="light")
+    watched.page.wait_for_function("document.getElementById('playback').layout.font.color === '#3a404a'")
+    assert watched.complaints == []
     watched.page.context.close()
 
 

@@ -1,4 +1,4 @@
-// A microcontroller for docs/examples/wires.ino: its serial port is a file descriptor, its pins are lines of another.
+// A microcontroller for examples/wires.ino: its serial port is a file descriptor, its pins are lines of another.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>

@@ -1,4 +1,4 @@
-"""The plant over ROS 2 of docs/examples drives a simulated robot; in the place of ROS stand a few lines."""
+"""The plant over ROS 2 of examples/ drives a simulated robot; in the place of ROS stand a few lines."""
 
 import math
 import runpy
@@ -15,7 +15,7 @@ from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.simulated import SimulatedPlant
 from seastar_gym.plant.swim import PlantSwim
 
-EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "ros_plant.py"
+EXAMPLE = Path(__file__).parents[2] / "examples" / "ros_plant.py"
 SCENE = Scene(actuator=SmaWires(heating_time=0.08, period=0.5)).at("fast")
 
 

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.skipif(
     not (shutil.which("g++") and hasattr(os, "openpty")), reason="There is no compiler, or no pseudo-terminal, here."
 )
 HERE = Path(__file__).parent
-SKETCH = HERE.parents[1] / "docs" / "examples"
+SKETCH = HERE.parents[1] / "examples"
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from seastar_gym.evaluation.path_file import load_path
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
@@ -150,10 +151,28 @@ def test_a_path_is_drawn_with_the_mouse(opened):
     opened.mouse.down()
     opened.mouse.move(x + 80, y - 60, steps=5)
     opened.mouse.up()
-    assert opened.evaluate("swimPage.swim.name") == "your path"
+    assert "A planner swims your path" in opened.inner_text("#who")
     assert opened.inner_text("#play") == "Pause"
     assert opened.evaluate("swimPage.swim.path.length") >= 2
     assert opened.complaints == []
+
+
+def test_a_drawn_path_is_a_file_for_the_policy(opened, tmp_path):
+    opened.evaluate("path => swimPage.choose(swimPage.plan(path.map(([x, y]) => [x + 0.1, y]), [0.1, 0]))", PATH)
+    with opened.expect_download() as saved:
+        opened.click("#who a")
+    saved.value.save_as(tmp_path / "path.csv")
+    np.testing.assert_allclose(load_path(str(tmp_path / "path.csv")), PATH, atol=1e-4)
+    opened.evaluate("swimPage.choose(swimPage.swims[0])")
+    assert opened.inner_text("#who") == "A bundled policy swims, recorded from the simulator."
+
+
+def test_the_page_has_a_title_and_a_way_back_unless_the_guide_frames_it(opened, file, tmp_path):
+    assert opened.inner_text("h1") == opened.title() and opened.get_attribute("#back", "href").startswith("index.")
+    (tmp_path / "index.html").write_text(f'<iframe src="{file.as_uri()}"></iframe>')
+    opened.goto((tmp_path / "index.html").as_uri())
+    opened.frame_locator("iframe").locator("#play").wait_for()
+    assert not opened.frame_locator("iframe").locator("h1").is_visible()
 
 
 def test_it_plays_to_the_end_and_begins_again(opened, data):

@@ -15,9 +15,6 @@ from seastar_gym.scene import Scene, UniformCurrent, Water
 from seastar_gym.scene.number import Range, not_negative, positive, ranging
 from seastar_gym.scene.serial import register_part
 
-ARROW = 20.0
-"""Length of an arrow in pictures over the speed it stands for [s]."""
-
 
 @register_part
 @dataclass(frozen=True)
@@ -156,13 +153,8 @@ class StationTask(Numbered, Swimming):
         return {"distance": self._measure(hub), "station": self.station.copy()}
 
     def scenery(self, robot: int) -> Scenery:
-        """The station, and the current as far as it flows in 20 s, from the lower left of the station."""
-        place, flow = self.station[robot], np.array([self.drawn[U_X][robot], self.drawn[U_Y][robot]])
-        start = place - 0.12
-        speed = 1000.0 * float(np.hypot(*flow))
+        """The station; pictures show the current by themselves."""
         return Scenery(
-            rings=(Ring(place, self.about.tolerance),),
-            arrows=(np.array([start, start + ARROW * flow]),),
+            rings=(Ring(self.station[robot], self.about.tolerance),),
             progress=f"{1000.0 * self._distance[robot]:.1f} mm off",
-            note=f"current of {speed:.1f} mm/s",
         )

@@ -10,9 +10,10 @@ import plotly.graph_objects as go
 import plotly.io
 from numpy.typing import NDArray
 
-from seastar_gym.evaluation.pictures import COLOURS, FAINT_INK, INK, MM, PLANNED, STROKES_PER_DOT, view
+from seastar_gym.evaluation.pictures import COLOURS, FAINT_INK, FLOW, INK, MM, PLANNED, STROKES_PER_DOT, flow_in, view
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.scene.csv_rows import read_rows
+from seastar_gym.scene.currents import AnyCurrent
 
 Floats = NDArray[np.float64]
 DASHES = ("solid", "dash", "dot")
@@ -25,6 +26,8 @@ def to_html(figure: go.Figure, name: str) -> str:
     """The figure as a piece of a page that has plotly.js; it fills the element around it."""
     figure.update_layout(
         template="none",
+        paper_bgcolor="rgba(0,0,0,0)",  # a page has a light and a dark mode
+        plot_bgcolor="rgba(0,0,0,0)",
         font={"family": "system-ui, sans-serif", "size": 13, "color": INK},
         legend={"orientation": "h", "yanchor": "bottom", "x": 0.0},
         showlegend=True,
@@ -37,10 +40,20 @@ def to_html(figure: go.Figure, name: str) -> str:
     return str(plotly.io.to_html(figure, config=options, include_plotlyjs=False, full_html=False, div_id=name))
 
 
-def paths_figure(swims: Sequence[Swim], waypoint_radius: float) -> go.Figure:
-    """The hubs' ways along the path of the first swim. waypoint_radius: [m]."""
+def paths_figure(swims: Sequence[Swim], waypoint_radius: float, current: AnyCurrent | None = None) -> go.Figure:
+    """The hubs' ways along the path of the first swim, and a current of the water. waypoint_radius: [m]."""
     path = MM * np.concatenate([np.zeros((1, 2)), swims[0].waypoints])
-    figure = go.Figure()
+    low, high = view(path, MM * np.concatenate([done.hub for done in swims]))
+    figure, flow = go.Figure(), flow_in(current, low, high)
+    if flow.words:
+        x, y = (_joined(MM * flow.arrows[:, :, axis]) for axis in (0, 1))
+        figure.add_scatter(
+            x=x, y=y, name=flow.words, hoverinfo="skip", mode="lines+markers", line={"color": FLOW, "width": 1.5},
+            marker={
+                "symbol": "arrow", "angleref": "previous", "size": [0, 10, 0] * len(flow.arrows), "color": FLOW,
+                "line_width": 0,
+            },
+        )  # fmt: skip
     figure.add_scatter(
         x=_rounded(path[:, 0]), y=_rounded(path[:, 1]), mode="lines", name="path", hoverinfo="skip",
         line={"color": PLANNED, "dash": "dash", "width": 1.5},
@@ -49,7 +62,6 @@ def paths_figure(swims: Sequence[Swim], waypoint_radius: float) -> go.Figure:
         figure.add_shape(type="circle", **_circle(x, y, MM * waypoint_radius), line_color=PLANNED, layer="below")
     for number, done in reversed(list(enumerate(swims))):  # the first swim comes on top
         figure.add_trace(_trace(done, number))
-    low, high = view(path, MM * np.concatenate([done.hub for done in swims]))
     figure.update_layout(
         xaxis={"title": "x [mm]", "range": [low[0], high[0]], "constrain": "domain"},
         yaxis={"title": "y [mm]", "range": [low[1], high[1]], "scaleanchor": "x", "constrain": "domain"},
@@ -66,7 +78,7 @@ def _trace(done: Swim, number: int) -> go.Scatter:
         x=_rounded(hub[:, 0]), y=_rounded(hub[:, 1]), mode="lines+markers",
         name=html.escape(f"{done.agent} ({done.result})"),
         line={"color": COLOURS[number % len(COLOURS)], "dash": DASHES[number // len(COLOURS) % len(DASHES)]},
-        marker={"size": np.where(dots, 6, 0).tolist()},
+        marker={"size": np.where(dots, 6, 0).tolist(), "line_width": 0},
         text=[f"{done.counted_in[:-1]} {stroke}, {time:g} s" for stroke, time in enumerate(done.time.round(6))],
         hovertemplate="%{text}: %{x:.0f}, %{y:.0f} mm",
     )  # fmt: skip
@@ -79,6 +91,11 @@ def _circle(x: float, y: float, radius: float) -> dict[str, float]:
 def _rounded(values: Floats) -> list[float]:
     """Millimetres to a tenth: a page is read by eyes."""
     return np.round(values, 1).tolist()
+
+
+def _joined(lines: Floats) -> list[float | None]:
+    """Coordinates of lines [mm], shape (n, 2), in one trace with gaps between them."""
+    return [number for line in lines.round(1).tolist() for number in (*line, None)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,8 +205,13 @@ def speeds_figure(directions: Sequence[float], speeds: Mapping[str, Sequence[flo
         )  # fmt: skip
     figure.update_layout(
         polar={
-            "radialaxis": {"rangemode": "tozero", "angle": sector / 4, "nticks": 5, "gridcolor": "#dfe3e8"},
-            "angularaxis": {"ticksuffix": "\u00b0", "dtick": sector / 2, "gridcolor": "#dfe3e8"},
+            "bgcolor": "rgba(0,0,0,0)",
+            "radialaxis": {
+                "rangemode": "tozero", "angle": sector / 4, "nticks": 5, "gridcolor": "#dfe3e8", "linecolor": FAINT_INK
+            },
+            "angularaxis": {
+                "ticksuffix": "\u00b0", "dtick": sector / 2, "gridcolor": "#dfe3e8", "linecolor": FAINT_INK
+            },
         },
         margin={"l": 48, "r": 48, "t": 36, "b": 36},
         legend_y=1.12,

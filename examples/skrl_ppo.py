@@ -1,6 +1,6 @@
 """PPO of skrl on the native batch.
 
-    python docs/examples/skrl_ppo.py
+    python examples/skrl_ppo.py
 
 skrl takes the observation that a step returns for that of the next stroke, so the batch has the autoreset mode
 SAME_STEP.

@@ -1,6 +1,6 @@
 """PPO of TorchRL on the native batch.
 
-    python docs/examples/torchrl_ppo.py
+    python examples/torchrl_ppo.py
 
 TorchRL resets robots itself, so the batch has the autoreset mode DISABLED; `GymWrapper` then asks for resets of those
 whose episode is over, all in one call.

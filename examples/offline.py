@@ -1,7 +1,7 @@
 """Behaviour cloning, and conservative Q-learning (CQL, Kumar et al. 2020), on a Minari dataset.
 
     seastar data --tasks SeastarSwim-v0 --agents greedy --random-paths --fidelity fast --out data
-    MINARI_DATASETS_PATH=data python docs/examples/offline.py SeastarSwim/greedy-v0 --learner cql
+    MINARI_DATASETS_PATH=data python examples/offline.py SeastarSwim/greedy-v0 --learner cql
 
 Both learn a number for every action from what was recorded, without a simulator: cloning the logits of the recorded
 actions, CQL their values. CQL is a deep Q-learner that also lowers the values of actions that were not taken.

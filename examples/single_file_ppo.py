@@ -1,6 +1,6 @@
 """PPO in one file, in the manner of CleanRL, on the native batch: read it from top to bottom.
 
-    python docs/examples/single_file_ppo.py --out policy.safetensors
+    python examples/single_file_ppo.py --out policy.safetensors
     seastar evaluate --agents policy.safetensors pentagon --fidelity fast
 
 The batch writes observations, rewards and flags straight into the learner's memory (`out=Buffers(...)`). Defaults are
