@@ -34,10 +34,11 @@ try:
     from agents.ppo import make_model, make_training_env, require_device
     from agents.training import efficiency
     from agents.training.box import put_in_the_box
+    from agents.training.filming import filmed_beside
     from agents.training.folder import export, held, is_unbegun, recorded, resume_command, write_config
     from agents.training.interruption import Interruption
     from agents.training.options import Options, config_of, read_options, require_consent
-    from agents.training.robot import SCENE, Robot, asked_for, keep, robot_of
+    from agents.training.robot import Robot, asked_for, keep, physics, robot_of
     from agents.training.watch import Watch
     from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
     from seastar_gym.command import ended_by_disk
@@ -86,10 +87,10 @@ def train(options: Options, folder: Path, stop: Callable[[], bool]) -> tuple[PPO
     return model, watch
 
 
-def compare(options: Options, folder: Path, remarks: Remarks) -> None:
+def compare(options: Options, folder: Path, remarks: Remarks, film: Callable[[], Path | None]) -> None:
     """Compare the learned policy with the scripted gait round the pentagon: table, CSV, picture, videos and report.
 
-    The gait of a timed environment is the lagged one, where decisions allow it.
+    film: Returns the file of the gait's video, if somebody else made it, see `filmed_beside`.
     """
     decision_period, robot = options.ppo.decision_period, robot_of(options, folder)
     evaluate(
@@ -100,20 +101,30 @@ def compare(options: Options, folder: Path, remarks: Remarks) -> None:
         scene=robot.scene,
         fidelity=robot.fidelity(options),
         video=options.video,
+        filmed={"script": film},
         report=remarks,
         out=folder / "evaluation",
     )
 
 
-def script(decision_period: float | None, scene: Scene | None = None) -> dict[str, Policy]:
-    """Fastest scripted gait round the pentagon for a time between decisions [s], by its name; {} if there is none."""
+def gait_of(decision_period: float | None, scene: Scene | None = None) -> str | None:
+    """Name of the fastest scripted gait round the pentagon for a time between decisions [s]; None if there is none.
+
+    That of a timed environment is the lagged one, where decisions allow it.
+    """
     for name in ("lagged-pentagon", "pentagon"):
         with suppress(ValueError):  # the gait needs other decisions, or another robot
             gait = scripted(name, decision_period=decision_period)
             if scene is not None:
                 require_fit(gait, scene, actions_of(gait, scene.robot.n_limbs), decision_period)
-            return {"script": gait}
-    return {}
+            return name
+    return None
+
+
+def script(decision_period: float | None, scene: Scene | None = None) -> dict[str, Policy]:
+    """That gait by its name in the comparison; {} if there is none."""
+    name = gait_of(decision_period, scene)
+    return {} if name is None else {"script": scripted(name, decision_period=decision_period)}
 
 
 def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Remarks:
@@ -129,17 +140,14 @@ def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Rema
         sentences.append(
             f"The last session took {seconds:.0f} s, {watch.strokes / seconds:.0f} strokes per second: {shares}."
         )
-    policy = shlex.quote(str(folder / "policy.safetensors"))
-    decision_period = options.ppo.decision_period
-    timed = "" if decision_period is None else f" --decision-period {decision_period:g}"
-    physics = f"--scene {shlex.quote(str(folder / SCENE))}" if own else f"--fidelity {options.fidelity}"
+    agents = ["--agents", str(folder / "policy.safetensors"), "pentagon", *physics(options, folder)]
     return Remarks(
         title="Learned against scripted round the pentagon",
         sentences=sentences,
         commands=[
             *config_of(folder)["commands"],
             f"tensorboard --logdir {shlex.quote(str(folder))}",
-            f"seastar evaluate --agents {policy} pentagon {physics} --report --video --out runs/evaluate{timed}",
+            f"seastar evaluate {shlex.join(agents)} --report --video --out runs/evaluate",
             f"{resume_command(folder)} --strokes {2 * trained}",
         ],
         curves=[Curve.of("learned", read_progress(folder))],
@@ -180,6 +188,13 @@ def run(options: Options, arguments: Sequence[str]) -> int:
 
 def train_and_compare(options: Options, folder: Path) -> int:
     """Train, compare, report, in the folder of the run; returns the exit code."""
+    gait = gait_of(options.ppo.decision_period, robot_of(options, folder).scene)
+    with filmed_beside(gait, options, folder) as film:
+        return train_beside(film, options, folder)
+
+
+def train_beside(film: Callable[[], Path | None], options: Options, folder: Path) -> int:
+    """Train, compare, report, while the film of the scripted gait is made; returns the exit code."""
     with Interruption() as interruption:
         model, watch = train(options, folder, lambda: interruption.requested)
     export(model, folder)
@@ -190,7 +205,7 @@ def train_and_compare(options: Options, folder: Path) -> int:
         asked = ["--ship"] * options.ship + ["--ship-anyway"] * options.ship_anyway
         print(" ".join(["   ", resume_command(folder), *asked]))
         return 130
-    compare(options, folder, describe(options, folder, model.num_timesteps, watch))
+    compare(options, folder, describe(options, folder, model.num_timesteps, watch), film)
     print(f"Report:  {folder / 'evaluation' / 'report.html'}\nPolicy:  {folder / 'policy.safetensors'}")
     print(f"Logs:    tensorboard --logdir {folder}\n{watch.efficiency}")
     return put_in_the_box(options, folder) if options.ship else 0

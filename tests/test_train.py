@@ -19,6 +19,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 import train
 from agents.training import box as shipping
-from agents.training import efficiency
+from agents.training import efficiency, filming
 from agents.training.efficiency import Efficiency
 from agents.training.folder import held, recorded
 from agents.training.options import Options, read_options, saved_options
@@ -586,6 +587,60 @@ def test_several_seeds_are_runs_of_their_own(tmp_path, capsys, short_swims):
     for wrong in (["--seeds", "1", "1"], ["--seeds", "1", "--ship"]):
         with pytest.raises(SystemExit):
             train.main([*TINY, *wrong])
+
+
+def filmed(folder, *arguments):
+    """Bytes of the film of the script of a tiny training."""
+    options = [word for word in TINY if word != "--no-video"]
+    assert train.main([*options, "--strokes", "128", *arguments, "--out", str(folder)]) == 0
+    assert sorted(file.name for file in (folder / "evaluation").iterdir()) == [
+        "evaluation.csv", "learned.mp4", "report.html", "script.mp4", "traces.png",
+    ]  # fmt: skip
+    return (folder / "evaluation" / "script.mp4").read_bytes()
+
+
+def no_process(*arguments, **options):
+    raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+
+
+def lost_process(command, **options):
+    return subprocess.Popen([sys.executable, "-c", "raise SystemExit(1)"], **options)
+
+
+def test_the_script_is_filmed_beside_the_training_and_else_afterwards(tmp_path, monkeypatch):
+    """The film has the same bytes wherever it is made: beside, here on one processor, and where a process is lost."""
+    monkeypatch.setattr("agents.training.options.TIME_LIMIT", 3.0)
+    monkeypatch.setattr("agents.training.filming.processors", lambda: 2)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    there, made = {}, train.compare
+
+    def compare(options, folder, remarks, film):
+        there[folder] = film()
+        made(options, folder, remarks, film)
+
+    monkeypatch.setattr(train, "compare", compare)
+    beside = filmed(tmp_path / "beside", "--decision-period", "0.5")
+    assert there[tmp_path / "beside"] is not None
+    for name, popen in {"none": no_process, "lost": lost_process}.items():
+        monkeypatch.setattr(filming, "subprocess", SimpleNamespace(DEVNULL=subprocess.DEVNULL, Popen=popen))
+        assert filmed(tmp_path / name, "--decision-period", "0.5") == beside
+    monkeypatch.setattr("agents.training.filming.processors", lambda: 1)
+    assert filmed(tmp_path / "alone", "--decision-period", "0.5") == beside
+    assert [there[tmp_path / name] for name in ("none", "lost", "alone")] == [None] * 3
+    assert not list(tmp_path.glob("seastar-film-*"))
+
+
+def test_a_training_that_is_stopped_ends_the_process_that_films(tmp_path, monkeypatch):
+    monkeypatch.setattr("agents.training.filming.processors", lambda: 2)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    begun, begin = [], filming._begun
+    monkeypatch.setattr(filming, "_begun", lambda words: begun.append(begin(words)) or begun[-1])
+    monkeypatch.setattr(train, "train", lambda *given: (_ for _ in ()).throw(KeyboardInterrupt))
+    options = [word for word in TINY if word != "--no-video"]
+    assert train.main([*options, "--out", str(tmp_path / "run")]) == 130
+    (process,) = begun
+    assert process.poll() is not None and not list(tmp_path.glob("seastar-film-*"))
+    assert not (tmp_path / "run" / "evaluation").exists()
 
 
 @pytest.mark.slow

@@ -58,6 +58,13 @@ def keep(robot: Robot, folder: Path) -> None:
         write_json(folder / INTERVALS, {name: each.bounds for name, each in robot.draws.distributions.items()})
 
 
+def physics(options: Options, folder: Path) -> list[str]:
+    """Words of `seastar evaluate` for the robot and the decisions of the run with these options in a folder."""
+    words = ["--fidelity", options.fidelity] if options.scene is None else ["--scene", str(folder / SCENE)]
+    period = options.ppo.decision_period
+    return words if period is None else [*words, "--decision-period", str(period)]
+
+
 def robot_of(options: Options, folder: Path) -> Robot:
     """Robot of the run with these options in a folder."""
     return Robot(

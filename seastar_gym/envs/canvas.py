@@ -6,6 +6,8 @@ are in pixels of the finished picture, counted from the upper left corner, y dow
 
 from __future__ import annotations
 
+import functools
+import itertools
 import os
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +22,8 @@ Colour = tuple[int, int, int]
 
 SUPERSAMPLING = 3
 """Pictures are painted this many times larger and smoothed down."""
+KEPT_TEXTS = 64
+"""Number of texts that are kept as they were written: most are the same from picture to picture."""
 
 
 class Canvas:
@@ -37,6 +41,8 @@ class Canvas:
         self._shows: object = None  # what is kept shows it
         self._changed: list[pygame.Rect] = []  # where this picture differs from the last, but for what is above
         self._above: list[pygame.Rect] = []  # where something is painted above what is kept
+        self._written = functools.lru_cache(KEPT_TEXTS)(lambda *text: self._font.render(*text))
+        self._size_of = functools.lru_cache(KEPT_TEXTS)(lambda text: self._font.size(text))
 
     def begin(self, background: Colour, shows: object = None) -> bool:
         """Begin a picture; returns whether it has what was kept of the last one already.
@@ -44,7 +50,7 @@ class Canvas:
         shows: What is kept shows. Where it is that of the last picture, what was painted above it is taken away;
             otherwise, and for None, the picture is filled with the background.
         """
-        self._font = self._new_font()
+        vars(self).pop("_font", None)
         stays = shows is not None and shows == self._shows
         self._changed, self._above, self._shows = self._above, [], shows
         if stays:
@@ -85,9 +91,11 @@ class Canvas:
         It is a row of discs: pygame's own thick lines and polygons come out up to a fifth thinner in some directions.
         """
         radius = max(1, round(0.5 * SUPERSAMPLING * width))
-        centres = np.rint(SUPERSAMPLING * _along(points, 2.0 / SUPERSAMPLING)).tolist()
-        discs = [self._pygame.draw.circle(self._large, colour, centre, radius) for centre in centres]
-        self._above.append(discs[0].unionall(discs))
+        corners = np.rint(SUPERSAMPLING * _along(points, 2.0 / SUPERSAMPLING)) - radius
+        self._large.fblits(list(zip(itertools.repeat(_disc(colour, radius)), corners.tolist())))
+        low, high = corners.min(axis=0), corners.max(axis=0) + 2 * radius + 1
+        place = self._pygame.Rect(low.tolist(), (high - low).tolist())
+        self._above.append(place.clip(self._large.get_rect()))
 
     def area(self, corners: FloatArray, colour: Colour) -> None:
         """Filled polygon of corners [px], shape (n, 2)."""
@@ -100,21 +108,33 @@ class Canvas:
 
     def text_size(self, text: str) -> FloatArray:
         """Width and height of a written text [px], shape (2,)."""
-        return np.array(self._font.size(text)) / SUPERSAMPLING
+        return np.array(self._size_of(text)) / SUPERSAMPLING
 
     def write(self, text: str, place: ArrayLike, colour: Colour, anchor: tuple[float, float]) -> float:
         """Write a text with its anchor (0 to 1 from the upper left) at a place [px]; returns the x [px] of its end."""
-        written = self._font.render(text, True, colour)
+        written = self._written(text, True, colour)
         corner = np.rint(SUPERSAMPLING * np.asarray(place) - np.array(anchor) * written.get_size())
         self._above.append(self._large.blit(written, corner.tolist()))
         return (float(corner[0]) + written.get_width()) / SUPERSAMPLING
 
-    def _new_font(self) -> pygame.font.Font:
+    @functools.cached_property
+    def _font(self) -> pygame.font.Font:
         """Font for one picture: it dies when another part of the program calls pygame.quit()."""
         self._pygame.font.init()
         name, height = self._pygame.font.get_default_font(), SUPERSAMPLING * self.text_height
         font: pygame.font.Font = self._pygame.font.Font(name, height)
         return font
+
+
+@functools.lru_cache(256)
+def _disc(colour: Colour, radius: int) -> pygame.Surface:
+    """Disc of a radius [pixels of the larger picture], to be put down many times; what is around it is not painted."""
+    pygame, around = import_pygame(), (0, 0, 0) if any(colour) else (1, 1, 1)
+    disc = pygame.Surface((2 * radius + 1, 2 * radius + 1), depth=32)
+    disc.fill(around)
+    disc.set_colorkey(around, pygame.RLEACCEL)
+    pygame.draw.circle(disc, colour, (radius, radius), radius)
+    return disc
 
 
 def _along(points: FloatArray, spacing: float) -> FloatArray:

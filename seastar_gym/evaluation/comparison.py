@@ -18,6 +18,7 @@ from seastar_gym.evaluation.playback import Playback, RecordingEnv
 from seastar_gym.evaluation.results import as_text, results, time_series, write_csv
 from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, decisions_in, swim
 from seastar_gym.extras import require_extra
+from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
 
@@ -40,6 +41,7 @@ def evaluate(
     report: Remarks | None = None,
     trajectory: bool = False,
     say: Callable[[str], None] = print,
+    filmed: Mapping[str, Callable[[], Path | None]] | None = None,
     **environment: Any,
 ) -> list[Swim]:
     """Let every agent swim the path and print the table; returns the swims in the order of the agents.
@@ -54,6 +56,8 @@ def evaluate(
     report: Remarks for report.html, a page with the results and playbacks of the swims; it is not written if None.
     trajectory: Whether trajectories.csv is written, with a row for every stroke of every swim.
     say: Function that prints a text.
+    filmed: Functions by agent that return the file of a film of its swim, made meanwhile by somebody else. None from
+        one of them means that there is none.
     environment: Further arguments of `SeastarSwimEnv`, such as fidelity and random_heading.
     """
     if not agents:
@@ -72,7 +76,8 @@ def evaluate(
     episode = {"seed": seed, "reset_options": reset_options, "max_strokes": max_strokes}
     swims, playbacks = list[Swim](), list[Playback]()
     for name, policy in agents.items():
-        swum, playback = _swim_once(name, policy, environment, episode, videos.get(name), report is not None)
+        video = _without_film(videos.get(name), (filmed or {}).get(name))
+        swum, playback = _swim_once(name, policy, environment, episode, video, report is not None)
         swims.append(swum)
         playbacks += [] if playback is None else [playback]
     say(as_text(swims))
@@ -120,6 +125,15 @@ def _swim_once(
         swum = swim(name, policy, env, **episode, watch=watch)
     env.close()
     return swum, env.playback(name)
+
+
+def _without_film(video: Path | None, filmed: Callable[[], Path | None] | None) -> Path | None:
+    """File of a video that is still to be made, None for none: what is filmed already is copied there."""
+    made = None if video is None or filmed is None else filmed()
+    if video is None or made is None:
+        return video
+    write_atomically(video, made.read_bytes())
+    return None
 
 
 def _video_files(agents: Mapping[str, Policy], folder: Path) -> dict[str, Path]:

@@ -1,6 +1,5 @@
 """`Simulator`: a batch of robots of one scene, advanced by intervals of time, such as strokes."""
 
-import os
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from itertools import pairwise
@@ -30,6 +29,7 @@ from seastar_gym.simulator.report import StrokeReport, make_report
 from seastar_gym.simulator.schedule import ends_at, ends_of_parts, require_duration
 from seastar_gym.simulator.state import State, checked_state
 from seastar_gym.simulator.water import relative_velocities
+from seastar_gym.simulator.workers import processors
 
 Floats = NDArray[np.float64]
 
@@ -76,8 +76,7 @@ class Simulator:
         require_choice("device", device, ("cpu", *DEVICES))
         self.scene = scene
         self.n_robots = int(n_robots)
-        available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        self.threads = min(-(-self.n_robots // N_LANES), available if threads is None else int(threads))
+        self.threads = min(-(-self.n_robots // N_LANES), processors() if threads is None else int(threads))
         self.device = device
         self._batch = self._make_batch(effort)
         self._drive = Drive(scene.actuator, self.n_robots, scene.robot.n_limbs, scene.numerics.step)
