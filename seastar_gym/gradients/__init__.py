@@ -1,0 +1,14 @@
+"""Derivatives of swims.
+
+    from seastar_gym.gradients import differentiate
+
+    found = differentiate(Scene(), commands, by=["fluid.drag_coefficient", "commands"])
+    found.swim.hub, found.by["commands"].hub
+
+Forward differentiation, exact to rounding, in every scene: the kernels are compiled on lanes that carry slopes
+(simd/dual_lanes.py). docs/gradients.md says how far derivatives of swims can be trusted, and what they cost.
+"""
+
+from seastar_gym.gradients.swim import Derivatives as Derivatives
+from seastar_gym.gradients.swim import Swim as Swim
+from seastar_gym.gradients.swim import differentiate as differentiate

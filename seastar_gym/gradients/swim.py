@@ -1,0 +1,233 @@
+"""`differentiate`: a swim of one robot, and its derivatives in numbers of the scene, commands and the start."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seastar_gym.der.rods import make_work
+from seastar_gym.der.stepping.report import MOMENTS, REPORT_ROWS, SMALLEST_HUB_T, WORK
+from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
+from seastar_gym.der.terms.hub import Actuation
+from seastar_gym.gradients.kernels import advance_slopes
+from seastar_gym.gradients.stencils import arrays_of
+from seastar_gym.gradients.unknowns import Rotations, Start, slopes_of_start, unknowns_of
+from seastar_gym.model.rods import make_limits, make_rods
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import as_finite, require_kind, require_texts
+from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.rows import aligned_rows, side_by_side
+from seastar_gym.simulator.drive import checked_commands
+from seastar_gym.simulator.report import SolverStatus
+from seastar_gym.simulator.schedule import require_duration
+from seastar_gym.simulator.simulator import Simulator
+from seastar_gym.simulator.state import State
+
+Floats = NDArray[np.float64]
+
+COUNTS = ("halvings", "rejections", "energy_cuts")
+
+
+class Swim(NamedTuple):
+    """A swim, or its derivatives in an unknown, whose arrays have the unknown's axes behind those that are named here.
+
+    positions, velocities: Of the nodes at the start and at ends of intervals [m], [m/s], shape (n + 1, n_nodes, 2).
+    heading: As of `Simulator.heading` [rad], shape (n + 1,). work: Of the actuators in every interval [J], shape (n,).
+    """
+
+    positions: Floats
+    velocities: Floats
+    heading: Floats
+    work: Floats
+
+    @property
+    def hub(self) -> Floats:
+        """Positions of the hub [m], shape (n + 1, 2)."""
+        return self.positions[:, 0]
+
+
+class Derivatives(NamedTuple):
+    """A swim and its derivatives.
+
+    swim: The swim, to the bits of `Simulator`. by: Derivatives by the names of unknowns, per unit of each.
+    status: SolverStatus of every interval, shape (n,). After a failure all is NaN.
+    halvings, rejections, energy_cuts: Counts of every interval, as in StrokeReport, shape (n,).
+    """
+
+    swim: Swim
+    by: dict[str, Swim]
+    status: NDArray[np.int64]
+    halvings: NDArray[np.int64]
+    rejections: NDArray[np.int64]
+    energy_cuts: NDArray[np.int64]
+
+    @property
+    def sentence(self) -> str:
+        """What the derivatives are of, in one sentence."""
+        if self.status.any():
+            return f"The solver failed in interval {int(np.flatnonzero(self.status)[0]) + 1}: {self._failure}"
+        counts = {name: int(getattr(self, name).sum()) for name in COUNTS}
+        if not any(counts.values()):
+            return "The derivatives are of the swim as it is: no step was halved and no energy cut."
+        halved, cut = counts["halvings"] + counts["rejections"], counts["energy_cuts"]
+        return f"The derivatives are of the steps that were taken: {halved} were halved and {cut} lost energy."
+
+    @property
+    def _failure(self) -> str:
+        return SolverStatus(int(self.status.max())).sentence
+
+
+def differentiate(
+    scene: Scene, commands: ArrayLike, by: Sequence[str], state: State | None = None, duration: float | None = None
+) -> Derivatives:
+    """Swim with these commands, one interval after the other, and differentiate the swim.
+
+    scene: Of one robot. commands: As for `Simulator.stroke`, shape (n, n_limbs).
+    by: Names of unknowns: numbers of the scene such as "fluid.drag_coefficient" or "robot.limbs.0.radius.1",
+        "commands", shape (n, n_limbs), and "positions" and "velocities" of the nodes at the start, shape (n_nodes, 2).
+    state: Of the one robot at the start; None means at rest. Actuators at the start depend on no unknown.
+    duration: Length of an interval [s]; None means a stroke.
+
+    A direction takes a lane, so that N_LANES of them cost some three to four swims of a robot alone. Stages are
+    differentiated as solved exactly: what Newton's tolerance leaves of them is in the swim, not in its derivatives. How
+    steps were halved, limbs touched and energies were cut is taken as it came. At the ends of [-1, 1], derivatives in
+    commands are those from within; where a wire's rotation has a corner, they are the mean of both sides.
+    """
+    require_kind("scene", scene, Scene, "a Scene")
+    if scene.n_robots is not None:
+        raise ValueError("differentiate needs the scene of one robot, such as scene.of_robot(0).")
+    for part, name in ((scene.contact, "contact"), (scene.robot.body, "a body")):
+        if part is not None:
+            raise ValueError(f"There are no derivatives of swims with {name} yet.")
+    require_texts("by", by)
+    if not by or len(set(by)) < len(by):
+        raise ValueError("by must name one unknown or more, each once.")
+    told = as_finite("commands", commands, (None, scene.robot.n_limbs))
+    length = float(scene.actuator.period if duration is None else duration)
+    require_duration(length, scene.numerics.step)
+    strengths = Simulator(scene, 1, threads=1).limb_strengths
+    for command in told:
+        checked_commands(command[None], scene, strengths)
+    unknowns = unknowns_of(scene, told, by)
+    start, slopes = slopes_of_start(scene, state, unknowns)
+    rotations, groups = Rotations(scene, state, told, unknowns), _groups(scene, start, slopes)
+    for k in range(len(told)):
+        times, turned, rises = rotations.interval(k, length)
+        for group in groups:
+            group.advance(times, turned, rises)
+    value, slope = _joined(groups, start, slopes)
+    found, column = dict[str, Swim](), 0
+    for unknown in unknowns:
+        some = slice(column, column + unknown.size)
+        found[unknown.name] = Swim(*(part[..., some].reshape(*part.shape[:-1], *unknown.shape) for part in slope))
+        column += unknown.size
+    report = {name: groups[0].counts(name) for name in COUNTS}
+    return Derivatives(value, found, groups[0].counts("status"), **report)
+
+
+class _Group:
+    """A robot in N_LANES lanes, with a direction in each. columns: Of the slopes that its lanes carry."""
+
+    def __init__(self, scene: Scene, start: Start, slopes: Start, columns: slice):
+        self._columns, self._scheme = columns, scheme_of(scene.numerics.scheme, scene.numerics.damping)
+        one, n_limbs = make_rods(scene), scene.robot.n_limbs
+        self._rods = _dual(side_by_side([one] * N_LANES))
+        for rows, rise in zip(arrays_of(self._rods), slopes.coefficients, strict=True):
+            if rows.ndim == 2:
+                rows[:, N_LANES : N_LANES + self._n] = rise[:, columns]
+            elif rise[:, columns].any():
+                raise ValueError("There are no derivatives in numbers on a grid.")
+        self._work, self._limits = _dual(make_work(one, self._scheme.n_stages)), make_limits(scene)
+        self._actuation = Actuation(*(np.zeros((n_limbs, 2 * N_LANES)) for _ in range(2)))
+        self._q, self._v = (self._rows(value, rise) for value, rise in zip(start[1:3], slopes[1:3], strict=True))
+        stages, n_free = self._scheme.n_stages, 2 * one.n_free
+        n_rows = (n_free + 1) * stages + 2 + (stages if one.body is not None else 0)
+        self._a = aligned_rows(1, n_rows, 2 * N_LANES)
+        self._peaks = np.zeros((1, n_limbs, 2 * N_LANES))
+        self._peaks[..., :N_LANES] = 1.0
+        self._failed = np.zeros((1, 1, 2 * N_LANES))
+        self._held = np.array([2 * node + axis for node in scene.held_nodes for axis in (0, 1)], dtype=int)
+        self._reports: list[dict[str, float]] = []
+        self.states, self.work = [(self._q[0].copy(), self._v[0].copy())], list[Floats]()
+
+    @property
+    def _n(self) -> int:
+        return self._columns.stop - self._columns.start
+
+    def _rows(self, value: Floats, rise: Floats) -> Floats:
+        rows = aligned_rows(1, len(value), 2 * N_LANES)
+        rows[0, :, :N_LANES] = value[:, None]
+        rows[0, :, N_LANES : N_LANES + self._n] = rise[:, self._columns]
+        return rows
+
+    def advance(self, times: Floats, turned: Floats, rises: Floats) -> None:
+        """Advance through the intervals between `times` [s] with rotations, shape (n_times, n_limbs) [rad]."""
+        report = np.zeros((1, len(REPORT_ROWS), 2 * N_LANES))
+        report[:, SMALLEST_HUB_T, :N_LANES] = np.inf
+        effort = np.zeros((1, MOMENTS + turned.shape[1], 2 * N_LANES))
+        shape = self._rows(turned.ravel(), rises.reshape(turned.size, -1))
+        self._a[:] = 0.0
+        held = self._q[0, self._held]
+        self._v[0, self._held] = 0.0
+        advance_slopes()(
+            self._rods, self._work, self._scheme, SCHEMES["implicit-euler"], self._actuation, self._q, self._v,
+            self._a, self._peaks, times, shape, turned.shape[1], self._failed, report, self._limits, effort,
+        )  # fmt: skip
+        self._q[0, self._held], self._v[0, self._held] = held, 0.0
+        status = float(self._failed[0, 0, 0])
+        if status > 0.0:
+            self._q[:] = self._v[:] = effort[:] = np.nan
+        self._reports.append({**dict(zip(REPORT_ROWS, report[0, :, 0].tolist(), strict=True)), "status": status})
+        self.states.append((self._q[0].copy(), self._v[0].copy()))
+        self.work.append(effort[0, WORK].copy())
+
+    def counts(self, name: str) -> NDArray[np.int64]:
+        return np.array([report[name] for report in self._reports]).astype(np.int64)
+
+
+def _dual(bundle: Any) -> Any:
+    """A bundle whose rows (n, N_LANES) have zero slopes behind them."""
+    if isinstance(bundle, np.ndarray) and bundle.ndim == 2:
+        rows = aligned_rows(len(bundle), 2 * N_LANES)
+        rows[:, :N_LANES] = bundle
+        return rows
+    if hasattr(bundle, "_fields"):
+        return bundle._replace(**{name: _dual(getattr(bundle, name)) for name in bundle._fields})
+    return bundle
+
+
+def _groups(scene: Scene, start: Start, slopes: Start) -> list[_Group]:
+    n = slopes.q.shape[-1]
+    return [_Group(scene, start, slopes, slice(a, min(a + N_LANES, n))) for a in range(0, n, N_LANES)]
+
+
+def _joined(groups: list[_Group], start: Start, slopes: Start) -> tuple[Swim, Swim]:
+    """The swim, and its slopes in all unknowns behind all other axes."""
+    n, n_rows = slopes.q.shape[-1], 2 * start.rest.shape[-2]
+
+    def apart(all_rows: list[list[Floats]]) -> tuple[Floats, Floats]:
+        rows = np.array(all_rows)  # (n_groups, n + 1, n_rows, 2 N_LANES)
+        rise = np.moveaxis(rows[..., N_LANES:], 0, -2)
+        return rows[0, ..., 0], rise.reshape(*rise.shape[:-2], -1)[..., :n]
+
+    nodes = []
+    for field in (0, 1):
+        value, rise = apart([[state[field][:n_rows] for state in group.states] for group in groups])
+        nodes.append((value.reshape(len(value), -1, 2), rise.reshape(len(value), -1, 2, n)))
+    work, work_rise = apart([group.work for group in groups])
+    (places, place_rises), (velocities, velocity_rises) = nodes
+    heading, heading_rise = _heading(places, place_rises, start.rest, slopes.rest)
+    return Swim(places, velocities, heading, work), Swim(place_rises, velocity_rises, heading_rise, work_rise)
+
+
+def _heading(places: Floats, rises: Floats, rest: Floats, rest_rises: Floats) -> tuple[Floats, Floats]:
+    """Heading of every state and its slopes, see body_frame.py."""
+    x, y = np.moveaxis(places - places[:, :1], -1, 0)
+    dx, dy = np.moveaxis(rises - rises[:, :1], 2, 0)
+    (a, b), (da, db) = rest.T, np.moveaxis(rest_rises, 1, 0)
+    across, along = y @ a - x @ b, x @ a + y @ b
+    d_across = np.einsum("knu,n->ku", dy, a) - np.einsum("knu,n->ku", dx, b) + y @ da - x @ db
+    d_along = np.einsum("knu,n->ku", dx, a) + np.einsum("knu,n->ku", dy, b) + x @ da + y @ db
+    rise = along[:, None] * d_across - across[:, None] * d_along
+    return np.arctan2(across, along), rise / (across**2 + along**2)[:, None]

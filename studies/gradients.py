@@ -1,0 +1,244 @@
+"""How a tangent grows: whether the derivative of a swim stays small enough to be used.
+
+Every swim is made by three robots side by side. One differs from the first by random velocities of 1e-7 m/s at the
+start, one by pulses of the first stroke that are smaller by a share of 1e-7. What they differ by later, over that
+share, is a tangent of the swim. Its growth is the root mean square of the nodes' differences after some strokes, over
+that after the first. "Shape" is the same of positions as the robot itself sees them, from the hub and along its
+heading. Newton's tolerance is 1e-12 limb lengths. A fourth robot, with pulses that are smaller by 1e-6, tells whether
+differences are tangents.
+
+Writes the growth as JSON and a picture.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from seastar_gym.controllers.learned import in_the_box, load
+from seastar_gym.envs.commands import to_commands
+from seastar_gym.gaits import PAIRS, STRAIGHT, in_time, lagged_gait, pentagon_gait
+from seastar_gym.scene import Contact, Scene, SmaWires, Vortex, Water
+from seastar_gym.simulator import Simulator
+from studies.frame import InDocs, Results, Study
+from studies.kept import rounded
+from studies.style import DPI, INK, subplots
+
+Floats = NDArray[np.float64]
+Commands = Callable[[int, int, np.random.Generator], Floats]
+
+STROKES, SWIMS = 100, 32
+SMALL, LARGER = 1e-7, 1e-6
+NEWTON_TOLERANCE = 1e-12
+SHOWN = (2, 10, 50, 100)
+"""Strokes of the table."""
+LIMIT = 10.0
+"""Growth up to which whole swims are differentiated."""
+OTHERS = {"random, in a vortex": "#cc7a00", "random, vacuum": "#cc3355"}
+"""Cases whose tangents grow, and their colours."""
+TANGENTS = ("start", "pulse")
+
+
+class Case(NamedTuple):
+    """Scene, commands of n strokes of n swims, shape (n_decisions, n_swims, 5), and decisions per second."""
+
+    scene: Scene
+    commands: Commands
+    every: int = 1
+
+
+def signs(strokes: int, swims: int, rng: np.random.Generator) -> Floats:
+    """Random commands of -1, 0 and 1."""
+    return rng.integers(-1, 2, (strokes, swims, 5)).astype(float)
+
+
+def shares(strokes: int, swims: int, rng: np.random.Generator) -> Floats:
+    """Random commands from -1 to 1."""
+    return rng.uniform(-1.0, 1.0, (strokes, swims, 5))
+
+
+def repeated(strokes: int, swims: int, rng: np.random.Generator) -> Floats:
+    """A random command of every swim, again and again."""
+    return np.repeat(signs(1, swims, rng), strokes, axis=0)
+
+
+def gaits(strokes: int, swims: int, rng: np.random.Generator) -> Floats:
+    """The straight swim, the pairs of Fig. 13.8 and the pentagon."""
+    pentagon = np.resize(pentagon_gait(), (strokes, 1, 5))
+    same = np.repeat(np.array([[STRAIGHT, *PAIRS.values()]]), strokes, axis=0)
+    return np.concatenate([same, pentagon], axis=1)
+
+
+def lagged(decisions: int, swims: int, rng: np.random.Generator) -> Floats:
+    """The lagged gait and, as decisions, the straight swim."""
+    seconds = decisions // 5
+    straight = in_time(np.tile(STRAIGHT, (seconds, 1)), 0.2)
+    return np.stack([np.tile(lagged_gait(0.2), (seconds, 1)), straight], axis=1)
+
+
+def of_policy(decision_period: float | None) -> Commands:
+    """What the bundled policy commands on random paths, one after the other, to be swum open loop."""
+
+    def commands(decisions: int, swims: int, rng: np.random.Generator) -> Floats:
+        timed = {} if decision_period is None else {"decision_period": decision_period}
+        name = "SeastarSwim-v0" if decision_period is None else "SeastarSwimTimed-v0"
+        options: dict[str, Any] = {"path": "random", "actions": "pairs", **timed}
+        batch = gym.make_vec(name, swims, vectorization_mode="vector_entry_point", **options)
+        policy, (seen, _) = load(in_the_box(decision_period)), batch.reset(seed=0)
+        state, begins, told = None, np.ones(swims, bool), []
+        for _ in range(decisions):
+            actions, state = policy.predict(seen, state=state, episode_start=begins, deterministic=True)
+            told.append(to_commands("pairs", 5, actions, swims))
+            seen, _, terminated, truncated, _ = batch.step(actions)
+            begins = terminated | truncated
+        return np.array(told)
+
+    return commands
+
+
+WIRES = replace(Scene(), actuator=SmaWires())
+CASES: dict[str, Case] = {
+    "random commands of -1, 0, 1": Case(Scene(), signs),
+    "random shares": Case(Scene(), shares),
+    "a random command, repeated": Case(Scene(), repeated),
+    "gaits of the chapter": Case(Scene(), gaits),
+    "bundled policy": Case(Scene(), of_policy(None)),
+    "wires: random, every 0.2 s": Case(WIRES, signs, 5),
+    "wires: gaits, every 0.2 s": Case(WIRES, lagged, 5),
+    "wires: bundled policy, every 0.2 s": Case(WIRES, of_policy(0.2), 5),
+    "random, discretisation of the chapter": Case(Scene.preset("chapter"), signs),
+    "random, contact": Case(replace(Scene(), contact=Contact()), signs),
+    "random, added mass, little drag along": Case(
+        Scene(fluid=Water(tangential_drag_coefficient=0.1, added_mass_coefficient=1.0)), signs
+    ),
+    "random, in a vortex": Case(Scene(fluid=Water(current=Vortex(0.02, 0.1, 0.0, 0.05))), signs),
+    "random, vacuum": Case(Scene(fluid=None), signs),
+}
+"""Cases of the study."""
+
+
+def seen_by_robot(simulator: Simulator) -> Floats:
+    """Node positions from the hub and along the robot's heading [m], shape (n_robots, n_nodes, 2)."""
+    c, s = np.cos(simulator.heading())[:, None], np.sin(simulator.heading())[:, None]
+    x, y = np.moveaxis(simulator.positions - simulator.hub_position()[:, None], -1, 0)
+    return np.stack([c * x + s * y, c * y - s * x], axis=-1)
+
+
+def rms(differences: Floats) -> Floats:
+    """Root mean square over the nodes, shape (n_robots,)."""
+    return np.asarray(np.sqrt(np.square(differences).sum(axis=-1).mean(axis=-1)))
+
+
+def growth(case: Case, strokes: int, swims: int, seed: int = 0) -> dict[str, Any]:
+    """Growth of both tangents after every stroke, shape (strokes, n_swims) each, and what tells whether they are such.
+
+    nonlinearity: Largest relative difference of tangents by the two sizes of difference, of the hub and all swims.
+    troubled: Share of the swims with a halved or a guarded step.
+    """
+    rng = np.random.default_rng(seed)
+    given = case.commands(strokes * case.every, swims, rng)
+    n = given.shape[1]
+    numerics = replace(case.scene.numerics, newton_tolerance=NEWTON_TOLERANCE)
+    simulator = Simulator(replace(case.scene, numerics=numerics), 4 * n, threads=1)
+    state = simulator.get_state()
+    state.velocities[n : 2 * n] += SMALL * rng.standard_normal(state.velocities[:n].shape)
+    simulator.set_state(state)
+    factors = np.repeat([1.0, 1.0, 1.0 - SMALL, 1.0 - LARGER], n)[:, None]
+    found: dict[str, list[Floats]] = {f"{tangent} {of}": [] for tangent in TANGENTS for of in ("nodes", "shape")}
+    nonlinearity, troubled = np.zeros(n), np.zeros(n, bool)
+    for stroke in range(strokes):
+        for command in given[stroke * case.every : (stroke + 1) * case.every]:
+            told = np.tile(command, (4, 1)) * (factors if stroke == 0 else 1.0)
+            report = simulator.advance(1.0 / case.every, told)
+            troubled |= (report.halvings + report.energy_cuts > 0).reshape(4, n).any(axis=0)
+        for of, places in (("nodes", simulator.positions), ("shape", seen_by_robot(simulator))):
+            first, start, pulse, larger = places.reshape(4, n, *places.shape[1:])
+            found[f"start {of}"].append(rms(start - first))
+            found[f"pulse {of}"].append(rms(pulse - first))
+            if of == "nodes":
+                off = rms((larger - first) * (SMALL / LARGER) - (pulse - first)) / np.maximum(rms(pulse - first), 1e-15)
+                nonlinearity = np.maximum(nonlinearity, off)
+    moved = found["pulse nodes"][0] > 0.0  # swims whose first command is zero have no pulse
+    grown = {name: np.array(values)[:, moved] / values[0][moved] for name, values in found.items()}
+    return {**grown, "nonlinearity": nonlinearity[moved], "troubled": troubled}
+
+
+def as_data(found: dict[str, Any]) -> dict[str, Any]:
+    """Medians and worst growth as plain data."""
+    curves = {
+        name: {
+            "median": [rounded(float(value), 3) for value in np.median(values, axis=1)],
+            "worst": [rounded(float(value), 3) for value in values.max(axis=1)],
+        }
+        for name, values in found.items()
+        if name not in ("nonlinearity", "troubled")
+    }
+    return {
+        **curves,
+        "swims": int(found["pulse nodes"].shape[1]),
+        "nonlinearity": rounded(float(found["nonlinearity"].max()), 2),
+        "troubled": rounded(float(found["troubled"].mean()), 2),
+    }
+
+
+def run(options: InDocs, results: Results) -> str | None:
+    """Measure all cases."""
+    for name, case in tqdm(CASES.items(), unit="case"):
+        results[name] = as_data(growth(case, STROKES, SWIMS))
+    return None
+
+
+def cases_of(results: Mapping[str, Any]) -> dict[str, Any]:
+    """Results by the names of cases, without what heads the file."""
+    return {name: results[name] for name in CASES if name in results}
+
+
+def largest(case: Mapping[str, Any], of: str) -> Floats:
+    """Growth of the worst swim after every stroke, of the larger of both tangents."""
+    return np.max([case[f"{tangent} {of}"]["worst"] for tangent in TANGENTS], axis=0)
+
+
+def table(results: Mapping[str, Any]) -> str:
+    """Table of growth in Markdown."""
+    strokes = [f"after {n}" for n in SHOWN]
+    lines = [
+        f"| swims | {' | '.join(strokes)} | largest | above {LIMIT:.0f} from stroke | shape after {SHOWN[1]} |",
+        f"|---|{'---:|' * (len(SHOWN) + 3)}",
+    ]
+    for name, case in cases_of(results).items():
+        worst, shape = largest(case, "nodes"), largest(case, "shape")
+        above = np.flatnonzero(worst > LIMIT)
+        cells = [f"{worst[n - 1]:.2g}" for n in SHOWN] + [
+            f"{worst.max():.2g}",
+            str(above[0] + 1) if above.size else "-",
+        ]
+        lines.append(f"| {name} | {' | '.join(cells)} | {shape[SHOWN[1] - 1]:.1g} |")
+    return "\n".join(lines)
+
+
+def draw(results: Mapping[str, Any], path: Path) -> None:
+    """Picture of the growth of the worst swims over strokes."""
+    figure, axes = subplots(1, 2, figsize=(9.0, 4.0), sharey=True)
+    for axis, of, title in zip(axes, ("nodes", "shape"), ("Positions of the nodes", "Shape"), strict=True):
+        for name, case in cases_of(results).items():
+            growth_of_case = largest(case, of)
+            colour = OTHERS.get(name, "#3366aa")
+            axis.loglog(np.arange(1, len(growth_of_case) + 1), growth_of_case, color=colour, lw=1.2, alpha=0.8)
+        axis.axhline(LIMIT, color=INK, lw=0.8, ls=":")
+        axis.set_title(title, loc="left", color=INK, fontsize=10)
+        axis.set_xlabel("strokes")
+    axes[0].set_ylabel("tangent over that after the first stroke")
+    axes[0].text(10, 1e6, "vacuum", color=OTHERS["random, vacuum"], ha="right")
+    axes[0].text(3, 3e1, "in a vortex", color=OTHERS["random, in a vortex"])
+    axes[0].text(3, 1e-2, "in water at rest: all others", color="#3366aa")
+    figure.savefig(path, dpi=DPI)
+
+
+STUDY = Study(
+    "gradients", run, file="gradients.json", pictures={"gradients.png": draw}, tables={"gradients growth": table}
+)

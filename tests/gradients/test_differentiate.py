@@ -1,0 +1,225 @@
+"""Derivatives of swims: against differences of swims, and against what symmetry and units say exactly."""
+
+from dataclasses import replace
+
+import numba
+import numpy as np
+import pytest
+
+from seastar_gym import (
+    AlongLimb,
+    Body,
+    Contact,
+    Limb,
+    Numerics,
+    Scene,
+    Seastar,
+    Simulator,
+    SmaPulse,
+    SmaWires,
+    Stiffening,
+    ThermalSma,
+    Vortex,
+    Water,
+)
+from seastar_gym.gradients import differentiate
+from seastar_gym.scene.per_robot import at, with_numbers
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="dual lanes have compiled code alone")
+
+PULSE = SmaPulse(0.6, 0.05, 0.05)
+EXACT = Numerics("implicit-midpoint", 5e-3, 1e-12, damping=0.003)
+SMALL = Scene(Seastar(nodes_per_limb=5), actuator=PULSE, numerics=EXACT)
+COMMANDS = np.random.default_rng(1).uniform(-0.9, 0.9, (3, 5))
+SHARES, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
+"""Places of differences of fourth order, and their weights."""
+QUANTITIES = ("positions", "velocities", "heading", "work")
+
+
+def swum(scene, commands, velocities=0.0):
+    """Quantities of QUANTITIES of a swim."""
+    simulator = Simulator(scene, 1, threads=1, effort=True)
+    state = simulator.get_state()
+    state.velocities[0] += velocities
+    simulator.set_state(state)
+    found, work = [], []
+    for command in [None, *commands]:
+        if command is not None:
+            work.append(simulator.stroke(command[None]).work[0])
+        found.append((simulator.positions[0], simulator.velocities[0], simulator.heading()[0]))
+    return *(np.array(each) for each in zip(*found, strict=True)), np.array(work)
+
+
+def differences(swim, step):
+    """Derivative of the quantities of `swim(change)`."""
+    beside = [swim(step * share) for share in SHARES]
+    return [np.tensordot(WEIGHTS, np.array(each), axes=1) / step for each in zip(*beside, strict=True)]
+
+
+def assert_same(found, expected, tolerance):
+    for name, slope, difference in zip(QUANTITIES, found, expected, strict=True):
+        scale = np.abs(difference).max()
+        np.testing.assert_allclose(slope, difference, rtol=0.0, atol=tolerance * scale + 1e-13, err_msg=name)
+
+
+def assert_is_derivative(scene, names, tolerance=1e-6, commands=COMMANDS, share=1e-4):
+    """Derivatives in numbers, and in two commands, are differences; and the swim is that of `Simulator`."""
+    found = differentiate(scene, commands, [*names, "commands"])
+    for name, value, expected in zip(QUANTITIES, found.swim, swum(scene, commands), strict=True):
+        np.testing.assert_allclose(value, expected, rtol=1e-14, atol=1e-16 if name == "heading" else 0.0)
+    for name in names:
+        number = at(scene, name)
+        step = share * (abs(number) or 1.0)
+        expected = differences(
+            lambda change, name=name, number=number: swum(with_numbers(scene, {name: number + change}), commands), step
+        )
+        assert_same(found.by[name], expected, tolerance)
+    for place in ((0, 1), (1, 3)):
+        change = np.zeros_like(commands)
+        change[place] = 1.0
+        expected = differences(lambda size, change=change: swum(scene, commands + size * change), share)
+        assert_same([each[..., *place] for each in found.by["commands"]], expected, tolerance)
+    return found
+
+
+@pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"])
+def test_every_scheme_has_the_derivatives_of_its_differences(scheme):
+    scene = replace(SMALL, numerics=Numerics(scheme, 5e-3, 1e-12))
+    found = assert_is_derivative(scene, ["robot.youngs_modulus", "fluid.drag_coefficient", "actuator.peak_angle"])
+    assert found.sentence == "The derivatives are of the swim as it is: no step was halved and no energy cut."
+
+
+def test_adapted_steps_are_differentiated_as_they_were_taken():
+    scene = replace(SMALL, numerics=Numerics("implicit-midpoint", 0.02, 1e-12, path_tolerance=0.01))
+    found = assert_is_derivative(scene, ["robot.density"])
+    assert found.rejections.sum() > 0
+    assert "of the steps that were taken" in found.sentence
+
+
+@pytest.mark.parametrize("actuator", [SmaWires(0.6, 0.05, 0.3, period=0.1), ThermalSma()])
+def test_actuators_with_memory(actuator):
+    name = "actuator.peak_angle"
+    assert_is_derivative(replace(SMALL, actuator=actuator), [name], commands=0.5 + 0.3 * COMMANDS)
+
+
+def test_lengths_move_the_start():
+    assert_is_derivative(SMALL, ["robot.limb_length", "robot.rod_radius"])
+
+
+def test_velocities_at_the_start():
+    found = differentiate(SMALL, COMMANDS, ["velocities"])
+    blow = np.random.default_rng(0).standard_normal((SMALL.robot.n_nodes, 2))
+    expected = differences(lambda size: swum(SMALL, COMMANDS, size * blow), 1e-5)
+    assert_same([np.tensordot(each, blow, axes=2) for each in found.by["velocities"]], expected, 1e-6)
+
+
+def test_a_robot_that_is_moved_swims_as_far_aside():
+    """Exact: the sum of the derivatives in all nodes' positions is that of the whole robot's."""
+    found = differentiate(SMALL, COMMANDS, ["positions"]).by["positions"]
+    moved = found.positions.sum(axis=-2)
+    np.testing.assert_allclose(moved, np.broadcast_to(np.eye(2), moved.shape), atol=1e-9)
+    np.testing.assert_allclose(found.heading.sum(axis=-2), 0.0, atol=1e-7)
+
+
+def test_no_path_depends_on_the_unit_of_mass():
+    """Exact: E, density of limbs and density of water, times one factor, are the same robot in other units."""
+    names = ["robot.youngs_modulus", "robot.density", "fluid.density"]
+    found = differentiate(SMALL, COMMANDS, names)
+    each = np.array([at(SMALL, name) * found.by[name].positions for name in names])
+    assert np.abs(each.sum(axis=0)).max() < 1e-9 * np.abs(each).max()
+
+
+def test_strengths_are_factors_of_commands():
+    scene = replace(SMALL, limb_strengths=(1.0, 0.9, 0.8, 0.7, 0.6))
+    found = differentiate(scene, COMMANDS, ["limb_strengths.1", "commands"])
+    expected = found.by["commands"].hub[..., 1] @ (COMMANDS[:, 1] / 0.9)
+    np.testing.assert_allclose(found.by["limb_strengths.1"].hub, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_a_robot_at_rest_moves_by_its_commands_alone():
+    found = differentiate(SMALL, np.zeros((2, 5)), ["commands", "robot.youngs_modulus"])
+    assert SMALL.robot.youngs_modulus * np.abs(found.by["robot.youngs_modulus"].positions).max() < 1e-12
+    assert np.isfinite(found.by["commands"].positions).all()
+    assert found.by["commands"].positions.any()
+
+
+def test_derivatives_go_on_from_a_state():
+    simulator = Simulator(SMALL, 1, threads=1)
+    simulator.stroke(COMMANDS[:1])
+    whole = differentiate(SMALL, COMMANDS, ["commands"])
+    rest = differentiate(SMALL, COMMANDS[1:], ["commands"], simulator.get_state())
+    np.testing.assert_array_equal(rest.swim.positions, whole.swim.positions[1:])
+    np.testing.assert_allclose(rest.by["commands"].hub, whole.by["commands"].hub[1:, :, 1:], rtol=0.0, atol=1e-12)
+
+
+def test_halved_steps_are_of_their_branch():
+    scene = replace(SMALL, fluid=Water(), numerics=Numerics("implicit-euler", 0.05, 1e-12, 3))
+    found = assert_is_derivative(scene, ["robot.youngs_modulus"], 1e-5, share=1e-6)
+    assert found.halvings.sum() > 0
+    assert found.sentence.startswith("The derivatives are of the steps that were taken")
+
+
+# Every term; each of these scenes is compiled for minutes
+
+FLUID = Water(950.0, 1.3, 0.1, Vortex(0.02, 0.1, -0.05, 0.06), 0.8)
+TERMS = {
+    "contact": (replace(SMALL, contact=Contact()), ["robot.youngs_modulus", "contact.opening_angle"]),
+    "vacuum": (replace(SMALL, fluid=None), ["robot.density"]),
+    "hub hinges": (replace(SMALL, robot=Seastar(nodes_per_limb=5, discretisation="chapter")), ["robot.youngs_modulus"]),
+    "fluid, damping": (
+        replace(SMALL, robot=Seastar(nodes_per_limb=5, relaxation_time=4e-3), fluid=FLUID),
+        [
+            "fluid.added_mass_coefficient",
+            "fluid.tangential_drag_coefficient",
+            "fluid.current.x",
+            "robot.relaxation_time",
+        ],
+    ),
+    "bent along": (
+        replace(SMALL, robot=Seastar(nodes_per_limb=5, along=AlongLimb(0.7), stiffening=Stiffening(2.0))),
+        ["robot.along.share", "robot.stiffening.ratio"],
+    ),
+    "profiles": (
+        replace(SMALL, robot=Seastar(nodes_per_limb=5, limbs=(Limb(radius=(2e-3, 1e-3)), *[Limb()] * 4))),
+        ["robot.limbs.0.radius.1"],
+    ),
+    "loads": (replace(SMALL, gravity=(0.1, -0.2), loads=((3, 1e-4, 0.0),)), ["gravity.1", "loads.0.1"]),
+    "body": (
+        replace(SMALL, robot=Seastar(nodes_per_limb=5, body=Body(radius=0.02, centre_of_mass=(2e-3, 1e-3)))),
+        ["robot.body.mass"],
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in TERMS if name not in ("contact", "body")])
+def test_every_term_has_the_derivatives_of_its_differences(name):
+    scene, numbers = TERMS[name]
+    assert_is_derivative(scene, numbers)
+
+
+# Refusals
+
+
+@pytest.mark.parametrize(
+    ("by", "reason"),
+    [
+        ((), "by must name one unknown or more, each once"),
+        (("commands", "commands"), "each once"),
+        (("robot.colour",), "no number of this scene"),
+        (("numerics.step",), "no number of this scene"),
+        (("actuator.heating_time",), "moves the ends of time steps"),
+        (("robot.nodes_per_limb",), "cannot be changed both ways"),
+    ],
+)
+def test_refusals_are_sentences(by, reason):
+    with pytest.raises(ValueError, match=rf"{reason}.*\.$"):
+        differentiate(SMALL, COMMANDS, by)
+
+
+def test_scenes_of_many_robots_and_bodies_are_refused():
+    with pytest.raises(ValueError, match=r"scene of one robot.*\.$"):
+        differentiate(replace(SMALL, actuator=SmaPulse((0.3, 0.4))), COMMANDS, ["commands"])
+    for name in ("body", "contact"):
+        with pytest.raises(ValueError, match=rf"with (a )?{name} yet\.$"):
+            differentiate(TERMS[name][0], COMMANDS, ["commands"])
