@@ -8,18 +8,18 @@ lag one step behind. So one more step is taken, with slopes alone, at the positi
 which is the implicit function theorem. Positions keep their bits.
 """
 
-from seastar_gym.der.linear.coupled import add_contact_product, dot
+from seastar_gym.der.body.body import place_roots
+from seastar_gym.der.contact.contact import n_listed
+from seastar_gym.der.contact.coupled import add_contact_product, dot
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.stepping.momentum import settle_momentum
-from seastar_gym.der.terms.body import place_roots
-from seastar_gym.der.terms.contact import n_listed
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.dual_lanes import slope_of, with_slope
 from seastar_gym.simd.lanes import add_product, any_lane, load, select, splat, store, subtract_product
 
 ACCURACY = 1e-22  # of the square of what limbs in touch share, in the norm of H: what conjugate gradients leave of it
-MOST_ITERATIONS = 200  # as in linear/coupled.py
+MOST_ITERATIONS = 200  # as in contact/coupled.py
 
 
 @kernel
