@@ -160,7 +160,7 @@ def _add_unfinished(figure: go.Figure, curves: Sequence[Curve]) -> None:
     finished = np.concatenate([curve.pentagon[np.isfinite(curve.pentagon)] for curve in curves])
     above = 1.05 * float(finished.max()) if finished.size else 1.0
     figure.add_scatter(
-        x=early, y=[above] * len(early), name="not finished", mode="markers", hoverinfo="x",
+        x=early, y=[above] * len(early), name="not finished", mode="markers", hoverinfo="x", cliponaxis=False,
         marker={"symbol": "x", "size": 8, "color": FAINT_INK},
     )  # fmt: skip
 
