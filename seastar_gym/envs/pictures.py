@@ -1,5 +1,7 @@
 """What the kernels of `observation.py` see of the robots of a simulator, as rows of numbers."""
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,10 +20,16 @@ def observed_rows(simulator: Simulator, targets: Floats) -> Floats:
     targets: Two points of every robot in the world frame [m], shape (n_robots, 4).
     """
     own, robot, target_rows = simulator.coefficients, simulator.scene.robot, to_rows(targets)
-    out = np.empty((len(target_rows), Layout(robot.n_limbs).size, target_rows.shape[2]))
+    out = np.empty((len(target_rows), _size(robot.n_limbs), target_rows.shape[2]))
     places = stations_of(robot)
     observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
     return out
+
+
+@functools.cache
+def _size(n_limbs: int) -> int:
+    """Number of the rows that the kernel fills."""
+    return Layout(n_limbs).size
 
 
 def axes_of(simulator: Simulator) -> Floats:
