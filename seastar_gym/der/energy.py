@@ -7,6 +7,7 @@ from seastar_gym.der.star import edge_of
 from seastar_gym.der.terms.along import natural_moment, natural_tangent, stiffening_rate
 from seastar_gym.der.terms.bending import bending_energy, moment
 from seastar_gym.der.terms.clamp import add_clamp_moments, clamp_energy
+from seastar_gym.der.terms.fluid import fluid_velocity
 from seastar_gym.der.terms.hub import set_natural_hub_angles
 from seastar_gym.der.terms.inertia import kinetic_energy
 from seastar_gym.der.terms.stretching import stretching_energy, tension
@@ -103,6 +104,36 @@ def energies(rods, work, actuation, q, v, elastic, kinetic):
     move_roots(rods, q, v)
     set_natural_hub_angles(rods, work, actuation, splat(1.0))
     store(borrow(elastic), 0, elastic_energy(rods, work, q))
+    store(borrow(kinetic), 0, energy_of_motion(rods, q, v))
+
+
+@kernel
+def energy_of_motion(rods, q, v):
+    """Kinetic energy of nodes and body with velocities v [J]."""
     still = (splat(0.0), splat(0.0))
-    total = kinetic_energy(rods, v, still)
-    store(borrow(kinetic), 0, add_turning_energy(rods, q, v, still, total))
+    return add_turning_energy(rods, q, v, still, kinetic_energy(rods, v, still))
+
+
+@kernel
+def fill_relative(rods, q, v, relative):
+    """Fill `relative` with the velocities v [m/s] less those of the water at the nodes, and with those of a body."""
+    for node in range(rods.n_nodes):
+        x, y = fluid_velocity(rods, load(q, 2 * node), load(q, 2 * node + 1))
+        store(relative, 2 * node, load(v, 2 * node) - x)
+        store(relative, 2 * node + 1, load(v, 2 * node + 1) - y)
+    if rods.body is not None:
+        store(relative, 2 * rods.n_nodes, load(v, 2 * rods.n_nodes))
+        move_roots(rods, q, relative)
+
+
+@entry_point
+def energies_in_water(rods, q, v, relative, kinetic):
+    """Fill `kinetic` [J], shape (n_groups, 1, N_LANES), with the kinetic energies of lane groups relative to the water.
+
+    relative: Rows for the velocities of a lane group, to be written over.
+    """
+    rods, relative = borrow(rods), borrow(relative)
+    for group in range(q.shape[0]):
+        place = borrow(q[group])
+        fill_relative(rods, place, borrow(v[group]), relative)
+        store(borrow(kinetic[group]), 0, energy_of_motion(rods, place, relative))

@@ -1,5 +1,6 @@
 """What the kernels of `observation.py` see of the robots of a simulator, as rows of numbers."""
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ def observed_rows(simulator: Simulator, targets: Floats) -> Floats:
     targets: Two points of every robot in the world frame [m], shape (n_robots, 4).
     """
     own, robot, target_rows = simulator.coefficients, simulator.scene.robot, to_rows(targets)
-    out = np.empty((len(target_rows), Layout(robot.n_limbs).size, target_rows.shape[2]))
+    out = np.empty((len(target_rows), _size(robot.n_limbs), target_rows.shape[2]))
     places = stations_of(robot)
     observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
     return out
@@ -45,7 +46,13 @@ def observing(own: Coefficients, robot: Seastar, targets: Floats) -> tuple[Any, 
         "rest": rest, "limb_length": length, "n_limbs": robot.n_limbs, "stations": stations_of(robot),
         "targets": to_rows(targets), "velocity_scale": VELOCITY_SCALE,
     }  # fmt: skip
-    return observe_group, numbers, Layout(robot.n_limbs).size
+    return observe_group, numbers, _size(robot.n_limbs)
+
+
+@functools.cache
+def _size(n_limbs: int) -> int:
+    """Number of the rows that the kernel fills."""
+    return Layout(n_limbs).size
 
 
 def axes_of(simulator: Simulator) -> Floats:

@@ -109,7 +109,7 @@ class Swimming(ABC):
         scene = options.modelled
         self.options = options
         self.decision_period = checked_decision_period(options.decision_period, scene)
-        self._tells_errors = True
+        self._tells_errors, self._tells_growth = True, is_watched(scene)
         self._can_be_masked = can_be_masked(scene.actuator)
         self.scene = self._drawn_from = scene
         self._draws = draws
@@ -433,7 +433,7 @@ class Swimming(ABC):
             **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
             **(self._errors() if self._tells_errors else {}),
             **({"error_estimate": self.simulator.error_estimate} if self.options.error_bars else {}),
-            **({"energy_growth": self.simulator.energy_growth} if is_watched(self.scene) else {}),
+            **({"energy_growth": self.simulator.energy_growth} if self._tells_growth else {}),
             **({} if self._tracker is None else {"sight_age": self._tracker.age(self.simulator.time)}),
             **{name: values.copy() for name, values in self.drawn.items()},
             **self._lateness.drawn,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.der.energy import energies
+from seastar_gym.der.energy import energies, energies_in_water
 from seastar_gym.der.rods import Work, make_work
 from seastar_gym.der.stepping.report import MOMENTS, PEAK_MOMENT, REPORT_ROWS, SMALLEST_HUB_T, WORK
 from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
@@ -198,19 +198,24 @@ class Batch:
         for name, values in moved.items():
             getattr(self, name)[:] = values
 
-    def energies(self, v: Floats | None = None) -> tuple[Floats, Floats]:
-        """Elastic energy at the present rotations (13.14) and kinetic energy [J], shape (n_robots,) each.
-
-        v: Velocities as those of the batch, to take in place of them.
-        """
-        v = self.v if v is None else v
+    def energies(self) -> tuple[Floats, Floats]:
+        """Elastic energy at the present rotations (13.14) and kinetic energy [J], shape (n_robots,) each."""
         work, actuation = self.memory[0]
         both = np.zeros((2, len(self.q), 1, N_LANES))
         for group in range(len(self.q)):
             actuation.delta_psi_start[:] = actuation.delta_psi_end[:] = self.rotations[group]
             rods = self.coefficients.rods(group)
-            energies(rods, work, actuation, self.q[group], v[group], both[0, group], both[1, group])
+            energies(rods, work, actuation, self.q[group], self.v[group], both[0, group], both[1, group])
         return self.read(both[0])[:, 0], self.read(both[1])[:, 0]
+
+    def energy_in_water(self) -> Floats:
+        """Kinetic energy with the velocity of every node less that of the water there [J], shape (n_robots,)."""
+        q, v = self.q, self.v
+        relative, found = aligned_rows(*v.shape[1:]), np.zeros((len(q), 1, N_LANES))
+        bounds = [0, len(q)] if self.coefficients.are_shared else range(len(q) + 1)
+        for part in map(slice, bounds[:-1], bounds[1:]):
+            energies_in_water(self.coefficients.rods(part.start), q[part], v[part], relative, found[part])
+        return self.read(found)[:, 0]
 
     def begin(self, times: Floats, peaks: Floats, shape: Floats) -> None:
         """Begin an interval in which limbs turn by `peaks`, shape (n_robots, n_limbs), times `shape`.

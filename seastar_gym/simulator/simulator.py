@@ -28,7 +28,6 @@ from seastar_gym.simulator.lock import BROKEN_OFF, StrokeLock
 from seastar_gym.simulator.report import StrokeReport, make_report
 from seastar_gym.simulator.schedule import ends_at, ends_of_parts, require_duration
 from seastar_gym.simulator.state import State, checked_state
-from seastar_gym.simulator.water import relative_velocities
 from seastar_gym.simulator.workers import processors
 
 Floats = NDArray[np.float64]
@@ -353,7 +352,7 @@ class Simulator:
 
         relative_to_water: With the velocity of every node less that of the water there.
         """
-        return self._batch.energies(relative_velocities(self._batch) if relative_to_water else None)[1]
+        return self._batch.energy_in_water() if relative_to_water else self._batch.energies()[1]
 
     def stroke(self, commands: ArrayLike) -> StrokeReport:
         """Advance all robots by one actuation period.

@@ -8,7 +8,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaWires, UniformCurrent, Water
+from currents import CURRENTS, velocity
+from seastar_gym import Body, Numerics, Scene, Seastar, Simulator, SmaWires, UniformCurrent, Water
 from seastar_gym.accuracy.endurance import long_swims
 from seastar_gym.simulator.growth import ENOUGH, EVERY, WINDOW, EnergyGrowth, is_watched
 
@@ -78,6 +79,24 @@ def test_currents_of_each_robot_are_taken_off_its_own_energy():
     np.testing.assert_allclose(np.delete(found, 6), 0.0, atol=1e-20)
     np.testing.assert_allclose(found[6], over_ground[2], rtol=1e-12)  # whose water has the same speed
     np.testing.assert_array_equal(simulator.velocities, velocities)
+
+
+@pytest.mark.parametrize("body", [None, Body(radius=0.02, mass=0.02)], ids=["hub", "disc"])
+@pytest.mark.parametrize("name", CURRENTS)
+def test_the_energy_in_a_current_is_that_of_the_same_motion_in_still_water(name, body):
+    scene = Scene(Seastar(nodes_per_limb=5, body=body), Water(current=CURRENTS[name]), numerics=CALM)
+    simulator, still = Simulator(scene, 9), Simulator(replace(scene, fluid=Water()), 9)
+    state, rng = simulator.get_state(), np.random.default_rng(2)
+    positions, velocities = (each + rng.normal(0.0, 0.05, each.shape) for each in (state.positions, state.velocities))
+    state = state._replace(positions=positions, velocities=velocities)
+    if body is not None:
+        state = state._replace(orientation=rng.normal(size=9), spin=rng.normal(size=9))
+    simulator.set_state(state)
+    water = velocity(name, state.positions.reshape(-1, 2)).reshape(state.positions.shape)
+    still.set_state(state._replace(velocities=state.velocities - water))
+    found = simulator.kinetic_energy(relative_to_water=True)
+    np.testing.assert_allclose(found, still.kinetic_energy(), rtol=1e-9)
+    assert (np.abs(found - simulator.kinetic_energy()) > 1e-3 * found).all()
 
 
 @pytest.mark.filterwarnings("error")
