@@ -1,6 +1,7 @@
 """Pictures and costs of scenes that differ from the default; writes `gallery.json`.
 
-A picture shows the robot at rest (grey), at the end of heating (blue) and its hub's path. The cost is the processor
+A picture shows the robot at rest (grey), at the end of heating (blue) and its hub's path, and below the robot the cross
+sections at root and tip of limbs that are no plain discs. The cost is the processor
 time of a stroke of random commands relative to that of the default scene. Scenes take turns, stroke by stroke, so that
 other work of the machine affects all of them alike, and the median over strokes counts.
 """
@@ -14,12 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene import Contact, Numerics, Scene, Seastar
+from seastar_gym.scene import Contact, Numerics, Scene, Seastar, Strip, Tube
 from seastar_gym.scene.actuators.limited import Limited
 from seastar_gym.scene.actuators.measured import MeasuredCurve
 from seastar_gym.scene.actuators.pulse import SmaPulse
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.limb import Limb
+from seastar_gym.scene.section import AnySection, Disc, Section
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study
 from studies.style import INK, subplots
@@ -30,6 +32,9 @@ NUMERICS, NODES = Numerics.preset("balanced"), 10
 ROBOTS, ROUNDS, STROKES = 64, 9, 5
 """Robots and rounds of the measured cost, and strokes in a picture."""
 REST, HEATED, PATH = "#c8c8c8", "#2b6cb0", "#c53030"
+SECTION, LARGER, SECTIONS = "#4a5568", 4.0, -84.0
+TURN, CORNERS = np.linspace(0.0, 2.0 * np.pi, 60), np.array([[-1.0, 1.0, 1.0, -1.0], [-1.0, -1.0, 1.0, 1.0]])
+"""Colour of cross sections, how much larger than the robot they are drawn, and how high [mm]; outlines."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +63,9 @@ def exhibits() -> list[Exhibit]:
     def five(**pieces: object) -> Scene:
         scene = Scene(numerics=NUMERICS, **pieces)  # type: ignore[arg-type]
         return replace(scene, robot=replace(scene.robot, nodes_per_limb=NODES))
+
+    def of_section(section: Strip | Tube) -> Scene:
+        return five(robot=Seastar(limbs=(Limb(section=section),) * 5))
 
     return [
         Exhibit("default", "Scene()", five(), straight),
@@ -88,6 +96,12 @@ def exhibits() -> list[Exhibit]:
         ),
         Exhibit("tapered limbs", "Seastar(limbs=(Limb(radius=(2e-3, 1e-3)),) * 5)",
                 five(robot=Seastar(limbs=tapered)), straight),
+        Exhibit("strips", "Seastar(limbs=(Limb(section=Strip(width=3e-3, height=8e-3)),) * 5)",
+                of_section(Strip(width=3e-3, height=8e-3)), straight),
+        Exhibit("tubes", "Seastar(limbs=(Limb(section=Tube(outer=3e-3, inner=2e-3)),) * 5)",
+                of_section(Tube(outer=3e-3, inner=2e-3)), straight),
+        Exhibit("a profile", "Seastar(limbs=(Limb(section=Strip(width=(4e-3, 2e-3), height=(4e-3, 12e-3))),) * 5)",
+                of_section(Strip(width=(4e-3, 2e-3), height=(4e-3, 12e-3))), straight),
         Exhibit("curved limbs", "Seastar(limbs=(Limb(natural_curvature=10.0),) * 5)",
                 five(robot=Seastar(limbs=curved)), straight),
         Exhibit("uneven limbs", "Seastar(limbs=(Limb(0.0, 0.12), Limb(1.0, 0.08), ..)), actuator=SmaPulse(0.4)",
@@ -124,6 +138,22 @@ def outline(centre: Floats, radius: Floats) -> Floats:
     return np.concatenate([centre + radius[:, None] * normal, (centre - radius[:, None] * normal)[::-1]])
 
 
+def draw_sections(axes: Any, section: AnySection) -> None:
+    """Draw a strip or tube at the limb's root and, if it differs there, at its tip; the plane is horizontal."""
+    ends = {name: [1e3 * LARGER * np.atleast_1d(number)[k] for number in vars(section).values()]
+            for name, k in (("root", 0), ("tip", -1))}  # fmt: skip
+    if isinstance(section, Disc | Section):
+        return
+    same = ends["root"] == ends["tip"]
+    for x, (name, (first, second)) in zip((76.0, 110.0), list(ends.items())[: 1 if same else 2], strict=False):
+        if isinstance(section, Strip):
+            axes.fill(x + 0.5 * first * CORNERS[0], SECTIONS + 0.5 * second * CORNERS[1], color=SECTION, linewidth=0.0)
+        else:
+            for radius, colour in ((first, SECTION), (second, "white")):
+                axes.fill(x + radius * np.cos(TURN), SECTIONS + radius * np.sin(TURN), color=colour, linewidth=0.0)
+        axes.text(x, -122.0, f"{LARGER:.0f} : 1" if same else name, color=INK, fontsize=8, ha="center")
+
+
 def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
     """Draw the robot at rest and at the end of the first heating, and its hub's path over some strokes."""
     simulator, robot = Simulator(exhibit.scene, threads=1), exhibit.scene.robot
@@ -141,6 +171,7 @@ def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
             reach = [cut.reach for cut in shape.cuts(robot.density, share)]
             axes.fill(*1e3 * outline(np.concatenate([nodes[:1], limb]), np.array(reach)).T, color=colour, linewidth=0.5)
     axes.plot(*1e3 * np.array(hub).T, color=PATH, linewidth=1.2)
+    draw_sections(axes, robot.limb_shapes()[0].section)
     axes.plot([-120.0, -70.0], [-116.0, -116.0], color=INK, linewidth=1.5)
     axes.text(-95.0, -112.0, "50 mm", color=INK, fontsize=8, ha="center")
     axes.set_aspect("equal")
