@@ -76,7 +76,8 @@ def _unknown(scene: Scene, commands: Floats, name: str) -> Unknown:
             f"by has {shown(name)}, which is no number of this scene, such as fluid.drag_coefficient, and none of "
             f"{', '.join(('commands', *OF_START))}."
         )
-    step = step_of(float(value))
+    value = float(value)  # type: ignore[arg-type]
+    step = step_of(value)
     try:
         beside = tuple(with_numbers(scene, {name: value + step * place}) for place in CENTRAL.places)
     except ValueError as refused:
