@@ -29,9 +29,6 @@ ROBOTS = {
     "fastest in its lengths": "fastest in limb lengths per stroke",
     "fastest at the chapter's length and angle": "fastest of the chapter's length and angle",
     "fastest of them without taper": "fastest of these without taper",
-    "fastest at the chapter's work": "fastest at the chapter's work per stroke",
-    "fastest at ten times that work": "fastest at ten times that work",
-    "least work per metre, not slower": "least work per metre, not slower than the chapter's",
 }
 """Robots of the table, by their names in designs.json."""
 CHAPTER = {
@@ -59,14 +56,6 @@ def robots(found: dict[str, Any]) -> str:
             f"| {row['J_per_metre']:.3g} J |"
         )
     return "\n".join(lines)
-
-
-def by_work(found: dict[str, Any]) -> str:
-    """Table in Markdown of the fastest robots that do with some times the work of the chapter's."""
-    head = " | ".join(f"{factor:g}" for factor, _ in found["fastest_by_work"])
-    speeds = " | ".join(f"{speed:.2f}" for _, speed in found["fastest_by_work"])
-    columns = "---:|" * len(found["fastest_by_work"])
-    return f"| work per stroke at most, of the chapter's | {head} |\n|---|{columns}\n| fastest [mm/s] | {speeds} |"
 
 
 def summary(table: Any) -> dict[str, Any]:

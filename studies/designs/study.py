@@ -1,9 +1,9 @@
 """Simulates 102,480 robots, swims the fastest again at finer settings, and writes designs.json and designs.png.
 
 Limb length, radius, stiffness, taper, number of limbs and peak angle vary; all swim {2+, n-}, eight strokes from rest,
-of which the last five count, at `fast`. They are ranked by speed, by speed at the work per stroke of the chapter's
-robot, and by work per metre. The scene of the fastest is written to fastest.json, for `certify`. Results are
-kept in folders of OUT, so that the command goes on after an interrupt.
+of which the last five count, at `fast`, and are ranked by speed; front.py ranks by work. The scene of the fastest is
+written to fastest.json, for `certify`. Results are kept in folders of OUT, so that the command goes on after an
+interrupt.
 """
 
 import json
@@ -21,7 +21,8 @@ from seastar_gym.sweep.axes import Choices
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.parts import Parts, read_parts
 from seastar_gym.sweep.run import Tally, run
-from studies.designs.pictures import by_work, draw, robots, summary
+from studies.designs.pictures import draw, robots, summary
+from studies.designs.search import counting
 from studies.designs.space import (
     BODIES,
     MEASURED,
@@ -36,15 +37,11 @@ from studies.designs.space import (
 from studies.frame import Results, Study
 
 Table = dict[str, Any]
-CLEARANCE = 0.1
-"""Smallest opening angle at the hub of robots that count [rad]: the limbs of others cross, or nearly do."""
 CHECKS = ("fast", "balanced", "reference")
 """Fidelities at which the winners swim."""
 MM = 1e3
 MEASURES = {"mm_per_s": ("speed", MM), "mJ_per_stroke": ("work", 1e3 / MEASURED), "peak_mN_m": ("peak_moment", 1e3)}
 """What is told of a robot: a column of results, and its factor."""
-LIMITS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
-"""Limits of the work per stroke, over that of the chapter's robot."""
 
 
 def results(sweep: Sweep, folder: Path, executor: Executor) -> Any:
@@ -118,30 +115,20 @@ def study(folder: Path, executor: Executor) -> tuple[Table, Any]:
     """Run the study; returns its results as plain data, and the table of all designs."""
     designs = results(all_designs(), folder / "designs", executor)
     sound = designs[designs.status == 0]
-    table = sound[sound.smallest_opening_angle > CLEARANCE]
+    table = counting(sound)
     same = results(at_the_chapters(), folder / "chapter", executor)
-    same = same[(same.status == 0) & (same.smallest_opening_angle > CLEARANCE)]
+    same = counting(same)
     mass = results(masses(), folder / "masses", executor)
     checks = folder / "checks"
-    relative, work = table.speed / table["robot.limb_length"], 1e3 / MEASURED * table.work
-    chapter = at_all_fidelities(Scene.preset("fast"), checks)
-    speed, limit = chapter["mm_per_s"]["fast"] / MM, chapter["mJ_per_stroke"]["fast"]
+    relative = table.speed / table["robot.limb_length"]
     uniform = same[same.taper == 1.0]
     return {
         "designs": len(designs), "failed": len(designs) - len(sound), "count": len(table),
-        "the chapter's": chapter,
+        "the chapter's": at_all_fidelities(Scene.preset("fast"), checks),
         "fastest": winner(table.loc[table.speed.idxmax()], checks),
         "fastest in its lengths": winner(table.loc[relative.idxmax()], checks),
         "fastest at the chapter's length and angle": winner(same.loc[same.speed.idxmax()], checks),
         "fastest of them without taper": winner(uniform.loc[uniform.speed.idxmax()], checks),
-        "fastest at the chapter's work": winner(table.loc[table.speed[work <= limit].idxmax()], checks),
-        "fastest at ten times that work": winner(table.loc[table.speed[work <= 10.0 * limit].idxmax()], checks),
-        "least work per metre, not slower": winner(
-            table.loc[(table.work / table.speed)[table.speed >= speed].idxmin()], checks
-        ),
-        "fastest_by_work": [
-            [factor, round(MM * float(table.speed[work <= factor * limit].max()), 3)] for factor in LIMITS
-        ],
         "speeds_mm_per_s": {name: quantiles(table, name) for name in ("n_limbs", "radius", "taper")},
         "masses": masses_by_taper(mass),
     }, table  # fmt: skip
@@ -184,6 +171,6 @@ STUDY = Study(
     Options,
     "designs.json",
     pictures={"designs.png": draw},
-    tables={"designs robots": robots, "designs by_work": by_work},
+    tables={"designs robots": robots},
     packages=("pandas", "pyarrow"),
 )

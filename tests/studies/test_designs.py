@@ -64,7 +64,7 @@ def test_the_page_tells_what_was_measured():
     for name in ("the chapter's", "fastest", "fastest at the chapter's length and angle"):
         for speed in found[name]["mm_per_s"].values():
             assert f"{speed:.2f}" in page
-    chapter, fastest, cheap = (found[name] for name in ("the chapter's", "fastest", "fastest at the chapter's work"))
+    chapter, fastest = found["the chapter's"], found["fastest"]
 
     def times(robot, measure):
         return robot[measure]["reference"] / chapter[measure]["reference"]
@@ -72,9 +72,6 @@ def test_the_page_tells_what_was_measured():
     assert f"{times(fastest, 'mJ_per_stroke'):.0f} times the work per stroke" in page
     assert f"{times(fastest, 'peak_mN_m'):.0f} times the peak moment" in page
     assert f"{fastest['J_per_metre'] / chapter['J_per_metre']:.0f} times the work per metre" in page
-    assert cheap["mJ_per_stroke"]["fast"] <= chapter["mJ_per_stroke"]["fast"]
-    assert f"the fastest swims {times(cheap, 'mm_per_s'):.1f} times as fast" in page
-    assert f"peak moment is {times(cheap, 'peak_mN_m'):.2f} times" in page
     gain = found["fastest"]["mm_per_s"]["reference"] / found["the chapter's"]["mm_per_s"]["reference"]
     assert math.isclose(gain, 5.4, abs_tol=0.06)
 
