@@ -74,8 +74,8 @@ def evaluate(
     episode = {"seed": seed, "reset_options": reset_options, "max_strokes": max_strokes}
     swims, playbacks = list[Swim](), list[Playback]()
     for name, policy in agents.items():
-        video = _without_film(videos.get(name), (filmed or {}).get(name))
-        swum, playback = _swim_once(name, policy, environment, episode, video, report is not None)
+        film_file = _without_film(videos.get(name), (filmed or {}).get(name))
+        swum, playback = _swim_once(name, policy, environment, episode, film_file, report is not None)
         swims.append(swum)
         playbacks += [] if playback is None else [playback]
     say(as_text(swims))
