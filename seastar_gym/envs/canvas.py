@@ -129,11 +129,11 @@ class Canvas:
 @functools.lru_cache(256)
 def _disc(colour: Colour, radius: int) -> pygame.Surface:
     """Disc of a radius [pixels of the larger picture], to be put down many times; what is around it is not painted."""
-    pygame, around = import_pygame(), (0, 0, 0) if any(colour) else (1, 1, 1)
-    disc = pygame.Surface((2 * radius + 1, 2 * radius + 1), depth=32)
+    library, around = import_pygame(), (0, 0, 0) if any(colour) else (1, 1, 1)
+    disc: pygame.Surface = library.Surface((2 * radius + 1, 2 * radius + 1), depth=32)
     disc.fill(around)
-    disc.set_colorkey(around, pygame.RLEACCEL)
-    pygame.draw.circle(disc, colour, (radius, radius), radius)
+    disc.set_colorkey(around, library.RLEACCEL)
+    library.draw.circle(disc, colour, (radius, radius), radius)
     return disc
 
 
