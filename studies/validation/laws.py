@@ -86,7 +86,7 @@ def table(results: dict[str, Any]) -> str:
 def tried(results: dict[str, Any]) -> str:
     """Models with what the full one lacks, and swimmers whose limbs follow their curves, in Markdown."""
     told_all = next(law for law in results["laws"] if law["told_all"])
-    p, q, more, most = *told_all["powers"], *told_all["standard_errors"]
+    (p, q), (more, most) = told_all["powers"], told_all["standard_errors"]
     lines = ["| model | error of 33 speeds | with other fours: median (5 to 95 %) | within 90 % | speeds go with |",
              "|---|---:|---:|---:|---|",
              f"| measured | | | | f^({p:.2f} ± {more:.2f}) dk^({q:.2f} ± {most:.2f}) |"]  # fmt: skip
