@@ -5,7 +5,7 @@ tried, so that none is picked. Mean thrust of about f dk^2 against drag of about
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,14 @@ Floats = NDArray[np.float64]
 
 POWERS_OF_FREQUENCY, POWERS_OF_CHANGE = (0.0, 0.5, 1.0), (0.0, 0.5, 1.0, 2.0)
 PER_CENT = 100.0
+ADDED = {
+    "as above": "the model",
+    "strips": "strips instead of discs",
+    "pairs in turn": "rear pair half a period after the front one",
+    "measured curves": "measured curves instead of their fits",
+    "all three": "all three",
+}
+"""Models that the page shows beside swimmers whose limbs follow, and their names there."""
 
 
 def law_error(shape: Floats, measured: Floats, chosen: list[int]) -> float:
@@ -27,17 +35,32 @@ def law_error(shape: Floats, measured: Floats, chosen: list[int]) -> float:
     return float(np.abs(a * shape[others] / measured[others] - 1.0).mean())
 
 
+def logarithms(conditions: list[Condition], curve: Callable[[Condition], tuple[Floats, Floats]]) -> Floats:
+    """1, log f and log dk of every condition, shape (n_conditions, 3). curve: Gives times and curvatures."""
+    f = np.array([condition.frequency for condition in conditions])
+    dk = np.array([np.ptp(curve(condition)[1]) for condition in conditions])
+    return np.stack([np.ones_like(f), np.log(f), np.log(dk)], axis=1)
+
+
+def powers(
+    conditions: list[Condition], v: Floats, curve: Callable[[Condition], tuple[Floats, Floats]] = measured_curve
+) -> tuple[list[float], list[float]]:
+    """Powers of f and dk to which speeds go, and their standard errors: the least squares of all logarithms."""
+    terms = logarithms(conditions, curve)
+    found, squares, _, _ = np.linalg.lstsq(terms, np.log(v), rcond=None)
+    variance = np.linalg.inv(terms.T @ terms) * squares / (len(v) - terms.shape[1])
+    return found[1:].tolist(), np.sqrt(np.diag(variance)[1:]).tolist()
+
+
 def law_scores(conditions: list[Condition], chosen: list[int], fours: list[list[int]]) -> list[dict[str, Any]]:
     """Errors of every law: with the chosen four, and quantiles 5, 50 and 95 % over other fours.
 
     The last one is told all speeds: its exponents are those of the least squares of all logarithms.
     """
-    f = np.array([condition.frequency for condition in conditions])
-    dk = np.array([np.ptp(measured_curve(c.liquid_metal, c.frequency)[1]) for c in conditions])
+    f, dk = np.exp(logarithms(conditions, measured_curve)[:, 1:].T)
     v = np.array([condition.speed for condition in conditions])
-    terms = np.stack([np.ones_like(f), np.log(f), np.log(dk)], axis=1)
-    told_all = tuple(np.linalg.lstsq(terms, np.log(v), rcond=None)[0][1:].tolist())
-    powers = [*itertools.product(POWERS_OF_FREQUENCY, POWERS_OF_CHANGE), told_all]
+    fitted, errors = powers(conditions, v)
+    told_all = tuple(fitted)
     return [
         {
             "powers": [p, q],
@@ -45,7 +68,8 @@ def law_scores(conditions: list[Condition], chosen: list[int], fours: list[list[
             "fours": np.percentile([law_error(f**p * dk**q, v, four) for four in fours], [5.0, 50.0, 95.0]).tolist(),
             "told_all": (p, q) == told_all,
         }
-        for p, q in powers
+        | ({"standard_errors": errors} if (p, q) == told_all else {})
+        for p, q in [*itertools.product(POWERS_OF_FREQUENCY, POWERS_OF_CHANGE), told_all]
     ]
 
 
@@ -57,6 +81,27 @@ def table(results: dict[str, Any]) -> str:
     rows.sort(key=lambda row: row[2][1])
     lines = ["| prediction | error of 33 speeds | with other fours: median (5 to 95 %) |", "|---|---:|---:|"]
     return "\n".join([*lines, *(_row(*row) for row in rows)])
+
+
+def tried(results: dict[str, Any]) -> str:
+    """Models with what the full one lacks, and swimmers whose limbs follow their curves, in Markdown."""
+    told_all = next(law for law in results["laws"] if law["told_all"])
+    (p, q), (more, most) = told_all["powers"], told_all["standard_errors"]
+    lines = ["| model | error of 33 speeds | with other fours: median (5 to 95 %) | within 90 % | speeds go with |",
+             "|---|---:|---:|---:|---|",
+             f"| measured | | | | f^({p:.2f} ± {more:.2f}) dk^({q:.2f} ± {most:.2f}) |"]  # fmt: skip
+    shown = [(shown_as, results["models"][name]) for name, shown_as in ADDED.items() if name in results["models"]]
+    for name, one in (*shown, *results["followers"].items()):
+        p, q = one["powers"]
+        row = _row(name, one["score"]["error"], one["fours"]["error"])
+        lines.append(f"{row} {PER_CENT * one['score']['covered']:.0f} % | f^{p:.2f} dk^{q:.2f} |")
+    return "\n".join(lines)
+
+
+def tell(one: dict[str, Any]) -> str:
+    """Errors of a model in a line."""
+    error, middle = PER_CENT * one["score"]["error"], PER_CENT * one["fours"]["error"][1]
+    return f"{error:.1f} %, {middle:.1f} % with other fours, powers {one['powers']}"
 
 
 def _name(law: dict[str, Any]) -> str:

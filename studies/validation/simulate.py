@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.simulator import Simulator
+from studies.validation.in_turn import LATE
 from studies.validation.priors import SWEEPS, of_sweep
 from studies.validation.speeds import Condition
-from studies.validation.swimmer import SIDES, Variant, scene
+from studies.validation.swimmer import FRONT, SIDES, Variant, scene
 
 Floats = NDArray[np.float64]
 
@@ -30,7 +31,8 @@ def swum(condition: Condition, values: dict[str, Floats], sweep: float, variant:
     """Speeds of samples with one sweep [m/s]."""
     n = len(values["limb length"])
     simulator = Simulator(scene(condition, values, sweep, variant, finer), n)
-    command, start = np.tile(SIDES, (n, 1)), np.zeros(n)
+    late = np.where(FRONT, 1.0, LATE) if variant.lag else 1.0
+    command, start = np.tile(late * np.array(SIDES), (n, 1)), np.zeros(n)
     for stroke in range(STROKES):
         if stroke == FIRST:
             start = simulator.hub_position()[:, 0]
@@ -40,11 +42,9 @@ def swum(condition: Condition, values: dict[str, Floats], sweep: float, variant:
 
 
 def all_speeds(
-    conditions: list[Condition], values: dict[str, Floats], variant: Variant, folder: Path
+    conditions: list[Condition], values: dict[str, Floats], variant: Variant, place: Path
 ) -> Iterator[tuple[Condition, Floats]]:
-    """Speeds of every condition in turn, from its file where there is one of as many samples."""
-    n = len(values["limb length"])
-    place = folder / f"{variant.replace(' ', '-')}-{n}"
+    """Speeds of every condition in turn, from its file in a folder where there is one."""
     place.mkdir(parents=True, exist_ok=True)
     for condition in conditions:
         file = place / f"{condition.name}.npy"

@@ -6,19 +6,38 @@ most samples would swim backwards.
 """
 
 from collections.abc import Mapping
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene import AlongLimb, Limb, MeasuredCurve, Numerics, Scene, Seastar, Stiffening, Water
+from seastar_gym.scene import AlongLimb, Limb, MeasuredCurve, Numerics, Scene, Seastar, Stiffening, Strip, Water
 from seastar_gym.scene.actuators.sma_limb import MEASURED
 from seastar_gym.scene.body import Attachment, Body
+from studies.measurements.curves import read_curves
 from studies.measurements.model import curvature
+from studies.validation.in_turn import InTurn
 from studies.validation.speeds import Condition
 
 Floats = NDArray[np.float64]
-Variant = Literal["full", "no added mass", "no stiffening", "ramp", "no drag along limbs"]
+How = Literal["measured", "fitted", "80 ms", "ramp"]
+
+
+class Variant(NamedTuple):
+    """What a model has of the swimmer.
+
+    bending: Curve of the limbs' curvature, see `bending`. lag: Of the rear pair [periods].
+    strips: Limbs are strips, not discs of the same area, bending stiffness, drag and added mass.
+    stiffening: Limbs stiffen with heat. added, along: Factors of added mass and of drag along limbs.
+    """
+
+    bending: How = "fitted"
+    lag: float = 0.0
+    strips: bool = False
+    stiffening: bool = True
+    added: float = 1.0
+    along: float = 1.0
+
 
 FRAME = (0.08, 0.04, 0.015)
 """Length, width and height of the frame [m]. Its drag and mass are unknown, so its size only places the limbs."""
@@ -32,75 +51,93 @@ RELAXATION = 2e-3
 """Relaxation time of the limbs' damping [s]."""
 RAMP = 0.1
 """Time in which the chapter's ramp rises [s]."""
+PULSE = 0.08
+"""Time for which programs of the swimmer heat a limb [s]."""
 NONE_OF_IT = 1e-6
 """Factor of a coefficient that is left out, so that the same code runs."""
+TYPICAL = 80.0
+"""Change of curvature [1/m] at which drag coefficients are those of the samples."""
 INSTANTS = 2001
 """Instants of a period at which its curve is taken."""
 LOOSE = 1.0
 """Largest distance of the samples' polygon from the curve [1/m]."""
 SIDES = (1.0, 1.0, -1.0, -1.0)
 """Sign of the curvature of every limb at rest, and its command: limbs on the left curl anti-clockwise, backwards."""
+FRONT = (True, False, False, True)
+"""Limbs of the front pair."""
+FULL = Variant()
+LEFT_OUT = {
+    "no added mass": Variant(added=NONE_OF_IT),
+    "no stiffening": Variant(stiffening=False),
+    "ramp": Variant("ramp"),
+    "no drag along limbs": Variant(along=NONE_OF_IT),
+}
+"""Models with a part left out."""
+ADDED = {
+    "as above": FULL,
+    "strips": Variant(strips=True),
+    "pairs in turn": Variant(lag=0.5),
+    "measured curves": Variant("measured"),
+    "all three": Variant("measured", lag=0.5, strips=True),
+}
+"""The full model beside models with what it lacks."""
+VARIANTS = {"full": FULL, **LEFT_OUT, **ADDED}
 
 
 def scene(
-    condition: Condition, values: Mapping[str, Floats], sweep: float, variant: Variant = "full", finer: int = 1
+    condition: Condition, values: Mapping[str, Floats], sweep: float, variant: Variant = FULL, finer: int = 1
 ) -> Scene:
     """Swimmers with values of their unknowns.
 
     sweep: Angle by which limbs are swept backwards where they leave the frame [rad].
     finer: Factor of the number of edges and steps.
     """
-    times, curvatures = bending(condition.liquid_metal, condition.frequency, ramp=variant == "ramp")
-    rest, length = float(curvatures[0]), values["limb length"]
+    times, curvatures = bending(condition, variant.bending)
+    rest, length, limb = float(curvatures[0]), values["limb length"], cross_section(values, variant.strips)
     change = (*(curvatures[:-1] - rest).tolist(), 0.0)
-    strip = round_limb(values)
-    along = values["limb drag along"] * (NONE_OF_IT if variant == "no drag along limbs" else 1.0)
-    added = strip.added_mass * (NONE_OF_IT if variant == "no added mass" else 1.0)
-    ratio = np.ones_like(length) if variant == "no stiffening" else values["hot over cold EI"]
+    ratio = values["hot over cold EI"] if variant.stiffening else np.ones_like(length)
     robot = Seastar(
         4,
         finer * (NODES - 1) + 1,
         limb_length=length,
-        rod_radius=strip.radius,
-        youngs_modulus=strip.youngs_modulus,
         density=ELASTOMER + (LIQUID_METAL - ELASTOMER) * 0.01 * condition.liquid_metal,
-        limbs=tuple(Limb(natural_curvature=side * rest) for side in SIDES),
+        limbs=tuple(Limb(natural_curvature=side * rest, section=limb.strip) for side in SIDES),
         relaxation_time=RELAXATION,
         along=AlongLimb(),
         stiffening=Stiffening(ratio),
         body=frame(values["body mass"], values["body drag"], sweep),
+        **limb.robot,
     )
-    water = Water(WATER, strip.drag, along * strip.drag, added_mass_coefficient=added)
-    actuator = MeasuredCurve(times, change, scale=length)
+    along = values["limb drag along"] * variant.along * limb.drag
+    water = Water(WATER, limb.drag, along, added_mass_coefficient=limb.added * variant.added)
+    curve = MeasuredCurve(times, change, scale=length)
+    actuator = InTurn(curve, variant.lag) if variant.lag else curve
     return Scene(robot, water, actuator, Numerics("implicit-midpoint", STEP / finer))
 
 
-class RoundLimb(NamedTuple):
-    """Round limb with the section, bending stiffness, drag and added mass of a strip.
+class CrossSection(NamedTuple):
+    """Limbs of a strip, which stands across the plane and bends about its thickness, or of discs in its place.
 
-    radius: [m]. youngs_modulus: [Pa]. drag, added_mass: Coefficients [1] of flow across, over those of a round limb.
+    drag, added: Coefficients of flow across and of added mass [1]. strip: None for discs.
+    robot: Young's modulus [Pa], and the radius of discs [m].
     """
 
-    radius: Floats
-    youngs_modulus: Floats
     drag: Floats
-    added_mass: Floats
+    added: Floats
+    robot: dict[str, Any]
+    strip: Strip | None = None
 
 
-def round_limb(values: Mapping[str, Floats]) -> RoundLimb:
-    """A strip's width is out of the plane, so flow across meets it; it bends about its thickness.
-
-    A plate of width w carries along the fluid of a cylinder of that diameter.
-    """
+def cross_section(values: Mapping[str, Floats], strips: bool) -> CrossSection:
+    """Strips, or discs of their area, bending stiffness and drag; a thin plate carries along a circle of its width."""
     width, thickness = values["limb width"], values["limb thickness"]
+    E, drag, added = values["Young's modulus"], values["limb drag across"], values["added mass"]
+    if strips:
+        return CrossSection(drag, added, {"youngs_modulus": E}, Strip(width=thickness, height=width))
     radius = np.sqrt(width * thickness / np.pi)
-    EI = values["Young's modulus"] * width * thickness**3 / 12.0
-    return RoundLimb(
-        radius=radius,
-        youngs_modulus=4.0 * EI / (np.pi * radius**4),
-        drag=values["limb drag across"] * 0.5 * width / radius,
-        added_mass=values["added mass"] * (0.5 * width / radius) ** 2,
-    )
+    EI, wider = E * width * thickness**3 / 12.0, 0.5 * width / radius
+    disc = {"rod_radius": radius, "youngs_modulus": 4.0 * EI / (np.pi * radius**4)}
+    return CrossSection(drag * wider, added * wider**2, disc)
 
 
 def frame(mass: Floats, drag: Floats, sweep: float) -> Body:
@@ -114,24 +151,37 @@ def frame(mass: Floats, drag: Floats, sweep: float) -> Body:
     )  # fmt: skip
 
 
-def bending(liquid_metal: int, frequency: float, ramp: bool = False) -> tuple[tuple[float, ...], Floats]:
+def bending(condition: Condition, how: How) -> tuple[tuple[float, ...], Floats]:
     """Times [s] and curvatures [1/m] of a limb over one period, as few as describe the curve.
 
-    ramp: The chapter's ramp between the same curvatures, instead of the fit of the measured curve.
+    how: The samples that were measured; the fit of the curves of its material; the samples, but straightened in PULSE;
+        or the chapter's ramp to the smallest sample and back.
     """
-    t, k = measured_curve(liquid_metal, frequency)
-    if ramp:
-        t, k = np.array([0.0, RAMP, t[-1]]), np.array([k[0], k.min(), k[0]])
+    t, k = fitted_curve(condition) if how == "fitted" else measured_curve(condition)
+    straight = int(k.argmin())
+    if how == "ramp":
+        t, k = np.array([0.0, RAMP, t[-1]]), k[[0, straight, 0]]
+    elif how == "80 ms":
+        share, later = np.linspace(0.0, 1.0, 20), (t > PULSE) & (np.arange(len(t)) > straight)
+        fall = k[0] - (k[0] - k[straight]) * np.sin(0.5 * np.pi * share) ** 2
+        t, k = np.append(PULSE * share, t[later]), np.append(fall, k[later])
     kept = polygon(t, k)
     return tuple(t[kept].tolist()), k[kept]
 
 
-def measured_curve(liquid_metal: int, frequency: float) -> tuple[Floats, Floats]:
-    """Times [s] and curvatures [1/m] of a limb over one period: the fit of what was measured of this material."""
-    numbers = MEASURED[liquid_metal]._asdict()
+def measured_curve(condition: Condition) -> tuple[Floats, Floats]:
+    """Times [s] and curvatures [1/m] of a limb over one period, as measured; the last is the first."""
+    curves = {curve.frequency: curve for curve in read_curves()[condition.liquid_metal]}
+    curve = curves[condition.frequency]
+    return np.append(curve.times, 1.0 / condition.frequency), np.append(curve.curvature, curve.curvature[0])
+
+
+def fitted_curve(condition: Condition) -> tuple[Floats, Floats]:
+    """Times [s] and curvatures [1/m] of a limb over one period: the fit of all curves of this material."""
+    numbers = MEASURED[condition.liquid_metal]._asdict()
     numbers["width"] = numbers.pop("heating_time")
-    t = np.linspace(0.0, 1.0 / frequency, INSTANTS)
-    k = curvature(numbers, frequency, t)
+    t = np.linspace(0.0, 1.0 / condition.frequency, INSTANTS)
+    k = curvature(numbers, condition.frequency, t)
     k[-1] = k[0]
     return t, k
 
