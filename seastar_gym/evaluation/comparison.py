@@ -15,7 +15,7 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.films import film
 from seastar_gym.evaluation.pictures import FPS, FRAMES_PER_STROKE, draw_traces
 from seastar_gym.evaluation.playback import Playback, RecordingEnv
-from seastar_gym.evaluation.results import as_text, results, write_csv
+from seastar_gym.evaluation.results import as_text, results, time_series, write_csv
 from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, decisions_in, swim
 from seastar_gym.extras import require_extra
 from seastar_gym.files import write_atomically
@@ -39,6 +39,7 @@ def evaluate(
     out: Path | str | None = None,
     video: bool = True,
     report: Remarks | None = None,
+    trajectory: bool = False,
     say: Callable[[str], None] = print,
     filmed: Mapping[str, Callable[[], Path | None]] | None = None,
     **environment: Any,
@@ -53,6 +54,7 @@ def evaluate(
     decision_period: Time between decisions [s]. None means a stroke.
     out: Folder for evaluation.csv, traces.png and, with `video`, an MP4 of every agent; nothing is written if None.
     report: Remarks for report.html, a page with the results and playbacks of the swims; it is not written if None.
+    trajectory: Whether trajectories.csv is written, with a row for every stroke of every swim.
     say: Function that prints a text.
     filmed: Functions by agent that return the file of a film of its swim, made meanwhile by somebody else. None from
         one of them means that there is none.
@@ -86,12 +88,20 @@ def evaluate(
             say(f"{done.agent}: {remark}")
     if folder is not None:
         write_csv(results(swims), folder / "evaluation.csv")
-        draw_traces(swims, waypoint_radius, folder / "traces.png")
+        fluid = swum_in.of_robot(0).fluid
+        current = None if fluid is None else fluid.current
+        draw_traces(swims, waypoint_radius, folder / "traces.png", current)
         files = ["evaluation.csv", "traces.png", *(file.name for file in videos.values())]
+        if trajectory:
+            write_csv(time_series(swims), folder / "trajectories.csv")
+            files.append("trajectories.csv")
         if report is not None:
             from seastar_gym.evaluation.report.page import write_report
 
-            write_report(folder / "report.html", path, swims, playbacks, waypoint_radius, report)
+            films = {name: file.name for name, file in videos.items()}
+            write_report(
+                folder / "report.html", path, swims, playbacks, waypoint_radius, report, current=current, films=films
+            )
             files.append("report.html")
         say(f"Written to {folder}: {', '.join(files)}")
     return swims
