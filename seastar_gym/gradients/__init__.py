@@ -5,8 +5,8 @@
     found = differentiate(Scene(), commands, by=["fluid.drag_coefficient", "commands"])
     found.swim.hub, found.by["commands"].hub
 
-Forward differentiation, exact to rounding, in every scene: the kernels are compiled on lanes that carry slopes
-(simd/dual_lanes.py). docs/gradients.md says how far derivatives of swims can be trusted, and what they cost.
+Forward differentiation, exact to rounding: the kernels are compiled on lanes that carry slopes (simd/dual_lanes.py).
+docs/gradients.md says how far derivatives of swims can be trusted.
 """
 
 from seastar_gym.gradients.swim import Derivatives as Derivatives

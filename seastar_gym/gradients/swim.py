@@ -97,9 +97,7 @@ def differentiate(
     require_kind("scene", scene, Scene, "a Scene")
     if scene.n_robots is not None:
         raise ValueError("differentiate needs the scene of one robot, such as scene.of_robot(0).")
-    for part, name in ((scene.contact, "contact"), (scene.robot.body, "a body")):
-        if part is not None:
-            raise ValueError(f"There are no derivatives of swims with {name} yet.")
+    _refuse_unproven(scene)
     require_texts("by", by)
     if not by or len(set(by)) < len(by):
         raise ValueError("by must name one unknown or more, each once.")
@@ -124,6 +122,21 @@ def differentiate(
         column += unknown.size
     report = {name: groups[0].counts(name) for name in COUNTS}
     return Derivatives(value, found, groups[0].counts("status"), **report)
+
+
+def _refuse_unproven(scene: Scene) -> None:
+    """ValueError for terms whose derivatives have not been compared with differences of swims."""
+    robot = scene.robot
+    terms = {
+        "contact": scene.contact is not None,
+        "a body": robot.has_body,
+        "actuators along the limbs": robot.along is not None or robot.stiffening is not None,
+        "loads or gravity": bool(scene.loads) or scene.gravity is not None,
+        "held nodes": bool(scene.held_nodes),
+    }
+    for name, is_there in terms.items():
+        if is_there:
+            raise ValueError(f"There are no derivatives of swims with {name} yet.")
 
 
 class _Group:
