@@ -77,7 +77,8 @@ def told(scene: Scene) -> Table:
 def radii(scene: Scene) -> tuple[float, float]:
     """Radius of root and tip [m]."""
     radius = scene.robot.limbs[0].radius if scene.robot.limbs else scene.robot.rod_radius
-    return radius if isinstance(radius, tuple) else (radius, radius)
+    root, tip = radius if isinstance(radius, tuple) else (radius, radius)
+    return root, tip
 
 
 @dataclass(frozen=True)

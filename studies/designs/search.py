@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas
+import pandas  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
