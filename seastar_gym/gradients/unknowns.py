@@ -71,7 +71,7 @@ def _unknown(scene: Scene, commands: Floats, name: str) -> Unknown:
             raise ValueError(f"There are no derivatives in {name} of robots with a body.")
         return Unknown(name, (scene.robot.n_nodes, 2))
     value = at(scene, name) if name.split(".")[0] in PARTS else None
-    if not is_finite_number(value):
+    if value is None or not is_finite_number(value):
         raise ValueError(
             f"by has {shown(name)}, which is no number of this scene, such as fluid.drag_coefficient, and none of "
             f"{', '.join(('commands', *OF_START))}."
