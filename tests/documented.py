@@ -28,7 +28,7 @@ MOTIVE = (
 MADE_BY_THE_PACKAGE = {
     "Setting", "Episode", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Tally",
     "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
-    "Plant", "PlantError", "Sighting",
+    "Plant", "PlantError", "Sighting", "Derivatives", "Motion",
 }  # fmt: skip
 """Records that functions return, protocols, and bases of classes of one's own."""
 UNCALLED = {*MADE_BY_THE_PACKAGE, "Here", "RayTasks", "SlurmArrays", "chapters_certificate",
@@ -234,6 +234,8 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     yield "identify", partial(named("identify"), FAST), dict(
         parameters=["x"], measurement=measurement(), confidence=0.9, largest_delay=None)  # fmt: skip
     yield "identify", lambda scene: named("identify")(scene, ["x"], measurement()), dict(scene=FAST)
+    yield "differentiate", named("differentiate"), dict(
+        scene=FAST, commands=np.zeros((1, 5)), by=["commands"], state=None, duration=0.1)  # fmt: skip
     yield "Measurement", named("Measurement").from_csv, dict(trajectory="a.csv", commands="b.csv")
     yield "Measurement", measurement().to_csv, dict(trajectory=folder() / "a.csv", commands=folder() / "b.csv")
     yield "film", filmed, dict(file=folder() / "swim.gif", fps=10.0)

@@ -10,5 +10,5 @@ docs/gradients.md says how far derivatives of swims can be trusted.
 """
 
 from seastar_gym.gradients.swim import Derivatives as Derivatives
-from seastar_gym.gradients.swim import Swim as Swim
+from seastar_gym.gradients.swim import Motion as Motion
 from seastar_gym.gradients.swim import differentiate as differentiate

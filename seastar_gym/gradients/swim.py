@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 COUNTS = ("halvings", "rejections", "energy_cuts")
 
 
-class Swim(NamedTuple):
+class Motion(NamedTuple):
     """A swim, or its derivatives in an unknown, whose arrays have the unknown's axes behind those that are named here.
 
     positions, velocities: Of the nodes at the start and at ends of intervals [m], [m/s], shape (n + 1, n_nodes, 2).
@@ -55,8 +55,8 @@ class Derivatives(NamedTuple):
     halvings, rejections, energy_cuts: Counts of every interval, as in StrokeReport, shape (n,).
     """
 
-    swim: Swim
-    by: dict[str, Swim]
+    swim: Motion
+    by: dict[str, Motion]
     status: NDArray[np.int64]
     halvings: NDArray[np.int64]
     rejections: NDArray[np.int64]
@@ -102,8 +102,9 @@ def differentiate(
     if not by or len(set(by)) < len(by):
         raise ValueError("by must name one unknown or more, each once.")
     told = as_finite("commands", commands, (None, scene.robot.n_limbs))
-    length = float(scene.actuator.period if duration is None else duration)
+    length = scene.actuator.period if duration is None else duration
     require_duration(length, scene.numerics.step)
+    length = float(length)
     strengths = Simulator(scene, 1, threads=1).limb_strengths
     for command in told:
         checked_commands(command[None], scene, strengths)
@@ -115,10 +116,10 @@ def differentiate(
         for group in groups:
             group.advance(times, turned, rises)
     value, slope = _joined(groups, start, slopes)
-    found, column = dict[str, Swim](), 0
+    found, column = dict[str, Motion](), 0
     for unknown in unknowns:
         some = slice(column, column + unknown.size)
-        found[unknown.name] = Swim(*(part[..., some].reshape(*part.shape[:-1], *unknown.shape) for part in slope))
+        found[unknown.name] = Motion(*(part[..., some].reshape(*part.shape[:-1], *unknown.shape) for part in slope))
         column += unknown.size
     report = {name: groups[0].counts(name) for name in COUNTS}
     return Derivatives(value, found, groups[0].counts("status"), **report)
@@ -215,7 +216,7 @@ def _groups(scene: Scene, start: Start, slopes: Start) -> list[_Group]:
     return [_Group(scene, start, slopes, slice(a, min(a + N_LANES, n))) for a in range(0, n, N_LANES)]
 
 
-def _joined(groups: list[_Group], start: Start, slopes: Start) -> tuple[Swim, Swim]:
+def _joined(groups: list[_Group], start: Start, slopes: Start) -> tuple[Motion, Motion]:
     """The swim, and its slopes in all unknowns behind all other axes."""
     n, n_rows = slopes.q.shape[-1], 2 * start.rest.shape[-2]
 
@@ -231,7 +232,7 @@ def _joined(groups: list[_Group], start: Start, slopes: Start) -> tuple[Swim, Sw
     work, work_rise = apart([group.work for group in groups])
     (places, place_rises), (velocities, velocity_rises) = nodes
     heading, heading_rise = _heading(places, place_rises, start.rest, slopes.rest)
-    return Swim(places, velocities, heading, work), Swim(place_rises, velocity_rises, heading_rise, work_rise)
+    return Motion(places, velocities, heading, work), Motion(place_rises, velocity_rises, heading_rise, work_rise)
 
 
 def _heading(places: Floats, rises: Floats, rest: Floats, rest_rises: Floats) -> tuple[Floats, Floats]:
