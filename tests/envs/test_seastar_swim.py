@@ -169,7 +169,7 @@ def test_numerics_that_a_scene_names_are_kept():
 
 def test_a_fidelity_that_contradicts_the_numerics_of_a_scene_is_refused():
     for make in (SeastarSwimEnv, SeastarSwimVectorEnv):
-        with assert_refused('fidelity="fast"', "implicit-euler", "give one of them"):
+        with assert_refused('fidelity="fast"', "Numerics()", "give one of them"):
             make(scene=Scene(numerics=Numerics()), fidelity="fast")
 
 
