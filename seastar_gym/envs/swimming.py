@@ -109,7 +109,7 @@ class Swimming(ABC):
         scene = options.modelled
         self.options = options
         self.decision_period = checked_decision_period(options.decision_period, scene)
-        self._tells_errors, self._tells_growth = True, is_watched(scene)
+        self._tells_errors = True
         self._can_be_masked = can_be_masked(scene.actuator)
         self.scene = self._drawn_from = scene
         self._draws = draws
@@ -233,6 +233,11 @@ class Swimming(ABC):
         away = self._targets().reshape(-1, 2, 2) - tracker.hub[:, None]
         found[:, at.waypoints] = self._in_body_frame(away / lengths_of(self.simulator)[:, None, None]).reshape(-1, 4)
         return found
+
+    @functools.cached_property
+    def _tells_growth(self) -> bool:
+        """Whether info tells how the kinetic energy grows. Asked once: the answer takes milliseconds."""
+        return is_watched(self.scene)
 
     def observe_on_device(self) -> Any:
         """`observe` as a fresh array of the simulator's device. What a `Sight` shows is copied there."""
