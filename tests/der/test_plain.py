@@ -170,6 +170,7 @@ def test_the_twin_has_every_function_of_lanes_and_says_so():
     used = {
         name
         for file in (ROOT / "seastar_gym").rglob("*.py")
+        if file.parent.name != "simd"  # other lanes are made of them
         for block in file.read_text(encoding="utf-8").split("seastar_gym.simd.lanes import ")[1:]
         for name in block.lstrip("(").split(")" if block.startswith("(") else "\n")[0].replace(",", " ").split()
     }

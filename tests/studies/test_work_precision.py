@@ -85,6 +85,10 @@ def test_contacts_are_told_by_error_softness_and_the_speed_that_stops_a_robot():
     assert contact.survives(Contact(), 5.0) and not contact.survives(Contact(layer=10e-3), 10.0)
     assert set(contact.STEPS) == {*contact.NODES, contact.LIMIT}
     numbers = {"19": 0.05, "37": None, "10": 0.1}
-    row = {"largest": numbers, "median": numbers, "away": [0.01, 0.2], "speed": 5.0, "cost": 2.5}
-    told = contact.STUDY.tables["contact"]({"contacts": {"Contact()": row}})
-    assert "| `Contact()` | 10 %, 10 % | 5 %, 5 % | fails, fails | 20 %, 1 % | 5 | x 2.5 |" in told
+    row = {"largest": numbers, "median": numbers, "away": [0.01, 0.2], "cost": 2.5}
+    every = dict.fromkeys(contact.KINDS | contact.BETWEEN)
+    told = contact.STUDY.tables["contact"](
+        {what: dict.fromkeys(every, value) for what, value in (("contacts", row), ("bounds", 0.03), ("thrown", 5.0))}
+    )
+    assert "| `Contact()` | 10 %, 10 % | 5 %, 5 % | fails, fails | 3 % | 20 %, 1 % | 5 | x 2.5 |" in told
+    assert "| `Contact(layer=7e-3)` | | | | 3 % | | 5 | |" in told
