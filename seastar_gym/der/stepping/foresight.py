@@ -20,8 +20,9 @@ With a rigid hub, which has no poles, the numbers of the first, second, third an
 and 220 times d^2 over the edge length; 0.8, 1.7 and 3; 2.6, 5.8 and 15 (300 strokes of every kind).
 
 In water with hub hinges near their poles, steps from potentials below a tenth of that of PREDICTABLE_STRAIN created no
-energy; 0.02 % did up to PREDICTABLE_STRAIN, 0.1 % up to ten times and 0.5 % up to a hundred times as much. Edges of
-more than 100 radii feel more of the curvature of drag, about l rho_f C_d/(pi r rho_m), than CURVATURE allows for.
+energy; 0.02 % did up to PREDICTABLE_STRAIN, 0.1 % up to ten times and 0.5 % up to a hundred times as much. Where the
+curvature of drag, about l rho_f C_d/(pi r rho_m), is ten times CURVATURE, as with edges of a thousand radii, no step is
+left out: one that was had been 300 times the tolerance.
 """
 
 from seastar_gym.der.contact.contact import those_apart

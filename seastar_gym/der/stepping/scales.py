@@ -6,11 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from seastar_gym.der.mesh import Mesh, mean
+from seastar_gym.der.stepping.foresight import CURVATURE
 from seastar_gym.der.terms.drag import drag_per_length
 from seastar_gym.der.terms.stretching import Stretching
 
 SLENDER = 5000.0  # square of an edge's length over its radius: slenderer edges do not curve the potential more
 PREDICTABLE_STRAIN = 1e-3  # over EA times the length of all limbs: more energy strains or moves a robot violently
+
+MOST_CURVED = 10.0  # times CURVATURE: no Newton step is predictable where drag curves the potential more
 
 
 class Scales(NamedTuple):
@@ -18,7 +21,8 @@ class Scales(NamedTuple):
 
     shortest_edge: Smallest natural length of an edge [m].
     curvature_rate: How fast the foreseeable length shrinks with the step [1/s^2], see foresight.py.
-    predictable: Potential [J] up to which Newton steps are predictable, see foresight.py.
+    predictable: Potential [J] up to which Newton steps are predictable, see foresight.py; none is where drag on slender
+        edges curves the potential more than that allows for.
     damped: Potential [J] up to which drag takes more energy than an unregularised step may create, see guard.py; zero
         without drag.
     unsettled_rate: How much stiffer edges are than inertia, the more the longer the step [1/s^2], see momentum.py.
@@ -54,12 +58,13 @@ def coefficients(
     energy = PREDICTABLE_STRAIN * mean(stretching.EA) * mesh.n_limbs * length
     area = mesh.per_node(mesh.at_nodes.inert)
     broadside = mean(mesh.per_node(drag_per_length(fluid_density, C_d, mesh.at_nodes.width)))
+    drag_curvature = broadside / (density * float(area.min())) * float(mesh.dl.max())
     stiffness_over_mass = float((stretching.EA_over_l / (density * area * mesh.dl)[1:]).max())
     edges = mesh.nodes_per_limb - 1
     return Scales(
         shortest_edge=np.array([shortest]),
         curvature_rate=np.array([rate]),
-        predictable=np.array([energy]),
+        predictable=np.array([energy if drag_curvature <= MOST_CURVED * CURVATURE else -np.inf]),
         damped=np.array([energy * min(1.0, broadside * length / (density * mean(area)))]),
         unsettled_rate=np.array([stiffness_over_mass * edges**2 if broadside > 0.0 else np.inf]),
         free_mass=np.array([np.delete(mass, held_nodes).sum()]),
