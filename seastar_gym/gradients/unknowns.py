@@ -76,7 +76,7 @@ def _unknown(scene: Scene, commands: Floats, name: str) -> Unknown:
             f"by has {shown(name)}, which is no number of this scene, such as fluid.drag_coefficient, and none of "
             f"{', '.join(('commands', *OF_START))}."
         )
-    value = float(value)  # type: ignore[arg-type]
+    value = float(value)
     step = step_of(value)
     try:
         beside = tuple(with_numbers(scene, {name: value + step * place}) for place in CENTRAL.places)
