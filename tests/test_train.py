@@ -179,7 +179,7 @@ def test_the_exported_policy_is_the_model_s(finished):
     assert policy.training["commands"] == config["commands"]
     assert policy.training["versions"] == config["versions"]
     assert (policy.training["seed"], policy.training["strokes"]) == (4, 512)
-    assert [trained for trained, *_ in policy.training["progress"]] == [256, 512]
+    assert [trained for trained, *_ in policy.training["progress"]] == [0, 256, 512]
 
 
 @pytest.fixture
@@ -210,7 +210,7 @@ def test_a_finished_run_can_be_trained_for_more_strokes(finished, tmp_path, caps
     steps = [step for step, _ in scalars(folder)["time/fps"]]
     assert steps == sorted(steps) and steps[-1] == 768
     trained = np.loadtxt(folder / "progress.csv", delimiter=",")[:, 0]
-    np.testing.assert_array_equal(trained, [256, 512, 768])
+    np.testing.assert_array_equal(trained, [0, 256, 512, 768])
     capsys.readouterr()
     for option in (["--seed", "5"], ["--learning-rate", "0.1"], ["--path", "pentagon"]):
         assert train.main(["--resume", str(folder), *option]) == 2
@@ -222,7 +222,7 @@ ENDLESS = [*TINY, "--strokes", "10000000", "--out"]
 
 def first_checkpoint(folder):
     deadline = time.monotonic() + 120
-    while not (folder / "progress.csv").exists() and time.monotonic() < deadline:
+    while not (folder / "checkpoints").exists() and time.monotonic() < deadline:
         time.sleep(0.1)
 
 
@@ -411,7 +411,8 @@ def test_a_damaged_folder_is_refused_in_a_sentence(damage, finished, tmp_path, c
 def test_a_checkpoint_that_a_kill_cut_short_is_completed(finished, tmp_path):
     folder = tmp_path / "tiny"
     shutil.copytree(finished, folder)
-    (folder / "progress.csv").write_text((finished / "progress.csv").read_text().splitlines()[0] + "\n")
+    lines = (finished / "progress.csv").read_text().splitlines()
+    (folder / "progress.csv").write_text("\n".join(lines[:-1]) + "\n")
     (folder / "checkpoints" / "model_000000512.zip").unlink()
     assert train.main(["--resume", str(folder)]) == 0
     assert (folder / "progress.csv").read_text() == (finished / "progress.csv").read_text()
