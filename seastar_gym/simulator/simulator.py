@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 MAX_ROBOTS, MAX_THREADS = 100_000_000, 4096
 
 
-class Before(NamedTuple):
+class Snapshot(NamedTuple):
     """Copies of what an interval changes, made before it."""
 
     rows: dict[str, Any]
@@ -170,7 +170,7 @@ class Simulator:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(*state["arguments"])  # type: ignore[misc]
         self._batch.put_rows(state["rows"])
-        self._clock.put(state["clock"])
+        self._clock.restore(state["clock"])
         vars(self._drive).update(state["drive"])
         self._bars, self._growth = state["bars"], state["growth"]
 
@@ -417,7 +417,7 @@ class Simulator:
             times = self._batch.times - self._batch.times[0]
             for begin, end in pairwise([0, *ends_of(times)]):
                 self._batch.advance(begin, end)
-                self._clock.show(self._batch.covered())
+                self._clock.advance_to(self._batch.covered())
                 self._drive.advance(end)
                 self._batch.show_rotations(end)
                 self._lock.pause()
@@ -432,28 +432,28 @@ class Simulator:
         checked = None if commands is None else checked_commands(commands, self.scene, self._drive.strengths)
         self._lock.require_intact()
         interval = self._lock.acquire()
-        bars = None if self._bars is None else self._bars.before()
-        before = Before(self._batch.moved(), self._clock.copy(), dict(vars(self._drive)), bars)
+        bars = None if self._bars is None else self._bars.save()
+        before = Snapshot(self._batch.save(), self._clock.copy(), dict(vars(self._drive)), bars)
         try:
             self._begin_interval(float(duration), checked)
             yield interval
             self._lock.release()
         except BaseException:
-            self._put_back(interval, before)
+            self._restore(interval, before)
             raise
 
-    def _put_back(self, interval: object, before: Before) -> None:
+    def _restore(self, interval: object, before: Snapshot) -> None:
         """Undo an interval, unless robots were put into another state since."""
         try:
             if self._lock.resume(interval):
-                self._batch.put_back(before.rows)
-                self._clock.put(before.clock)
+                self._batch.restore(before.rows)
+                self._clock.restore(before.clock)
                 vars(self._drive).update(before.drive)
                 if self._bars is not None:
-                    self._bars.put_back(before.bars)
+                    self._bars.restore(before.bars)
                 self._lock.release()
         except BaseException:  # interrupted once more: the robots are put back all the same
-            self._put_back(interval, before)
+            self._restore(interval, before)
             raise
 
     def _begin_interval(self, duration: float, commands: Floats | None) -> None:
