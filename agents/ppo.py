@@ -14,10 +14,10 @@ from stable_baselines3.common.utils import LinearSchedule
 from agents.coasting import WAYPOINT_RADIUS, CoastingProgress, fit_coasting
 from agents.hyperparameters import Hyperparameters
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.controllers import learner_zip
+from seastar_gym.controllers import checkpoint
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, Weights
-from seastar_gym.controllers.roster import task_of
+from seastar_gym.controllers.registry import task_of
 from seastar_gym.envs.options import Path as SwimPath
 from seastar_gym.envs.symmetry import VectorMemory, VectorSymmetryReduction, observed_mirror
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
@@ -123,4 +123,4 @@ def policy_of(model: PPO) -> LearnedPolicy:
 
 def actor(weights: Mapping[str, torch.Tensor]) -> Weights:
     """Weights of the policy in Stable-Baselines3's network, under the names of `LearnedPolicy`."""
-    return learner_zip.actor({name: tensor.detach().cpu().numpy().copy() for name, tensor in weights.items()})
+    return checkpoint.actor({name: tensor.detach().cpu().numpy().copy() for name, tensor in weights.items()})

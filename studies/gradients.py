@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from seastar_gym.controllers.learned import in_the_box, load
+from seastar_gym.controllers.learned import bundled_file, load
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.gaits import PAIRS, STRAIGHT, in_time, lagged_gait, pentagon_gait
 from seastar_gym.scene import Contact, Scene, SmaWires, Vortex, Water
@@ -89,7 +89,7 @@ def of_policy(decision_period: float | None) -> Commands:
         name = "SeastarSwim-v0" if decision_period is None else "SeastarSwimTimed-v0"
         options: dict[str, Any] = {"path": "random", "actions": "pairs", **timed}
         batch = gym.make_vec(name, swims, vectorization_mode="vector_entry_point", **options)
-        policy, (seen, _) = load(in_the_box(decision_period)), batch.reset(seed=0)
+        policy, (seen, _) = load(bundled_file(decision_period)), batch.reset(seed=0)
         state, begins, told = None, np.ones(swims, bool), []
         for _ in range(decisions):
             actions, state = policy.predict(seen, state=state, episode_start=begins, deterministic=True)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from seastar_gym.controllers.contract import Policy, require_fit
-from seastar_gym.controllers.learned import in_the_box, load
-from seastar_gym.controllers.roster import AGENTS, files_of, load_agent
+from seastar_gym.controllers.learned import bundled_file, load
+from seastar_gym.controllers.registry import AGENTS, files_of, load_agent
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.commands import checked_decision_period
 from seastar_gym.envs.options import Path as SwimPath
@@ -46,7 +46,7 @@ class Course:
 class Pilot:
     """A controller, and what it swims.
 
-    name: As in `seastar_gym.controllers.roster`. digest: SHA-256 of the files that it is made of. waypoints: [m].
+    name: As in `seastar_gym.controllers.registry`. digest: SHA-256 of the files that it is made of. waypoints: [m].
     decisions: Decisions at most. decision_period: Time between them [s]. None means a stroke.
     """
 
@@ -77,7 +77,7 @@ def pilot_of(name: Any, course: Course, scene: Scene) -> Pilot:
     period = None if seconds == scene.actuator.period else course.decision_period
     files = files_of(name, period)
     if name == "learned" or name.endswith(".safetensors"):
-        policy = load(in_the_box(period) if name == "learned" else name)
+        policy = load(bundled_file(period) if name == "learned" else name)
         require_fit(policy, scene, policy.actions, period)
     elif name not in AGENTS and not files:
         scripted(name, n_limbs=scene.robot.n_limbs, decision_period=period)

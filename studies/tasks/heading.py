@@ -64,7 +64,7 @@ def _planner(batch: Any) -> Policy:
 
 
 def _turn_then_swim(batch: Any) -> Policy:
-    swims, wave = learned.load(learned.in_the_box(PERIOD_OF_RULE)), turning_wave(PERIOD_OF_RULE)
+    swims, wave = learned.load(learned.bundled_file(PERIOD_OF_RULE)), turning_wave(PERIOD_OF_RULE)
     return OneByOne(TurnThenSwim(wave, swims, swims.actions, batch.scene, HEADINGS, PERIOD_OF_RULE))
 
 

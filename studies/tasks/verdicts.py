@@ -1,4 +1,4 @@
-"""What the results of the tasks say, in words: which are kept, and where the policies in the box are ahead."""
+"""What the results of the tasks say, in words: which are kept, and where the bundled policies are ahead."""
 
 import textwrap
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ def verdicts(rows: Sequence[Row]) -> str:
 
 
 def _summary(rows: Sequence[Row]) -> str:
-    lines = ["| task | bound | better than greedy | gap left by PPO | gap left by the policy in the box | kept |"]
+    lines = ["| task | bound | better than greedy | gap left by PPO | gap left by the bundled policy | kept |"]
     lines.append("|---|---|---:|---:|---:|---|")
     for row in rows:
         left = (f"{100.0 * row.left_by(agent):.0f} %" if agent in row.agents else "" for agent in ("PPO", BOX))

@@ -8,7 +8,7 @@ from gymnasium.vector import AutoresetMode
 from agents.distillation import Teacher, distil
 from agents.tasks.learning import imitate
 from refusals import assert_refused
-from seastar_gym.controllers.learned import in_the_box, load
+from seastar_gym.controllers.learned import pretrained
 from seastar_gym.envs.symmetry import VectorMemory
 from seastar_gym.evaluation.tasks import make_batch
 
@@ -22,7 +22,7 @@ def batch(n=16, id=ID, past=8):
 
 @pytest.fixture(scope="module")
 def teacher():
-    return load(in_the_box(0.2))
+    return pretrained("timed-0.2s")
 
 
 def test_advice_is_the_teachers_own_action_whatever_the_student_turns(teacher):
@@ -63,7 +63,7 @@ def test_who_cannot_teach_is_refused(teacher):
     with assert_refused("A teacher is a policy with symmetry, without memory"):
         distil(pose, batch(), 100, 0)
     with assert_refused("The teacher does not see what this batch's robots would show"):
-        distil(load(in_the_box(None)), batch(), 100, 0)
+        distil(pretrained("strokes"), batch(), 100, 0)
     with assert_refused("batch must be a VectorMemory"):
         distil(teacher, batch().env, 100, 0)
     with assert_refused("decisions must be a whole number"):

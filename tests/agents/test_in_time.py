@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from stable_baselines3 import SAC
 
-from seastar_gym.controllers import learner_zip
+from seastar_gym.controllers import checkpoint
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.options import make_scene
@@ -106,7 +106,7 @@ def test_a_training_begins_with_another_s_network(small, tmp_path, monkeypatch):
     learn("pairs", 0, "fast", tmp_path)
     monkeypatch.setitem(trainings.TRAININGS, "later", replace(trainings.TRAININGS["later"], decisions=0))
     learn("later", 0, "fast", tmp_path)
-    before, after = (learner_zip.load(trainings.network_file(tmp_path, name, 0)) for name in ("pairs", "later"))
+    before, after = (checkpoint.load(trainings.network_file(tmp_path, name, 0)) for name in ("pairs", "later"))
     assert (before.decision_period, after.decision_period) == (0.5, 0.2)
     for name, weights in before.weights.items():
         np.testing.assert_array_equal(after.weights[name], weights)

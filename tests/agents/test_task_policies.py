@@ -16,7 +16,7 @@ from agents.tasks.learning import LEARNERS, hyperparameters, make_learning_env
 from refusals import assert_refused
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.learned import TASKS, load, save
-from seastar_gym.controllers.roster import load_agent, task_of
+from seastar_gym.controllers.registry import load_agent, task_of
 from seastar_gym.envs.symmetry import VectorMemory
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.evaluation.swim import swim
@@ -138,7 +138,7 @@ def test_the_command_trains_compares_seeds_and_writes_a_card(monkeypatch, tmp_pa
     assert capsys.readouterr().out.count("mean return") == 2
     with pytest.raises(SystemExit):
         main(["--ids", "SeastarSwim-v0"])
-    assert "has no policy in the box" in capsys.readouterr().err
+    assert "has no bundled policy" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("id", IDS)

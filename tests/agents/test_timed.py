@@ -14,7 +14,7 @@ from agents.trials import main as trials_main
 from refusals import assert_refused
 from seastar_gym import Limited, Numerics, Scene, Simulator, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.controllers import learner_zip
+from seastar_gym.controllers import checkpoint
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.greedy import GreedyPolicy, displacement_map
 from seastar_gym.controllers.learned import LearnedPolicy, load, save
@@ -203,7 +203,7 @@ def test_a_timed_policy_survives_the_disk_with_its_decision_period(tmp_path):
     save(policy_of(model), tmp_path / "policy.safetensors")
     again = learner_file.resume(tmp_path / "model.zip", model.get_env())
     assert again.gamma == model.gamma
-    for policy in (load(tmp_path / "policy.safetensors"), learner_zip.load(tmp_path / "model.zip")):
+    for policy in (load(tmp_path / "policy.safetensors"), checkpoint.load(tmp_path / "model.zip")):
         assert policy.decision_period == 0.5 and isinstance(policy.scene.actuator, SmaWires)
         env = gym.make(
             "SeastarSwim-v0", actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period

@@ -9,12 +9,12 @@ from gymnasium.spaces import Box, Discrete
 
 from refusals import assert_refused
 from seastar_gym import Headings, Numerics, RewardWeights, Scene, Seastar
-from seastar_gym.controllers import foreign, learned, learner_zip
+from seastar_gym.controllers import checkpoint, learned, third_party
 from seastar_gym.controllers.contract import actions_of, as_floating, observed, require_fit, require_policy, starts
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.planner import TIMED_BUDGETS, Budget, Planner, Targets, budget_for
-from seastar_gym.controllers.roster import load_agent, load_agents
+from seastar_gym.controllers.registry import load_agent, load_agents
 from seastar_gym.controllers.scripted import RandomPolicy, scripted
 
 FAST = Scene(numerics=Numerics.preset("fast"))
@@ -145,9 +145,9 @@ def test_a_file_that_is_no_zip_is_no_model(content, tmp_path):
     file = tmp_path / "model.zip"
     if content is not None:
         file.write_bytes(content)
-    assert not foreign.is_model(file)
+    assert not third_party.is_model(file)
     with pytest.raises((ValueError, FileNotFoundError), match=r"model\.zip.*\.$"):
-        learner_zip.load(file)
+        checkpoint.load(file)
 
 
 def test_a_zip_is_a_model_of_others_if_it_has_their_entries_and_not_ours(tmp_path):
@@ -156,7 +156,7 @@ def test_a_zip_is_a_model_of_others_if_it_has_their_entries_and_not_ours(tmp_pat
         with zipfile.ZipFile(file, "w") as archive:
             for name in known:
                 archive.writestr(name, "")
-        assert foreign.is_model(file) == expected
+        assert third_party.is_model(file) == expected
 
 
 def test_a_network_of_a_training_is_a_policy(tmp_path):
@@ -171,7 +171,7 @@ def test_a_network_of_a_training_is_a_policy(tmp_path):
     with zipfile.ZipFile(tmp_path / "model.zip", "w") as archive:
         archive.writestr("policy.json", description.to_json())
         archive.writestr("learner.safetensors", learned.safetensors.numpy.save(arrays | {"other": np.zeros(3)}))
-    policy = learner_zip.load(tmp_path / "model.zip")
+    policy = checkpoint.load(tmp_path / "model.zip")
     assert policy.description == description
     assert all((policy.weights[name] == array).all() for name, array in weights.items())
 

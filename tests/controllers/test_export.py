@@ -33,7 +33,7 @@ CARRIED = 3e-7
 """Error of turned and mirrored numbers over the largest."""
 ROUNDING = 1.5e-6
 """Error of logits over the largest: sums of some hundred numbers, each rounded to 6e-8, in another order."""
-TASKS = {"learned": "SeastarSwim-v0", "seastar-0.2s": "SeastarSwim-v0", "fail-blind": "SeastarFailBlind-v0",
+TASKS = {"learned": "SeastarSwim-v0", "timed-0.2s": "SeastarSwim-v0", "fail-blind": "SeastarFailBlind-v0",
          "miswired-0.5s": "SeastarMiswiredTimed-v0", "fast-prizes-0.5s": "SeastarPrizesTimed-v0"}  # fmt: skip
 """Policies of every kind, with memory and without, with limbs and without, and ids of what they swim."""
 QUICK = ("learned", "miswired-0.5s")
@@ -247,7 +247,7 @@ def test_c_decides_as_numpy_does_for_random_observations(name, tmp_path):
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", ["learned", "seastar-0.2s", "miswired-0.5s"])
+@pytest.mark.parametrize("name", ["learned", "timed-0.2s", "miswired-0.5s"])
 def test_c_sees_what_the_environment_shows(name, tmp_path):
     """From positions and velocities, to float32's rounding; from a short history, to the error of differences."""
     policy, layout = policy_of(name), policy_of(name).description.layout
@@ -346,7 +346,7 @@ def test_fewer_points_may_be_tracked(tmp_path):
 def test_the_program_of_the_page_runs(tmp_path):
     (program,) = re.findall(r"```c\n(.*?)```", (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8"), re.S)
     (tmp_path / "main.c").write_text(program)
-    (tmp_path / "policy.c").write_text(to_c(policy_of("seastar-0.2s"), "seastar-0.2s", 3))
+    (tmp_path / "policy.c").write_text(to_c(policy_of("timed-0.2s"), "timed-0.2s", 3))
     flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
     subprocess.run(["cc", *flags, str(tmp_path / "main.c"), "-o", str(tmp_path / "main"), "-lm"], check=True)
     done = subprocess.run([str(tmp_path / "main")], check=True, capture_output=True, text=True)
@@ -355,7 +355,7 @@ def test_the_program_of_the_page_runs(tmp_path):
 
 
 def test_the_code_allocates_nothing_and_keeps_nothing():
-    text = to_c(policy_of("seastar-0.2s"), "*/ int x; /*\nname")
+    text = to_c(policy_of("timed-0.2s"), "*/ int x; /*\nname")
     assert "alloc(" not in text and "*/ int x" not in text
     kept = [line for line in text.splitlines() if line.startswith("static") and "(" not in line]
     assert kept and all(line.startswith("static const") for line in kept)
@@ -425,8 +425,8 @@ def test_the_command_writes_a_file(tmp_path, monkeypatch, capsys):
     assert main(["export", "learned", "--to", "c", "--points", "3"]) == 0
     assert capsys.readouterr().out.startswith("learned.c: ")
     assert "#define SEASTAR_POINTS 11\n" in (tmp_path / "learned.c").read_text()
-    assert main(["export", "seastar-0.2s", "--to", "c"]) == 0
-    assert "Policy seastar-0.2s" in Path("seastar-0.2s.c").read_text(encoding="utf-8")
+    assert main(["export", "timed-0.2s", "--to", "c"]) == 0
+    assert "Policy timed-0.2s" in Path("timed-0.2s.c").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

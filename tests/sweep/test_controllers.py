@@ -10,7 +10,7 @@ import pyarrow.parquet
 import pytest
 
 from refusals import assert_refused
-from seastar_gym.controllers.learned import SHIPPED, load
+from seastar_gym.controllers.learned import BUNDLED, load
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.swim import swim as swim_one
 from seastar_gym.executors.processes import Processes
@@ -39,10 +39,10 @@ def names(sweep):
 
 @pytest.fixture
 def policy(tmp_path):
-    """Copy of the policy in the box."""
-    for file in (SHIPPED, SHIPPED.with_suffix(".json")):
+    """Copy of the bundled policy."""
+    for file in (BUNDLED, BUNDLED.with_suffix(".json")):
         shutil.copy(file, tmp_path / file.name)
-    return tmp_path / SHIPPED.name
+    return tmp_path / BUNDLED.name
 
 
 def test_a_design_swims_as_the_environment_does():
