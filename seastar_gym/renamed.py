@@ -24,13 +24,22 @@ MODULES: dict[str, str] = {
 NAMES: dict[str, str] = {
     "seastar_gym.controllers.in_the_box": "seastar_gym.controllers.learned.bundled_file",
     "seastar_gym.controllers.learned.in_the_box": "seastar_gym.controllers.learned.bundled_file",
+    "seastar_gym.envs.symmetry.Recollection": "seastar_gym.envs.symmetry.FrameStack",
+    "seastar_gym.envs.symmetry.VectorMemory": "seastar_gym.envs.symmetry.VectorFrameStack",
 }
 """Classes and functions, by the modules that they are imported from."""
 ARGUMENTS: dict[str, dict[str, str]] = {
+    "SmaWires": {"deaf": "refractory"},
     "Options": {"ship": "publish", "ship_anyway": "publish_anyway"},  # of train.py, in the config.json of runs
 }
 """Arguments of constructors by the name of the class, which are its attributes, too, and entries of its plain form."""
-METHODS: dict[str, dict[str, str]] = {}
+METHODS: dict[str, dict[str, str]] = {
+    "ActuatorBase": {"can_be_deaf": "can_be_refractory", "deaf_wires": "refractory_wires"},
+    "FrameStack": {"told": "features", "shown": "stacked"},
+    "LearnedPolicy": {"recollection": "frame_stack"},
+    "Simulator": {"deaf_wires": "refractory_wires"},
+    "VectorFrameStack": {"recollection": "frame_stack"},
+}
 """Methods and properties by the name of the class, also where a class derived from it defines them."""
 KINDS: dict[str, str] = {}
 """Parts in their plain form."""
@@ -120,12 +129,6 @@ def methods(kind: Class) -> Class:
     for before, now in old.items():
         setattr(kind, before, _old_attribute(kind.__name__, before, now))
     return kind
-
-
-def entries(part: dict[Any, Any]) -> dict[Any, Any]:
-    """The plain form of a part of a scene by its present names: files from before are read without a warning."""
-    kind = KINDS.get(part["kind"], part["kind"])
-    return {**fields(kind, part), "kind": kind}
 
 
 def fields(kind: str, data: dict[Any, Any]) -> dict[Any, Any]:

@@ -30,7 +30,7 @@ from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy, bundled_file, load
 from seastar_gym.controllers.scripted import GAITS as SCRIPTED
 from seastar_gym.controllers.scripted import scripted
-from seastar_gym.envs.symmetry import VectorMemory
+from seastar_gym.envs.symmetry import VectorFrameStack
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.identify import Measurement, identify
 from seastar_gym.plant.guard import Limits
@@ -253,7 +253,7 @@ def teach(results: Mapping[str, Any]) -> LearnedPolicy:
         path="random", random_heading=True, sight=sight, randomization=draws, threads=1,
         autoreset_mode=AutoresetMode.SAME_STEP, max_episode_steps=ppo.max_episode_steps,
     )  # fmt: skip
-    return distil(policy_of(teacher), VectorMemory(batch, PAST), ENOUGH, 0)
+    return distil(policy_of(teacher), VectorFrameStack(batch, PAST), ENOUGH, 0)
 
 
 def run_to_the_end(policy: Policy, scene: Scene, path: str, seed: int) -> float:

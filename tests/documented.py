@@ -89,7 +89,7 @@ def training_env() -> Any:
 @cache
 def of_batch(name: str, mode: str = "NextStep") -> Any:
     """A wrapper of a batch after its reset."""
-    more = {"past": 1} if name == "VectorMemory" else {}
+    more = {"past": 1} if name == "VectorFrameStack" else {}
     made = named(name)(batch(mode, actions="pairs"), **more)
     made.reset()
     return made
@@ -176,9 +176,9 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "SimulatedPlant": dict(simulator=Simulator(WIRES), sight=Sight(), seed=0, paced=False),
         "PlantSwim": dict(plant=named("SimulatedPlant")(Simulator(WIRES)), limits=named("Limits")(), logs=None,
                           render_mode=None, frames_per_stroke=None, decision_period=0.5, scene=WIRES),
-        "Recollection": dict(symmetry=symmetry_for(5), past=1),
+        "FrameStack": dict(symmetry=symmetry_for(5), past=1),
         "Symmetry": dict(group=5, mirror=(), layout=named("Layout")(5), actions="limbs"),
-        "VectorMemory": dict(env=batch(), past=1),
+        "VectorFrameStack": dict(env=batch(), past=1),
         "memory_mirror": dict(actuator=FAST.actuator),
         "symmetry_of": dict(scene=FAST),
         "GoalForm": dict(env=env()),
@@ -252,7 +252,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     yield "Range", named("Range")("a", 0.0, 1.0).spaced, dict(n=3)
     yield "Range", named("Range")("a", 0.0, 1.0).at, dict(share=0.5)
     yield "Buffers", lambda out: batch_to_step().step(np.zeros((2, 5), int), out=out), dict(out=None)
-    for name in ("VectorMemory", "Recorder"):
+    for name in ("VectorFrameStack", "Recorder"):
         yield name, of_batch(name).reset, dict(seed=0, options=None)
         yield name, of_batch(name).step, dict(actions=np.zeros(2, int))
     yield "BatchVecEnv", of_batch("BatchVecEnv", "SameStep").step, dict(actions=np.zeros(2, int))

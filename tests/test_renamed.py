@@ -2,10 +2,14 @@
 
 import importlib
 import sys
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from seastar_gym import renamed
+from seastar_gym import SmaWires, renamed
+from seastar_gym.scene.actuators.actuator import complete
+from seastar_gym.scene.serial import from_dict, to_dict
 
 
 def attribute_of(path: str):
@@ -38,3 +42,39 @@ def test_options_are_taken_by_their_old_names():
         assert renamed.options(["--ship", "--out", "ship"]) == ["--publish", "--out", "ship"]
     with pytest.warns(DeprecationWarning, match="--ship-anyway"):
         assert renamed.option("--ship-anyway=True") == "--publish-anyway=True"
+
+
+def test_actuators_take_and_have_their_old_names():
+    with pytest.warns(DeprecationWarning, match=r"SmaWires\(deaf=...\) is called SmaWires\(refractory=...\) now"):
+        wires = SmaWires(deaf=True)
+    assert wires == SmaWires(refractory=True) and SmaWires.__init__.__name__ == "__init__"
+    with pytest.warns(DeprecationWarning, match="SmaWires.deaf is called refractory now"):
+        assert wires.deaf
+    with pytest.warns(DeprecationWarning, match="ActuatorBase.deaf_wires is called refractory_wires now"):
+        assert not wires.deaf_wires(wires.rest).any()
+    with pytest.warns(DeprecationWarning, match="deaf"):
+        assert replace(wires, deaf=False) == SmaWires()
+
+
+def test_scenes_of_before_are_read_without_a_warning():
+    for part in (SmaWires(refractory=True),):
+        data = part.to_dict() if hasattr(part, "to_dict") else to_dict(part)
+        old = {now: before for before, now in renamed.ARGUMENTS[type(part).__name__].items()}
+        assert from_dict({old.get(name, name): value for name, value in data.items()}, type(part)) == part
+
+
+def test_actuators_of_ones_own_answer_by_their_old_names():
+    with pytest.warns(DeprecationWarning, match="ActuatorBase.can_be_deaf is called can_be_refractory now"):
+
+        class Derived(SmaWires):
+            can_be_deaf = True
+
+    class Alone:
+        peak_angle, period, corners, can_be_deaf = 0.3, 1.0, (0.0, 1.0), True
+
+        def delta_psi(self, t):
+            return np.zeros_like(t)
+
+    assert Derived().can_be_refractory
+    with pytest.warns(DeprecationWarning, match="can_be_deaf"):
+        assert complete(Alone()).can_be_refractory

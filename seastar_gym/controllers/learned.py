@@ -27,7 +27,7 @@ from seastar_gym import renamed
 from seastar_gym.controllers.contract import as_floating, starts
 from seastar_gym.controllers.description import Description, read_facts
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.symmetry import Recollection
+from seastar_gym.envs.symmetry import FrameStack
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number, require_file, require_flag, require_kind, require_number, shown
@@ -50,6 +50,7 @@ RESOLUTION = "robot.nodes_per_limb"
 """Fact of a scene that a policy does not depend on."""
 
 
+@renamed.methods
 class LearnedPolicy:
     """Trained policy with the `predict` of Stable-Baselines3, from observations of the environment to its actions.
 
@@ -83,7 +84,7 @@ class LearnedPolicy:
         self.weights = weights
         self.actions = description.actions
         self.scene = description.scene
-        self.reduction, self.recollection = description.reduction, description.recollection
+        self.reduction, self.frame_stack = description.reduction, description.frame_stack
         self.decision_period = description.decision_period or description.scene.actuator.period
         self.training = training or {}
         self.rng = np.random.default_rng(0) if rng is None else rng
@@ -112,14 +113,14 @@ class LearnedPolicy:
             )
         if self.reduction is None:
             return self._choose(observation, deterministic), None
-        if self.recollection is not None:
-            return self._remembering(self.recollection, observation, state, episode_start, deterministic)
+        if self.frame_stack is not None:
+            return self._stacking(self.frame_stack, observation, state, episode_start, deterministic)
         reduced, elements = self.reduction.reduce(observation)
         return self.reduction.restore(self._choose(reduced, deterministic), elements), None
 
-    def _remembering(
+    def _stacking(
         self,
-        recollection: Recollection,
+        frame_stack: FrameStack,
         observation: NDArray[Any],
         state: tuple[NDArray[Any], ...] | None,
         episode_start: NDArray[np.bool_] | None,
@@ -127,12 +128,12 @@ class LearnedPolicy:
     ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...]]:
         """`predict` of a policy that sees past observations."""
         present = np.atleast_2d(observation).astype(np.float32)
-        _require_past(state, (len(present), recollection.past, present.shape[1]))
-        at_first = np.repeat(present[:, None], recollection.past, axis=1)
+        _require_past(state, (len(present), frame_stack.past, present.shape[1]))
+        at_first = np.repeat(present[:, None], frame_stack.past, axis=1)
         begun = starts(episode_start, len(present))
         past = at_first if state is None else np.where(begun[:, None, None], at_first, state[0])
-        shown, elements = recollection.shown(present, past)
-        chosen = recollection.symmetry.restore(self._choose(shown, deterministic), elements)
+        shown, elements = frame_stack.stacked(present, past)
+        chosen = frame_stack.symmetry.restore(self._choose(shown, deterministic), elements)
         later = np.concatenate([present[:, None], past[:, :-1]], axis=1)
         return (chosen if observation.ndim == 2 else chosen[0]), (later,)
 

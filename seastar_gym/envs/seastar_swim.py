@@ -74,11 +74,11 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     limb 1 at rest. It repeats after a whole turn: limb 1 is told from the others, as if it carried a camera.
 
     ## Masks
-    Some wires cannot be heated now: those of `SmaWires(deaf=True)` until their limb is cold, those of a `ThermalSma`
-    with a `largest_temperature` while they are that hot. A command to such a wire does nothing and costs nothing. With
-    these actuators, `info` has `action_mask` (int8, 1 for actions that are followed as a whole) and `masked_limbs`
-    (int, commands of this decision that were not followed). `env.action_masks()` is the mask as booleans, the form of
-    MaskablePPO in sb3-contrib, with any actuator:
+    Some wires cannot be heated now: those of `SmaWires(refractory=True)` until their limb is cold, those of a
+    `ThermalSma` with a `largest_temperature` while they are that hot. A command to such a wire does nothing and costs
+    nothing. With these actuators, `info` has `action_mask` (int8, 1 for actions that are followed as a whole) and
+    `masked_limbs` (int, commands of this decision that were not followed). `env.action_masks()` is the mask as
+    booleans, the form of MaskablePPO in sb3-contrib, with any actuator:
 
     | `actions`            | shape          | meaning                                            |
     |----------------------|----------------|----------------------------------------------------|

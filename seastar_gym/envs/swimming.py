@@ -320,17 +320,17 @@ class Swimming(ABC):
 
     def action_masks(self) -> Flags:
         """Actions that wires can follow now, shape (n_robots, k), see masks.py."""
-        return action_masks(self.options.actions, self._deaf_wires())
+        return action_masks(self.options.actions, self._refractory_wires())
 
-    def _deaf_wires(self) -> Flags:
+    def _refractory_wires(self) -> Flags:
         """Wires that cannot be heated now, by their names in commands, shape (n_robots, n_limbs, 2)."""
-        return self.simulator.deaf_wires()
+        return self.simulator.refractory_wires()
 
     def followed(self, commands: Floats) -> Floats:
         """Commands with zeros for limbs whose wire cannot follow its command now, shape (n_robots, n_limbs)."""
         if not self._can_be_masked:
             return commands
-        return np.where(masked_limbs(commands, self._deaf_wires()), 0.0, commands)
+        return np.where(masked_limbs(commands, self._refractory_wires()), 0.0, commands)
 
     def _wired(self, commands: Floats) -> Floats:
         """Commands as they reach the limbs, shape (n_robots, n_limbs)."""
@@ -380,7 +380,7 @@ class Swimming(ABC):
     def warmth(self) -> Floats | None:
         """Contractions or temperatures of wires + and -, 0 to 1, shape (n_robots, n_limbs, 2); None without wires."""
         actuator = complete(self.scene.actuator)
-        if actuator.deaf_wires(actuator.rest) is None:
+        if actuator.refractory_wires(actuator.rest) is None:
             return None
         numbers = self.simulator.observe_actuators()
         return np.clip(numbers.reshape(self.n_robots, self.scene.robot.n_limbs, -1)[..., :2], 0.0, 1.0)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym import renamed
 from seastar_gym.der.rods import Work
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
@@ -44,6 +45,7 @@ class Snapshot(NamedTuple):
     bars: Any
 
 
+@renamed.methods
 class Simulator:
     """A batch of robots of one scene. They begin at rest, with the hub at the origin.
 
@@ -232,13 +234,13 @@ class Simulator:
         """Actuators' state as numbers of order one, shape (n_robots, k), limb after limb; k = 0 without memory."""
         return self._drive.observe()
 
-    def deaf_wires(self) -> NDArray[np.bool_]:
+    def refractory_wires(self) -> NDArray[np.bool_]:
         """Wires that cannot be heated now, for + and - of every limb, shape (n_robots, n_limbs, 2).
 
         Commands to them are ignored. In the middle of a stroke of an actuator without memory it is all of them, and
-        commands are refused. An actuator of your own that has no `deaf_wires` has none.
+        commands are refused. An actuator of your own that has no `refractory_wires` has none.
         """
-        return self._drive.deaf_wires()
+        return self._drive.refractory_wires()
 
     @property
     def limb_strengths(self) -> Floats:

@@ -236,7 +236,7 @@ def test_a_timed_policy_behind_the_symmetry_is_equivariant():
 
 def test_masks_are_handed_out_robot_by_robot():
     """As sb3-contrib's MaskablePPO asks for them."""
-    scene = Scene(actuator=SmaWires(deaf=True), numerics=FAST)
+    scene = Scene(actuator=SmaWires(refractory=True), numerics=FAST)
     env = SeastarSwimVectorEnv(
         3, actions="pairs", scene=scene, decision_period=0.2, autoreset_mode=AutoresetMode.SAME_STEP, threads=1
     )

@@ -157,8 +157,8 @@ def environment(name: str, policy: LearnedPolicy, n: int = ROBOTS):
 
 def input_of(policy: LearnedPolicy, observations: np.ndarray, past: np.ndarray | None) -> np.ndarray:
     """What the network of Python sees, shape (n, inputs)."""
-    if policy.recollection is not None:
-        return policy.recollection.shown(observations, past)[0]
+    if policy.frame_stack is not None:
+        return policy.frame_stack.stacked(observations, past)[0]
     return observations if policy.reduction is None else policy.reduction.reduce(observations)[0]
 
 
@@ -211,7 +211,7 @@ def test_c_decides_as_numpy_does_in_swims(name, tmp_path):
     observations, _ = env.reset(seed=0)
     for _ in range(N_SWUM // ROBOTS):
         past = None
-        if policy.recollection is not None:
+        if policy.frame_stack is not None:
             at_first = np.repeat(observations[:, None], policy.description.past, axis=1)
             past = at_first if state is None else np.where(begun[:, None, None], at_first, state[0])
         chosen, state = policy.predict(observations, state, begun, deterministic=True)
@@ -234,7 +234,7 @@ def test_c_decides_as_numpy_does_for_random_observations(name, tmp_path):
     policy = policy_of(name)
     compiled, past, state = Compiled(policy, tmp_path), None, None
     observations, robots = random_observations(policy, N_DRAWN), compiled.robots(N_DRAWN)
-    if policy.recollection is not None:
+    if policy.frame_stack is not None:
         shape = N_DRAWN, policy.description.past, observations.shape[1]
         past = np.random.default_rng(1).normal(size=shape).astype(np.float32)
         state = (past,)
@@ -396,7 +396,7 @@ def test_onnx_decides_as_numpy_does(name):
     for seed in range(10):
         observations, past, state = random_observations(policy, 1000, seed), None, None
         given = {"observation": observations}
-        if policy.recollection is not None:
+        if policy.frame_stack is not None:
             shape = len(observations), policy.description.past, observations.shape[1]
             past = np.random.default_rng(seed).normal(size=shape).astype(np.float32)
             given["past"], state = past, (past,)

@@ -352,7 +352,7 @@ def test_a_policy_with_memory_sees_the_past_in_the_limbs_of_the_present():
     state, past = None, np.stack([first, first], axis=1)
     for present, later in ((first, [first, first]), (second, [second, first]), (third, [third, second])):
         action, state = policy.predict(present, state, deterministic=True)
-        shown, elements = TASK.recollection.shown(present, past)
+        shown, elements = TASK.frame_stack.stacked(present, past)
         chosen = policy.logits(shown).argmax(axis=-1)[..., 0]
         np.testing.assert_array_equal(action, TASK.reduction.restore(chosen, elements))
         past = np.stack(later, axis=1)
@@ -374,7 +374,7 @@ def test_a_description_of_a_task_survives_its_text_and_shapes_the_network():
     assert TASK.observation_size == size and TASK.input_size == size + 2 * (10 + size - 180)
     assert TASK.shapes()["0.weight"] == (8, TASK.input_size) and TASK.distributions == (1, 243)
     bare = Description("limbs", False, Scene(), ())
-    assert (bare.reduction, bare.recollection, bare.input_size) == (None, None, 186)
+    assert (bare.reduction, bare.frame_stack, bare.input_size) == (None, None, 186)
     assert bare.shapes() == {"0.weight": (15, 186), "0.bias": (15,)}
 
 

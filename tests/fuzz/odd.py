@@ -75,7 +75,7 @@ PARTS: Calls = {
         function=lambda x, y: (0.0 * x, y), x=(0.0, 1.0), y=(0.0, 1.0), spacing=0.5)),
     "Contact": (Contact, dict(layer=5e-3, opening_angle=0.2)),
     "SmaPulse": (SmaPulse, dict(peak_angle=0.5, heating_time=0.1, cooling_time=0.9)),
-    "SmaWires": (SmaWires, dict(peak_angle=0.5, heating_time=0.1, cooling_time=0.9, period=0.5, deaf=False,
+    "SmaWires": (SmaWires, dict(peak_angle=0.5, heating_time=0.1, cooling_time=0.9, period=0.5, refractory=False,
                                 heating_power=5.0)),
     "SmaLimb": (SmaLimb, dict(peak_angle=0.5, rise=10.0, middle=7.0, time_constant=0.7, heating_time=0.05, delay=0.02,
                               period=1.0, rest_curvature=125.0, curvature_change=90.0, heating_power=5.0)),

@@ -94,8 +94,8 @@ class MiswiredTask(Numbered, SwimTask):
     def _wired(self, commands: Floats) -> Floats:
         return commands * self.wiring
 
-    def _deaf_wires(self) -> Flags:
-        return self._by_command(super()._deaf_wires())
+    def _refractory_wires(self) -> Flags:
+        return self._by_command(super()._refractory_wires())
 
     def _by_command(self, of_wires: NDArray[Any]) -> NDArray[Any]:
         """Values of wires + and -, shape (n_robots, n_limbs, 2), in the names that commands have for them."""
