@@ -4,6 +4,7 @@ One table for each sort of name, and one function that reads it. To take an old 
 """
 
 import functools
+import inspect
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -22,13 +23,16 @@ MODULES: dict[str, str] = {
 }
 """Modules of the package."""
 NAMES: dict[str, str] = {
+    "seastar_gym.Headings": "seastar_gym.envs.headings.HeadingTargets",
     "seastar_gym.controllers.in_the_box": "seastar_gym.controllers.learned.bundled_file",
     "seastar_gym.controllers.learned.in_the_box": "seastar_gym.controllers.learned.bundled_file",
+    "seastar_gym.envs.headings.Headings": "seastar_gym.envs.headings.HeadingTargets",
     "seastar_gym.envs.symmetry.Recollection": "seastar_gym.envs.symmetry.FrameStack",
     "seastar_gym.envs.symmetry.VectorMemory": "seastar_gym.envs.symmetry.VectorFrameStack",
 }
 """Classes and functions, by the modules that they are imported from."""
 ARGUMENTS: dict[str, dict[str, str]] = {
+    "HeadingTargets": {"asked": "target"},
     "SmaWires": {"deaf": "refractory"},
     "Options": {"ship": "publish", "ship_anyway": "publish_anyway"},  # of train.py, in the config.json of runs
 }
@@ -37,11 +41,13 @@ METHODS: dict[str, dict[str, str]] = {
     "ActuatorBase": {"can_be_deaf": "can_be_refractory", "deaf_wires": "refractory_wires"},
     "FrameStack": {"told": "features", "shown": "stacked"},
     "LearnedPolicy": {"recollection": "frame_stack"},
+    "Setting": {"endures": "is_energy_stable"},
     "Simulator": {"deaf_wires": "refractory_wires"},
+    "Swimming": {"_wanted": "_task_observation", "_score": "_reward_terms", "_goal_facts": "_task_info"},
     "VectorFrameStack": {"recollection": "frame_stack"},
 }
 """Methods and properties by the name of the class, also where a class derived from it defines them."""
-KINDS: dict[str, str] = {}
+KINDS: dict[str, str] = {"Headings": "HeadingTargets"}
 """Parts in their plain form."""
 OPTIONS: dict[str, str] = {"--ship": "--publish", "--ship-anyway": "--publish-anyway"}
 """Options of commands."""
@@ -109,26 +115,31 @@ def arguments(kind: Class) -> Class:
 
     setattr(kind, "__init__", with_old_names)  # noqa: B010 - mypy knows no class of which to replace it
     for before, now in old.items():
-        setattr(kind, before, _old_attribute(kind.__name__, before, now))
+        setattr(kind, before, _old_field(kind.__name__, before, now))
     return kind
 
 
 def methods(kind: Class) -> Class:
     """Have a class, and those derived from it, keep the old names of its methods. A decorator."""
-    old = METHODS[kind.__name__]
 
     def take_over(derived: type[Any], /, **named: Any) -> None:
         super(kind, derived).__init_subclass__(**named)  # type: ignore[arg-type]
-        for before, now in old.items():
-            if before in vars(derived):
-                warn(f"{kind.__name__}.{before}", now)
-                setattr(derived, now, vars(derived)[before])
-                delattr(derived, before)
+        _take_over(kind.__name__, derived)
 
     setattr(kind, "__init_subclass__", classmethod(take_over))  # noqa: B010
-    for before, now in old.items():
-        setattr(kind, before, _old_attribute(kind.__name__, before, now))
+    for before, now in METHODS[kind.__name__].items():
+        setattr(kind, before, _old_attribute(kind, before, now))
     return kind
+
+
+def _take_over(kind: str, derived: type[Any]) -> None:
+    """Give methods of a derived class their present names, and the old ones beside them for `super()`."""
+    for before, now in METHODS[kind].items():
+        if before in vars(derived):
+            warn(f"{kind}.{before}", now, 4)
+            setattr(derived, now, vars(derived)[before])
+        if now in vars(derived):
+            setattr(derived, before, _old_attribute(derived, before, now))
 
 
 def fields(kind: str, data: dict[Any, Any]) -> dict[Any, Any]:
@@ -147,10 +158,23 @@ def name_in(value: object, kind: str, name: str) -> str | None:
     return None
 
 
-def _old_attribute(kind: str, before: str, now: str) -> property:
+def _old_field(kind: str, before: str, now: str) -> property:
     def get(self: Any) -> Any:
         warn(f"{kind}.{before}", now)
         return getattr(self, now)
+
+    return property(get)
+
+
+def _old_attribute(kind: type[Any], before: str, now: str) -> property:
+    """What a class has by its present name, for an object that is asked by the old one."""
+
+    def get(self: Any) -> Any:
+        warn(f"{kind.__name__}.{before}", now)
+        if not hasattr(kind, now):  # an attribute of the object
+            return getattr(self, now)
+        own = inspect.getattr_static(kind, now)
+        return own.__get__(self, type(self)) if hasattr(own, "__get__") else own
 
     return property(get)
 

@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seastar_gym import SmaWires, renamed
+from seastar_gym import HeadingTargets, SmaWires, renamed
+from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.task import SwimTask
 from seastar_gym.scene.actuators.actuator import complete
 from seastar_gym.scene.serial import from_dict, to_dict
 
@@ -50,17 +52,18 @@ def test_actuators_take_and_have_their_old_names():
     assert wires == SmaWires(refractory=True) and SmaWires.__init__.__name__ == "__init__"
     with pytest.warns(DeprecationWarning, match="SmaWires.deaf is called refractory now"):
         assert wires.deaf
-    with pytest.warns(DeprecationWarning, match="ActuatorBase.deaf_wires is called refractory_wires now"):
+    with pytest.warns(DeprecationWarning, match="SmaWires.deaf_wires is called refractory_wires now"):
         assert not wires.deaf_wires(wires.rest).any()
     with pytest.warns(DeprecationWarning, match="deaf"):
         assert replace(wires, deaf=False) == SmaWires()
 
 
 def test_scenes_of_before_are_read_without_a_warning():
-    for part in (SmaWires(refractory=True),):
-        data = part.to_dict() if hasattr(part, "to_dict") else to_dict(part)
+    for part in (SmaWires(refractory=True), HeadingTargets("random")):
+        kinds = {now: before for before, now in renamed.KINDS.items()}
         old = {now: before for before, now in renamed.ARGUMENTS[type(part).__name__].items()}
-        assert from_dict({old.get(name, name): value for name, value in data.items()}, type(part)) == part
+        data = {old.get(name, name): value for name, value in to_dict(part).items()}
+        assert from_dict({**data, "kind": kinds.get(data["kind"], data["kind"])}, type(part)) == part
 
 
 def test_actuators_of_ones_own_answer_by_their_old_names():
@@ -78,3 +81,23 @@ def test_actuators_of_ones_own_answer_by_their_old_names():
     assert Derived().can_be_refractory
     with pytest.warns(DeprecationWarning, match="can_be_deaf"):
         assert complete(Alone()).can_be_refractory
+
+
+def test_tasks_of_ones_own_score_by_their_old_names():
+    with pytest.warns(DeprecationWarning, match="Swimming._score is called _reward_terms now"):
+
+        class Older(SwimTask):
+            def _score(self, hub, pulses):
+                with pytest.warns(DeprecationWarning, match="SwimTask._score is called _reward_terms now"):
+                    score = super()._score(hub, pulses)
+                return score._replace(terms={**score.terms, "reward_more": np.ones(self.n_robots)})
+
+    class Newer(Older):
+        def _reward_terms(self, hub, pulses):
+            score = super()._reward_terms(hub, pulses)
+            return score._replace(terms={**score.terms, "reward_last": np.ones(self.n_robots)})
+
+    task = Newer(SwimOptions(fidelity="fast"), 1, 1)
+    task.reset(np.ones(1, bool), [np.random.default_rng(0)])
+    names = [*task._reward_terms(np.zeros((1, 2)), np.zeros(1)).terms]
+    assert names[-2:] == ["reward_more", "reward_last"] and len(names) == len(set(names))

@@ -18,7 +18,7 @@ from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.planner import Budget, Planner
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.controllers.turning import TurnThenSwim
-from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.rollout import Episodes
@@ -33,7 +33,7 @@ AGENTS = ("rest", "planner", RULE, "PPO")
 """Who swims it."""
 LIMIT = 300.0
 """Time limit [s]."""
-HEADINGS = Headings("random")
+HEADINGS = HeadingTargets("random")
 PERIOD, PERIOD_OF_RULE = 0.5, 0.2
 """Times between decisions [s]: that of the environment, and that of the rule, whose turning wave needs it."""
 AHEAD = Budget(depth=1, beam=1, coasting=0.5)

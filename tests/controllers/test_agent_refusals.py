@@ -8,7 +8,7 @@ import pytest
 from gymnasium.spaces import Box, Discrete
 
 from refusals import assert_refused
-from seastar_gym import Headings, Numerics, RewardWeights, Scene, Seastar
+from seastar_gym import HeadingTargets, Numerics, RewardWeights, Scene, Seastar
 from seastar_gym.controllers import checkpoint, learned, third_party
 from seastar_gym.controllers.contract import actions_of, as_floating, observed, require_fit, require_policy, starts
 from seastar_gym.controllers.description import Description
@@ -60,7 +60,7 @@ REFUSED = {
     "several robots": (lambda: GreedyPolicy(TWO), "scene must be that of one robot."),
     "no radius": (lambda: Planner(FAST, 0.0), "waypoint_radius"),
     "no reward": (lambda: Planner(FAST, reward=3), "reward must be RewardWeights"),
-    "no headings": (lambda: Planner(FAST, headings=3), "headings must be Headings"),
+    "no headings": (lambda: Planner(FAST, headings=3), "headings must be HeadingTargets"),
     "no budget": (lambda: Planner(FAST, budget=3), "budget must be a Budget"),
     "no threads": (lambda: Planner(FAST, threads=0), "threads"),
     "no depth": (lambda: Budget(0, 1), "depth must be a whole number from 1 to 1000"),
@@ -109,7 +109,7 @@ def test_a_search_is_allowed_the_budget_of_the_next_longer_decision():
     assert cost == sorted(cost)
 
 
-@pytest.mark.parametrize("headings", [None, Headings(tolerance=0.2)])
+@pytest.mark.parametrize("headings", [None, HeadingTargets(tolerance=0.2)])
 def test_a_planner_of_strokes_and_one_in_time_know_their_scene(headings):
     strokes, timed = Planner(headings=headings), Planner(decision_period=0.5, headings=headings)
     assert strokes.scene == Scene.preset("fast") and timed.scene.actuator.has_memory

@@ -5,7 +5,7 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from refusals import assert_refused
-from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -101,4 +101,4 @@ def test_what_cannot_be_remembered_is_refused():
     with assert_refused("past must be"):
         VectorFrameStack(batch("prey"), 0)
     with assert_refused("Asked headings have no place"):
-        VectorFrameStack(SeastarSwimVectorEnv(1, 50, fidelity="fast", headings=Headings(), threads=1), 2)
+        VectorFrameStack(SeastarSwimVectorEnv(1, 50, fidelity="fast", headings=HeadingTargets(), threads=1), 2)

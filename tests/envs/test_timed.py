@@ -306,8 +306,8 @@ def test_pictures_show_commands_and_warm_wires():
         pictures = env.render()
         assert len(pictures) == n and pictures[0].shape == (720, 960, 3)
     frame = warm._frame()
-    assert frame.warmth.shape == (5, 2) and frame.warmth.max() == pytest.approx(5 / 9)
-    assert cold._frame().warmth is None
+    assert frame.wire_state.shape == (5, 2) and frame.wire_state.max() == pytest.approx(5 / 9)
+    assert cold._frame().wire_state is None
     still = warm._get_renderer()
-    without = still.draw(type(frame)(**{**vars(frame), "warmth": None}))
+    without = still.draw(type(frame)(**{**vars(frame), "wire_state": None}))
     assert (still.draw(frame) != without).any()
