@@ -20,6 +20,10 @@ MODULES: dict[str, str] = {
     "seastar_gym.controllers.foreign": "seastar_gym.controllers.third_party",
     "seastar_gym.controllers.learner_zip": "seastar_gym.controllers.checkpoint",
     "seastar_gym.controllers.roster": "seastar_gym.controllers.registry",
+    "seastar_gym.sweep.cells": "seastar_gym.sweep.batches",
+    "seastar_gym.sweep.frames": "seastar_gym.sweep.configurations",
+    "seastar_gym.sweep.parts": "seastar_gym.sweep.result_files",
+    "seastar_gym.sweep.pilots": "seastar_gym.sweep.controllers",
 }
 """Modules of the package."""
 NAMES: dict[str, str] = {
@@ -29,11 +33,16 @@ NAMES: dict[str, str] = {
     "seastar_gym.envs.headings.Headings": "seastar_gym.envs.headings.HeadingTargets",
     "seastar_gym.envs.symmetry.Recollection": "seastar_gym.envs.symmetry.FrameStack",
     "seastar_gym.envs.symmetry.VectorMemory": "seastar_gym.envs.symmetry.VectorFrameStack",
+    "seastar_gym.gaits.in_time": "seastar_gym.gaits.timed",
+    "seastar_gym.sweep.controllers.Course": "seastar_gym.sweep.controllers.Route",
+    "seastar_gym.sweep.result_files.read_parts": "seastar_gym.sweep.result_files.read_results",
+    "seastar_gym.sweep.run.Tally": "seastar_gym.sweep.run.Progress",
 }
 """Classes and functions, by the modules that they are imported from."""
 ARGUMENTS: dict[str, dict[str, str]] = {
     "HeadingTargets": {"asked": "target"},
     "SmaWires": {"deaf": "refractory"},
+    "Sweep": {"course": "route"},
     "Options": {"ship": "publish", "ship_anyway": "publish_anyway"},  # of train.py, in the config.json of runs
 }
 """Arguments of constructors by the name of the class, which are its attributes, too, and entries of its plain form."""
@@ -43,6 +52,10 @@ METHODS: dict[str, dict[str, str]] = {
     "LearnedPolicy": {"recollection": "frame_stack"},
     "Setting": {"endures": "is_energy_stable"},
     "Simulator": {"deaf_wires": "refractory_wires"},
+    "Sweep": {
+        "cells": "batches", "n_cells": "n_batches", "frames": "configurations", "frame": "configuration",
+        "n_frames": "n_configurations", "designs_per_frame": "designs_per_configuration",
+    },
     "Swimming": {"_wanted": "_task_observation", "_score": "_reward_terms", "_goal_facts": "_task_info"},
     "VectorFrameStack": {"recollection": "frame_stack"},
 }

@@ -38,7 +38,7 @@ from seastar_gym.scene.numerics import Fidelity, SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study, require_known
-from studies.kept import rounded
+from studies.results_file import rounded
 from studies.speed.operations import count_operations, numbers_moved
 from studies.speed.terms import scenes as scenes_of_terms
 from studies.style import CYCLE, FAINT, subplots

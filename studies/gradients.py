@@ -22,11 +22,11 @@ from tqdm import tqdm
 
 from seastar_gym.controllers.learned import bundled_file, load
 from seastar_gym.envs.commands import to_commands
-from seastar_gym.gaits import PAIRS, STRAIGHT, in_time, lagged_gait, pentagon_gait
+from seastar_gym.gaits import PAIRS, STRAIGHT, lagged_gait, pentagon_gait, timed
 from seastar_gym.scene import Contact, Scene, SmaWires, Vortex, Water
 from seastar_gym.simulator import Simulator
 from studies.frame import InDocs, Results, Study
-from studies.kept import rounded
+from studies.results_file import rounded
 from studies.style import DPI, INK, subplots
 
 Floats = NDArray[np.float64]
@@ -77,7 +77,7 @@ def gaits(strokes: int, swims: int, rng: np.random.Generator) -> Floats:
 def lagged(decisions: int, swims: int, rng: np.random.Generator) -> Floats:
     """The lagged gait and, as decisions, the straight swim."""
     seconds = decisions // 5
-    straight = in_time(np.tile(STRAIGHT, (seconds, 1)), 0.2)
+    straight = timed(np.tile(STRAIGHT, (seconds, 1)), 0.2)
     return np.stack([np.tile(lagged_gait(0.2), (seconds, 1)), straight], axis=1)
 
 

@@ -26,7 +26,7 @@ MOTIVE = (
     "Frame,Time (Seconds),X,Y,Z\n0,0,1,2,3\n"
 )
 MADE_BY_THE_PACKAGE = {
-    "Setting", "Episode", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Tally",
+    "Setting", "Episode", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Progress",
     "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
     "Plant", "PlantError", "Sighting", "Derivatives", "Motion",
 }  # fmt: skip
@@ -160,7 +160,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     gaits = {"n_limbs": 5}
     for name, arguments in {
         "decisions_per_second": dict(decision_period=0.5),
-        "in_time": dict(strokes=np.zeros((2, 5)), decision_period=0.5),
+        "timed": dict(strokes=np.zeros((2, 5)), decision_period=0.5),
         "lagged_gait": dict(decision_period=0.1, n_limbs=5, lag=0.6, level=1.0),
         "lagged_pentagon": dict(decision_period=0.1),
         "pair_gait": dict(plus=1, minus=2, n_limbs=5),
@@ -207,9 +207,9 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "with_parameters": dict(scene=FAST, names=["fluid.density"], values=[900.0]),
         "Choices": dict(name="robot.n_limbs", values=(3, 4), labels=()),
         "Range": dict(name="robot.limb_length", low=0.1, high=0.2, is_log=False),
-        "Course": dict(path=PATH, seconds=1.0, decision_period=None),
+        "Route": dict(path=PATH, seconds=1.0, decision_period=None),
         "Sweep": dict(scene=FAST, axes=(), gait="straight", settling=0, measured=1, samples=0, seed=0, robots=1),
-        "read_parts": dict(folder=folder()),
+        "read_results": dict(folder=folder()),
         "Processes": dict(workers=1),
         "Recorder": dict(env=batch()),
         "BatchVecEnv": dict(env=batch("SameStep")),

@@ -20,7 +20,7 @@ from seastar_gym.controllers.contract import Policy
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import Symmetry
 from seastar_gym.scene.numerics import Fidelity
-from studies.learning.in_time.shares import ChosenCommands, shares_of_pairs
+from studies.learning.timed.shares import ChosenCommands, shares_of_pairs
 
 COMMON = Hyperparameters(discount=0.9, rollout=32, num_envs=64, gae_lambda=0.95)
 """Hyperparameters of the trainings, but for what differs."""
