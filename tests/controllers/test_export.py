@@ -64,7 +64,7 @@ OWN = {
     "two-long-limbs-adjacent": Description("pairs", True, Scene(four(0.12, 0.12, 0.1, 0.1)), (16,), past=1),
     "limbs-all-unlike": Description("limbs", True, Scene(four(0.12, 0.1, 0.11, 0.09)), (16,)),
 }
-"""Policies of kinds that are not in the box: without symmetry, with half a turn and a mirror, with a mirror that is not
+"""Policies of kinds that are not bundled: without symmetry, with half a turn and a mirror, with a mirror that is not
 along limb 1, with nothing, and of a network without hidden layers."""
 
 
