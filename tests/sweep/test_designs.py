@@ -60,7 +60,7 @@ def test_what_a_design_does_is_the_same_beside_any_others():
     """Limb 1 is bent at rest, in every design by another amount, and the way ahead is along it."""
     robot = Seastar(3, 4, limbs=(Limb(natural_curvature=1.0), Limb(), Limb()))
     bent = np.array([0.0, 8.0, -5.0])
-    frame = next(Sweep(Scene(robot), (LENGTH,), settling=0, measured=1, samples=1).batches()).frame
+    frame = next(Sweep(Scene(robot), (LENGTH,), settling=0, measured=1, samples=1).batches()).configuration
 
     def swum(order):
         return swim(Batch(frame, {"robot.limbs.0.natural_curvature": bent[order]}, len(order)))
