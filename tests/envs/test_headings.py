@@ -266,7 +266,7 @@ def test_what_is_no_tolerance_is_refused(tolerance):
 @pytest.mark.parametrize("make", [SeastarSwimEnv, SeastarSwimVectorEnv])
 def test_environments_refuse_headings_that_do_not_fit(make):
     for headings in (0.5, "along", True, {"kind": "HeadingTargets"}):
-        with assert_refused("eadings"):
+        with assert_refused("eading"):
             make(headings=headings)
     with assert_refused("2 angles", "5 waypoint"):
         make(headings=HeadingTargets((0.1, 0.2)))
