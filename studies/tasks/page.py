@@ -62,7 +62,7 @@ Comparisons are over the episodes that all agents of a task have swum.
 | PPO, memory | the same, and tips, last commands and targets of the last eight observations |
 | PPO, told the way | PPO of `ObstTrap`, by a reward that measures the way around all discs |
 | PPO, memory, coasting | PPO of `SimToReal` with a memory; its reward measures where the robot would come to rest |
-| in the box | the bundled policy, one training: PPO with memory, after six times as many decisions |
+| bundled | the bundled policy, one training: PPO with memory, after six times as many decisions |
 
 To the planner, wires are as they should be, the water is still, prey swim straight on, all limbs are alive, and the
 way between the discs that it sees is the straight one. The current of `Station` is hardly hidden: it shows in the
@@ -129,7 +129,7 @@ def _draw_row(axes: Any, row: Row) -> None:
     names = [agent for agent, _ in row.in_order]
     for place, (agent, seeds) in enumerate(row.in_order):
         mean, (low, high) = row.mean(agent), crossed_interval(seeds)
-        colour = CYCLE[0] if agent.startswith(("PPO", "Rec", "in the box")) else FAINT
+        colour = CYCLE[0] if agent.startswith(("PPO", "Rec", "bundled")) else FAINT
         axes.plot([low, high], [place, place], color=colour, lw=2.5, solid_capstyle="butt")
         axes.plot(mean, place, "o", color=colour, ms=5)
     axes.set_yticks(range(len(names)), names)

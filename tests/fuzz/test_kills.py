@@ -24,7 +24,7 @@ pytest.importorskip("tensorboard", reason="train.py writes its log for TensorBoa
 import train
 from fuzz.killed_training import SECONDS
 from seastar_gym.controllers import learned as policies
-from seastar_gym.controllers.learner_zip import load
+from seastar_gym.controllers.checkpoint import load
 from seastar_gym.evaluation.report.charts import read_progress
 
 DRIVER = Path(__file__).with_name("killed_training.py")
