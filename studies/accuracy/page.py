@@ -92,11 +92,10 @@ def presets() -> str:
             f"`{name}`", nodes, f"{scheme}, {1e3 * row.step:g} ms", f"{row.newton_tolerance:.0e}",
             percent(row.space_error), percent(row.time_error),
             f"**{percent(row.errors['random'])}** ({percent(row.typical['random'])})",
-            pair(row.errors["repeated"], row.typical["repeated"]), pair(row.errors["small"], row.typical["small"]),
-            percent(row.errors["straight"]), f"{row.speed:,.0f}",
+            pair(row.errors["repeated"], row.typical["repeated"]),
         ])  # fmt: skip
-    head = ["fidelity", "N", "scheme and step", "Newton tolerance", "space", "time", "path error", "gaits", "slow"]
-    return markdown([*head, "straight", "x real time"], rows)
+    head = ["fidelity", "N", "scheme and step", "Newton tolerance", "space", "time", "path error", "gaits"]
+    return markdown(head, rows)
 
 
 def timed(periods: tuple[float, ...] = PERIODS) -> str:
