@@ -2,8 +2,8 @@
 
 Finds what the search of the site finds, from its index, by the rules of Sphinx's searchtools.js: all words of a
 question are in a page, whose score is that of its best word or of a heading that has the whole question. As
-docs/_static/scorer.js has it, words in a title count, and pages that few ask for come last. Objects of the reference are
-left out. Exits with 1 and names the questions whose page is not among the first.
+docs/_static/scorer.js has it, words in a title count, and pages that few ask for come last. Objects of the reference
+are left out. Exits with 1 and names the questions whose page is not among the first.
 """
 
 import json

@@ -36,7 +36,7 @@ def environment(entry_point: str) -> type[Any]:
 
 def registered() -> str:
     """Table of all ids: what `gym.make` gives by default."""
-    head = "| id | class | actions | observation | decision [s] | time limit [decisions] | reward threshold |"
+    head = "| id | contract | actions | numbers seen | decision [s] | limit [decisions] | threshold |"
     return "\n".join([head, "|---|---|---|---:|---:|---:|---:|", *map(row, specs())])
 
 
@@ -63,7 +63,7 @@ def actions(space: gym.Space[Any]) -> str:
         case spaces.Discrete():
             return f"`Discrete({space.n})`"
         case spaces.MultiDiscrete():
-            return f"`MultiDiscrete({space.nvec.tolist()})`"
+            return f"`MultiDiscrete([{space.nvec[0]}] * {len(space.nvec)})`"
     return f"`Box(-1, 1, {space.shape})`"
 
 
@@ -76,7 +76,10 @@ def contracts() -> str:
 def contract(documented: type[Any]) -> str:
     """Docstring one level of headings deeper, without what the page has elsewhere; arguments as a list."""
     head, title, arguments = (inspect.getdoc(documented) or "").partition("## Arguments\n")
-    text = head + title + re.sub(r"^(\w+): ", r"- **\1**: ", arguments, flags=re.MULTILINE)
+    if arguments:
+        named = re.sub(r"^(\w+): ", r"- **\1**: ", arguments, flags=re.MULTILINE)
+        arguments = f"\n<details><summary>What they are</summary>\n\n{named}\n\n</details>\n"
+    text = head + title + arguments
     return DEEPER.sub("##", TERMS.sub("", IDS.sub("", SETTINGS.sub(" those at the top of this page.\n", text))))
 
 
