@@ -17,6 +17,8 @@ DEEPER = re.compile(r"^#", re.MULTILINE)
 SETTINGS = re.compile(r"(?<= are)\n\n\| id .*?\n(?=\n)", re.DOTALL)
 IDS = re.compile(r"\| id .*?\n\n", re.DOTALL)
 """Tables of ids in docstrings, which the page has at its top."""
+FEW = 100
+"""Words of arguments that are not folded."""
 SAID = re.compile(r" \[([\d.]+), \1\]|, (?:less|more) is better")
 """Intervals of length zero, and which numbers are better, in the table of the benchmark."""
 TERMS = re.compile(r"^\| `reward_\w+` +\| float.*\n", re.MULTILINE)
@@ -75,11 +77,13 @@ def contracts() -> str:
 
 def contract(documented: type[Any]) -> str:
     """Docstring one level of headings deeper, without what the page has elsewhere; arguments as a list."""
-    head, title, arguments = (inspect.getdoc(documented) or "").partition("## Arguments\n")
-    if arguments:
-        named = re.sub(r"^(\w+): ", r"- **\1**: ", arguments, flags=re.MULTILINE)
-        arguments = f"\n<details><summary>What they are</summary>\n\n{named}\n\n</details>\n"
-    text = head + title + arguments
+    head, title, arguments = (inspect.getdoc(documented) or "").partition("## Arguments")
+    besides, _, arguments = arguments.partition("\n")
+    named, memory, rest = arguments.partition("\n## ")
+    named = re.sub(r"^(\w+(?:, \w+)*): ", r"- **\1**: ", named, flags=re.MULTILINE)
+    if len(named.split()) > FEW:
+        named = f"\n<details><summary>What they are</summary>\n\n{named}\n\n</details>\n"
+    text = "".join([head, title, besides, "\n", named, memory, rest])
     return DEEPER.sub("##", TERMS.sub("", IDS.sub("", SETTINGS.sub(" those at the top of this page.\n", text))))
 
 

@@ -103,8 +103,8 @@ def timed(periods: tuple[float, ...] = PERIODS) -> str:
     rows = []
     for name in get_args(Fidelity):
         found = [cells(in_time(name, period)) for period in periods]
-        rows.append([f"`{name}`", *(each[k] for k in (0, 1) for each in found)])
-    columns = [f"{what}, {period:g} s" for what in ("random", "repeated") for period in periods]
+        rows.append([f"`{name}`", *(each[k].replace(" %", "") for k in (0, 1) for each in found)])
+    columns = [f"{what}, {period:g} s [%]" for what in ("random", "repeated") for period in periods]
     return markdown(["fidelity", *columns], rows)
 
 

@@ -191,7 +191,7 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     draw_cells(cells, sweeps_of(cells), list(dict.fromkeys(cell.step for cell in cells)), results["scheme"], file)
 
 
-TOLD = ("against", "strokes", "failed", "Newton iterations per step (most)", "substeps")
+TOLD = ("against", "failed", "Newton iterations per step (most)")
 """Columns of the page."""
 
 

@@ -34,7 +34,7 @@ OPTIONAL = "RecurrentPPO"
 """Agent that is not missing where it has not swum: it needs a package of its own."""
 COLUMNS = {
     "greedy": "greedy", "planner": "planner", "adaptive": "adaptive", "informed": "oracle", "PPO": "PPO",
-    "PPO, memory": "PPO, frame stack", "in the box": "bundled",
+    "PPO, memory": "PPO, frame stack", ORDER[-1]: "bundled",
 }  # fmt: skip
 """Agents of the page's table, and their names there."""
 IN_TABLE = {
