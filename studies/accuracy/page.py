@@ -87,14 +87,17 @@ def presets() -> str:
     for name in get_args(Fidelity):
         row = preset(name)
         nodes = f"{row.nodes_per_limb}{'' if row.discretisation == 'continuum' else ', chapter' + chr(39) + 's'}"
-        scheme = row.scheme.replace("-", " ").replace("euler", "Euler")
-        rows.append([
-            f"`{name}`", nodes, f"{scheme}, {1e3 * row.step:g} ms", f"{row.newton_tolerance:.0e}",
+        scheme = row.scheme.replace("implicit-midpoint", "midpoint").replace("implicit-euler", "implicit Euler")
+        numbers = [
             percent(row.space_error), percent(row.time_error),
             f"**{percent(row.errors['random'])}** ({percent(row.typical['random'])})",
             pair(row.errors["repeated"], row.typical["repeated"]),
+        ]  # fmt: skip
+        rows.append([
+            f"`{name}`", nodes, f"{scheme}, {1e3 * row.step:g} ms", f"{row.newton_tolerance:.0e}",
+            *(each.replace(" %", "") for each in numbers),
         ])  # fmt: skip
-    head = ["fidelity", "N", "scheme and step", "Newton tolerance", "space", "time", "path error", "gaits"]
+    head = ["fidelity", "N", "scheme and step", "tolerance", "space [%]", "time [%]", "path error [%]", "gaits [%]"]
     return markdown(head, rows)
 
 

@@ -66,6 +66,19 @@ CONDITIONS = {
     "limbs of 0.5 of the modulus": Condition(modulus=0.5),
     "100 ms late, and 0.7 of the modulus": Condition(delay=0.1, modulus=0.7),
 }
+SHOWN = {
+    "nominal robot, seen at once": "nominal, no delay",
+    "seen 50 ms late": "camera delay 50 ms",
+    "seen 100 ms late": "camera delay 100 ms",
+    "seen 150 ms late": "camera delay 150 ms",
+    "commands 50 ms late": "command delay 50 ms",
+    "places seen with 5 mm of noise": "position noise 5 mm",
+    "velocities seen as zero": "velocities set to zero",
+    "limbs of 0.7 of the modulus": "modulus x 0.7",
+    "limbs of 0.5 of the modulus": "modulus x 0.5",
+    "100 ms late, and 0.7 of the modulus": "camera delay 100 ms, modulus x 0.7",
+}
+"""Names of conditions in the table."""
 OF_SEEDS = ("seen 50 ms late", "seen 100 ms late", "seen 150 ms late", "100 ms late, and 0.7 of the modulus")
 """Conditions that are told of every seed."""
 
@@ -126,7 +139,7 @@ def table(results: Mapping[str, Any]) -> str:
     """Mean times, and how many arrive where not all do."""
     lines = []
     for condition in CONDITIONS:
-        cells = [condition]
+        cells = [SHOWN[condition]]
         for column in PERIODS:
             found = results["policies"][column][condition]
             cells.append("–" if found is None else _cell(found["times"], found["arrived"]))
