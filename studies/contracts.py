@@ -11,10 +11,18 @@ from gymnasium.envs.registration import EnvSpec
 
 import seastar_gym
 from seastar_gym.benchmark import page, results
-from seastar_gym.envs.tasks.envs import CHALLENGES
 from studies.frame import DOCS, Study
 
 DEEPER = re.compile(r"^#", re.MULTILINE)
+SETTINGS = re.compile(r"(?<= are)\n\n\| id .*?\n(?=\n)", re.DOTALL)
+IDS = re.compile(r"\| id .*?\n\n", re.DOTALL)
+"""Tables of ids in docstrings, which the page has at its top."""
+FEW = 100
+"""Words of arguments that are not folded."""
+SAID = re.compile(r" \[([\d.]+), \1\]|, (?:less|more) is better")
+"""Intervals of length zero, and which numbers are better, in the table of the benchmark."""
+TERMS = re.compile(r"^\| `reward_\w+` +\| float.*\n", re.MULTILINE)
+"""Rows of `info` that repeat the table of the reward."""
 
 
 def specs() -> list[EnvSpec]:
@@ -30,19 +38,25 @@ def environment(entry_point: str) -> type[Any]:
 
 def registered() -> str:
     """Table of all ids: what `gym.make` gives by default."""
-    head = "| id | contract | actions | observation | time limit [decisions] | arguments by default |"
-    return "\n".join([head, "|---|---|---|---|---:|---|", *map(row, specs())])
+    head = "| id | contract | actions | numbers seen | decision [s] | limit [decisions] | threshold |"
+    return "\n".join([head, "|---|---|---|---:|---:|---:|---:|", *map(row, specs())])
 
 
 def row(spec: EnvSpec) -> str:
-    """Row of an id. An environment of a task has the contract of its challenge, too."""
+    """Row of an id. An environment of a task has a link to its challenge, whose docstring is the contract."""
     env: Any = gym.make(spec.id, disable_env_checker=True).unwrapped
-    names = [type(env).__name__, *([type(env.challenge).__name__] if hasattr(env, "challenge") else [])]
-    links = ", ".join(f"[{name}](#{name.lower()})" for name in names)
-    arguments = ", ".join(f"`{name}={short(value)}`" for name, value in spec.kwargs.items()) or "-"
     (size,) = env.observation_space.shape
-    limit = spec.max_episode_steps or "-"
-    return f"| `{spec.id}` | {links} | {actions(env.action_space)} | {size} numbers | {limit} | {arguments} |"
+    limit, threshold = (f"{value:g}" if value else "-" for value in (spec.max_episode_steps, spec.reward_threshold))
+    cells = [f"`{spec.id}`", of_class(env), actions(env.action_space), str(size), f"{env.decision_period:g}", limit]
+    return f"| {' | '.join([*cells, threshold])} |"
+
+
+def of_class(env: Any) -> str:
+    """Link to the contract of an environment: a section of the page, or the source of its challenge."""
+    if not hasattr(env, "challenge"):
+        return f"[{type(env).__name__}](#{type(env).__name__.lower()})"
+    challenge = type(env.challenge)
+    return f"[{challenge.__name__}](../{challenge.__module__.replace('.', '/')}.py)"
 
 
 def actions(space: gym.Space[Any]) -> str:
@@ -51,27 +65,35 @@ def actions(space: gym.Space[Any]) -> str:
         case spaces.Discrete():
             return f"`Discrete({space.n})`"
         case spaces.MultiDiscrete():
-            return f"`MultiDiscrete({space.nvec.tolist()})`"
+            return f"`MultiDiscrete([{space.nvec[0]}] * {len(space.nvec)})`"
     return f"`Box(-1, 1, {space.shape})`"
 
 
-def short(value: Any) -> str:
-    """An argument; a part of a scene or a task by the name of its class."""
-    return f"{value['kind']}()" if isinstance(value, dict) else repr(value)
-
-
 def contracts() -> str:
-    """Docstring of every class of environments and of every challenge, once, in a section of its own."""
+    """Docstring of every class of environments, once, in a section of its own."""
     points = [str(point) for spec in specs() for point in (spec.entry_point, spec.vector_entry_point) if point]
-    classes = dict.fromkeys([*map(environment, points), *map(type, CHALLENGES.values())])
-    return "\n\n".join(f"## {each.__name__}\n\n{contract(each)}" for each in classes)
+    return "\n\n".join(f"## {each.__name__}\n\n{contract(each)}" for each in dict.fromkeys(map(environment, points)))
 
 
 def contract(documented: type[Any]) -> str:
-    """Docstring one level of headings deeper; arguments as a list."""
-    head, title, arguments = (inspect.getdoc(documented) or "").partition("## Arguments\n")
-    text = head + title + re.sub(r"^(\w+): ", r"- **\1**: ", arguments, flags=re.MULTILINE)
-    return DEEPER.sub("##", text)
+    """Docstring one level of headings deeper, without what the page has elsewhere; arguments as a list."""
+    head, title, arguments = (inspect.getdoc(documented) or "").partition("## Arguments")
+    besides, _, arguments = arguments.partition("\n")
+    named, memory, rest = arguments.partition("\n## ")
+    named = re.sub(r"^(\w+(?:, \w+)*): ", r"- **\1**: ", named, flags=re.MULTILINE)
+    if len(named.split()) > FEW:
+        named = f"\n<details><summary>What they are</summary>\n\n{named}\n\n</details>\n"
+    text = "".join([head, title, besides, "\n", named, memory, rest])
+    return DEEPER.sub("##", TERMS.sub("", IDS.sub("", SETTINGS.sub(" those at the top of this page.\n", text))))
+
+
+def leaderboard() -> str:
+    """Means, intervals and shares of success of agents that do more than rest, from the committed benchmark."""
+    entries = results.read(DOCS / "leaderboard" / "results.json")
+    lines = [SAID.sub("", line) for line in page.table(entries).splitlines()]
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    chosen = [cells[0].index(name) for name in ("task", "measure", "learned", "greedy")]
+    return "\n".join(f"| {' | '.join(row[k] for k in chosen)} |".replace(", `fast`", "") for row in cells)
 
 
 STUDY = Study(
@@ -79,6 +101,6 @@ STUDY = Study(
     tables={
         "contracts": lambda _: contracts(),
         "environments": lambda _: registered(),
-        "leaderboard": lambda _: page.table(results.read(DOCS / "leaderboard" / "results.json")),
+        "leaderboard": lambda _: leaderboard(),
     },
 )

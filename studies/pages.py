@@ -47,9 +47,9 @@ def show(text: str) -> None:
     Console().print(Markdown(text))
 
 
-def footer_of(file: Path) -> str:
-    """Footer of numbers in a file."""
-    return footer(read(file), file.name)
+def footer_of(docs: Path, names: str) -> str:
+    """Footer of numbers in files of the folder, whose names have spaces between them."""
+    return footer({name: read(docs / name) for name in names.split()})
 
 
 def tables(docs: Path, studies: Sequence[Study]) -> dict[str, Callable[[], str]]:
@@ -59,7 +59,9 @@ def tables(docs: Path, studies: Sequence[Study]) -> dict[str, Callable[[], str]]
         return lambda: text(numbers(docs, study))
 
     found = {name: filling(study, text) for study in studies for name, text in study.tables.items()}
-    return found | {f"footer {file.name}": partial(footer_of, file) for file in docs.glob("*.json")}
+    texts = (file.read_text(encoding="utf-8") for file in docs.glob("*.md"))
+    footers = {name for text in texts for _, name, *_ in BLOCK.findall(text) if name.startswith("footer ")}
+    return found | {name: partial(footer_of, docs, name.removeprefix("footer ")) for name in footers}
 
 
 def filled(text: str, blocks: dict[str, Callable[[], str]], of_all: bool = True) -> str:

@@ -64,17 +64,19 @@ FINAL = {
 """Files of docs/ that are final, and the last commit that has the code of their study."""
 
 
-def footer(results: Mapping[str, Any], file: str) -> str:
-    """Line in Markdown that says how the results in a file were made, and what the run did not record.
+def made_by(results: Mapping[str, Any], file: str) -> str:
+    """Words in Markdown that say how the results in a file were made, and what the run did not record.
 
-    file: Name of the file beside the page.
+    file: Name of the file beside the page, which has the options, the versions and the machine.
     """
-    said = f"*Numbers: [{file}]({file}), made by `{results.get('command', COMMANDS.get(file))}`"
+    command = " ".join(str(results.get("command", COMMANDS.get(file))).split()[:3])
+    said = f"[{file}]({file}) by `{command}`"
     said += f" at commit {FINAL[file]}" if file in FINAL else ""
-    versions = results.get("versions", {})
-    if versions:
-        said += f", with {', '.join(f'{name} {version}' for name, version in versions.items())}"
-    if "machine" in results:
-        said += f", on {results['machine']}"
     missing = " and ".join(name for name in ("versions", "machine") if name not in results)
-    return f"{said}.{f' Not recorded by that run: {missing}.' if missing else ''}*"
+    return f"{said}{f' ({missing} not recorded)' if missing else ''}"
+
+
+def footer(files: Mapping[str, Mapping[str, Any]]) -> str:
+    """Line in Markdown below the numbers of a page. files: Results of files beside the page, by their names."""
+    made = "; ".join(made_by(found, name) for name, found in files.items())
+    return f"*Numbers, with options, versions and machine: {made}.*"

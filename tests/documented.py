@@ -15,7 +15,7 @@ import numpy as np
 from seastar_gym import Numerics, Scene, Sight, Simulator, SmaWires
 from symmetries import symmetry_for
 
-PAGE = Path(__file__).parents[1] / "docs" / "reference_modules.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reference.md"
 NAMES = re.compile(r"^<!-- site: names (\S+) (.*) -->$", re.MULTILINE)
 
 FAST = Scene(numerics=Numerics.preset("fast"))

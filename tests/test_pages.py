@@ -216,6 +216,18 @@ def test_links_lead_to_headings(page):
     assert [(target.name, anchor) for target, anchor in named if anchor not in anchors(target)] == []
 
 
+def words(text: str) -> int:
+    """Words and numbers of prose and tables; not the rules of tables, no comments, no code."""
+    shown = re.sub(r"<!--.*?-->", "", FENCED.sub("", text), flags=re.DOTALL)
+    return sum(any(map(str.isalnum, word)) for word in shown.split())
+
+
+def test_the_guide_is_no_longer_than_a_reader_s_patience():
+    pages = PAGES[1:]
+    assert len(pages) <= 28
+    assert sum(words(page.read_text(encoding="utf-8")) for page in pages) <= 25_000
+
+
 SAID = re.compile(r"docs/(\w+\.md)")
 
 

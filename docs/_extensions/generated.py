@@ -13,12 +13,16 @@ from reference import names, public
 from sphinx.application import Sphinx
 
 DOCS = Path(__file__).resolve().parents[1]
+VERSION = re.compile(r"^## (.*)$", re.MULTILINE)
 MARKER = re.compile(r"^<!-- site: (\w+) ?(.*?) -->$", re.MULTILINE)
 
 
 def changelog() -> str:
-    """CHANGELOG.md without its title, its links from here."""
-    return (DOCS.parent / "CHANGELOG.md").read_text(encoding="utf-8").partition("\n")[2].replace("](docs/", "](")
+    """CHANGELOG.md without its title, its links from here, every version folded under its name."""
+    text = (DOCS.parent / "CHANGELOG.md").read_text(encoding="utf-8").partition("\n")[2].replace("](docs/", "](")
+    first, *rest = VERSION.split(re.sub(r"^###+ (.*)$", r"**\1**", text, flags=re.MULTILINE))
+    parts = zip(rest[::2], rest[1::2], strict=True)
+    return first + "".join(f"<details><summary>{name}</summary>\n{told}\n</details>\n\n" for name, told in parts)
 
 
 def more_pages() -> str:

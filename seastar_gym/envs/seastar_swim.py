@@ -43,10 +43,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `"pairs"`      | `Discrete(1 + n*(n - 1))`   | -      | 0..n*(n-1) | number of a command: none, or a + and a -   |
     | `"continuous"` | `Box(-1, 1, (n,), float32)` | 0..n-1 | -1..1      | limb: share of a full command, + or -       |
 
-    `"pairs"` learns best: with the same training its policies take 172.6 strokes on held-out paths, those of `"limbs"`
-    196.8, since limbs that are drawn one by one do not find gaits that alternate between two pairs (docs/results.md).
-    `"limbs"` is the default because it is the plainest form, for any robot, and results of `SeastarSwim-v0` are
-    comparable only with it; the timed environments, which came later, have `"pairs"`.
+    `"pairs"` learns best: 172.6 strokes on held-out paths, where `"limbs"` takes 196.8 (docs/results.md). `"limbs"` is
+    the default because it is the plainest form, for any robot.
 
     Actions have no unit. `env.command_table[number]` is the command of every limb: 0, 1 (+) or -1 (-). A share is the
     width of the heating pulse, of 0.1 s at most, for wires (`SmaWires`, `ThermalSma`), and scales the rotation of other
@@ -65,7 +63,6 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `SeastarSwimTimedHard-v0`     | 0.1                 | `"pairs"`      | 200            | 2000      | `SmaWires` |
     | `SeastarSwimHeading-v0`       | 0.5                 | `"pairs"`      | 300            | 600       | `SmaWires` |
 
-    The same physics and the same task, with a horizon that is 2, 5 or 10 times as long in decisions.
     `SeastarSwimHeading-v0` asks for headings, along the legs of the path.
 
     ## Headings
@@ -116,8 +113,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | cosine, sine of the turn to the current waypoint's heading  | 1    | -1..1 |
     | cosine, sine of the turn to the next waypoint's heading     | 1    | -1..1 |
 
-    So an observation has 196 numbers in the timed environments, 200 with headings. Nothing else tells the future of the
-    robot, unless decisions are shorter than pulses. `seastar_gym.envs.observation.Layout` names all these places.
+    So an observation has 196 numbers in the timed environments, 200 with headings. It is Markov unless decisions are
+    shorter than heating pulses. `seastar_gym.envs.layout.Layout` names all these places.
 
     ## Sight and delays
     A camera sees less, and late. With `sight`, a `Sight`, an observation follows from the last two pictures that were
@@ -137,10 +134,9 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | mean rate of turn between them, anti-clockwise positive                       | rad/s     | (-inf, inf) |
     | age of the last picture                                                       | s         | 0..         |
 
-    The frame is that of the last picture. k = 10 is that of five limbs. The memory of the actuators is what the driver
-    knows by its own commands; it is not late. `action_delay` is the time from a decision to when wires are heated by
-    it. Rewards and the end of an episode are by the true place. `info` has `sight_age`, and numbers that are drawn by
-    their names, such as `sight.delay` and `action_delay`.
+    The frame is that of the last picture; k = 10 for five limbs. The memory of the actuators follows from the commands
+    and is not late. `action_delay` is the time from a decision to the heating. Rewards and the end of an episode are by
+    the true place. `info` has `sight_age`, and drawn numbers, such as `sight.delay` and `action_delay`.
 
     ## Reward
     The sum of these terms, with the weights of `RewardWeights`; each term is in `info`, too:
@@ -194,17 +190,14 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `reward_effort`          | float      | 1    | term of the reward                                               |
     | `reward_heading`         | float      | 1    | term of the reward, only with `headings`                         |
 
-    `energy_per_metre` is infinite where the route has not become shorter; heat and energy are NaN for actuators that do
-    not say it.
-    Errors from `path_error` to `time_error` were measured before, over sequences of commands that docs/accuracy.md
-    names; among those of `path_error` are the straight swim and the pentagon. They belong to the robot's resolution and
-    the numerics (see `seastar_gym.accuracy`), and are NaN for other robots and scenes than the chapter's, unless
-    a `certificate` has them, and for what was not measured. Where decisions are no strokes, they are those of
-    `SmaWires` at whole seconds, over random commands and random seconds that are repeated; there `info` has them for
-    the chapter's robot alone, at a fidelity and with decisions of 0.1 to 0.5 s, and no `batch_real_time_factor`. That
-    was measured before, too, of robots that fill the lanes of a processor: one robot alone is slower (docs/speed.md).
-    `error_estimate` is of the very swim, of any robot: the true error since the reset, of space and time, lies below it
-    in about 95 % of strokes (docs/numerics.md); NaN after a failure.
+    `energy_per_metre` is infinite where the route has not become shorter; heat and energy are NaN for actuators without
+    a heating power.
+    Errors from `path_error` to `time_error` are those of docs/accuracy.md for the chapter's robot at a fidelity. They
+    are NaN for other robots and scenes, unless a `certificate` has them, and for what was not measured. For timed
+    environments, errors are measured once a second, for decisions of 0.1 to 0.5 s; these have no
+    `batch_real_time_factor`. One robot alone is slower than a batch (docs/speed.md).
+    `error_estimate` is of the current run, of any robot: the true error since the reset, of space and time, lies below
+    it in about 95 % of strokes (docs/numerics.md); NaN after a failure.
     `energy_growth` is 1 in the first 20 strokes; well above 1, time stepping gathers energy (docs/numerics.md). The
     chapter's scene at a fidelity, which gathers none, has no such entry.
     With `randomization`, `info` has the drawn numbers by their names, too.
@@ -232,7 +225,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     certificate: Measured errors of the scene for `info`: a `Certificate`, or the file of one that
         `python -m seastar_gym.certify` wrote. Refused where it is of another scene or version, or decisions are no
         strokes, of which its errors are.
-    error_bars: Whether `info` has `error_estimate`, by a twin of shorter edges and steps that swims along. No bit of a
+    error_bars: Whether `info` has `error_estimate`, by a finer copy of the robot that runs alongside. No bit of a
         trajectory changes, and a step takes four to five times as long.
     decision_period: Time between decisions [s]. None means a stroke, the period of the actuator. Other than 1 s, and
         without a `scene`, the chapter's robot has `SmaWires`. A time in which limbs would not come to rest is refused

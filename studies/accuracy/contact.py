@@ -113,17 +113,14 @@ def run(_: InDocs, results: Results) -> None:
 
 
 def table(results: Mapping[str, Any]) -> str:
-    """Table of all contacts in Markdown."""
+    """Table of the contacts that were examined as a whole in Markdown."""
     nodes = " | ".join(f"N = {n}" for n in NODES)
     lines = [
         f"| contact | {nodes} | `certify` | from the default's path | thrown, m/s | cost |",
         f"|---|{'---:|' * (len(NODES) + 4)}",
     ]
-    for name in sorted(KINDS | BETWEEN, key=_layer):
+    for name in sorted(KINDS, key=_layer):
         bounds, speed = (results[what][name] for what in ("bounds", "thrown"))
-        if name in BETWEEN:
-            lines.append(f"| `{name}` | {'| ' * len(NODES)}{_percent(bounds)} | | {speed:g} | |")
-            continue
         row = results["contacts"][name]
         each = [f"{_percent(row['largest'][str(n)])}, {_percent(row['median'][str(n)])}" for n in NODES]
         away = ", ".join(map(_percent, reversed(row["away"])))
@@ -135,7 +132,7 @@ def table(results: Mapping[str, Any]) -> str:
 
 def _layer(name: str) -> float:
     """Layer of a contact by its name [m]; 0 for others, which come first."""
-    return (KINDS | BETWEEN)[name].layer or 0.0
+    return KINDS[name].layer or 0.0
 
 
 def _percent(share: float | None) -> str:

@@ -87,16 +87,18 @@ def presets() -> str:
     for name in get_args(Fidelity):
         row = preset(name)
         nodes = f"{row.nodes_per_limb}{'' if row.discretisation == 'continuum' else ', chapter' + chr(39) + 's'}"
-        scheme = row.scheme.replace("-", " ").replace("euler", "Euler")
-        rows.append([
-            f"`{name}`", nodes, f"{scheme}, {1e3 * row.step:g} ms", f"{row.newton_tolerance:.0e}",
+        scheme = row.scheme.replace("implicit-midpoint", "midpoint").replace("implicit-euler", "implicit Euler")
+        numbers = [
             percent(row.space_error), percent(row.time_error),
             f"**{percent(row.errors['random'])}** ({percent(row.typical['random'])})",
-            pair(row.errors["repeated"], row.typical["repeated"]), pair(row.errors["small"], row.typical["small"]),
-            percent(row.errors["straight"]), f"{row.speed:,.0f}",
+            pair(row.errors["repeated"], row.typical["repeated"]),
+        ]  # fmt: skip
+        rows.append([
+            f"`{name}`", nodes, f"{scheme}, {1e3 * row.step:g} ms", f"{row.newton_tolerance:.0e}",
+            *(each.replace(" %", "") for each in numbers),
         ])  # fmt: skip
-    head = ["fidelity", "N", "scheme and step", "Newton tolerance", "space", "time", "path error", "gaits", "slow"]
-    return markdown([*head, "straight", "x real time"], rows)
+    head = ["fidelity", "N", "scheme and step", "tolerance", "space [%]", "time [%]", "path error [%]", "gaits [%]"]
+    return markdown(head, rows)
 
 
 def timed(periods: tuple[float, ...] = PERIODS) -> str:
@@ -104,8 +106,8 @@ def timed(periods: tuple[float, ...] = PERIODS) -> str:
     rows = []
     for name in get_args(Fidelity):
         found = [cells(in_time(name, period)) for period in periods]
-        rows.append([f"`{name}`", *(each[k] for k in (0, 1) for each in found)])
-    columns = [f"{what}, {period:g} s" for what in ("random", "repeated") for period in periods]
+        rows.append([f"`{name}`", *(each[k].replace(" %", "") for k in (0, 1) for each in found)])
+    columns = [f"{what}, {period:g} s [%]" for what in ("random", "repeated") for period in periods]
     return markdown(["fidelity", *columns], rows)
 
 

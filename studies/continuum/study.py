@@ -111,16 +111,27 @@ def rows_of(results: Mapping[str, Any]) -> list[Row]:
     return [Row(**{**row, "errors": np.array(row["errors"])}) for row in results["rows"]]
 
 
+TOLD = (10, 37)
+"""Nodes per limb of the table."""
+
+
 def table(results: Mapping[str, Any]) -> str:
-    """Table of errors and orders in Markdown."""
-    lines = [
-        f"| scene | discretisation | {' | '.join(f'N = {n}' for n in NODES)} | order |",
-        f"|---|---|{'---:|' * (len(NODES) + 1)}",
-    ]
-    for row in rows_of(results):
-        errors = " | ".join(f"{PERCENT * each:.2g}" for each in row.errors)
-        lines.append(f"| {row.name} | {row.discretisation} | {errors} | {row.order:.1f} |")
-    return "\n".join(lines)
+    """Errors [%] and orders of all scenes in Markdown, both discretisations side by side."""
+    kinds = ("continuum", "chapter")
+    head = [f"{kind}, N = {n}" if n == TOLD[0] else str(n) for kind in kinds for n in (*TOLD, "order")]
+    lines = [["scene", *head], ["---", *["---:"] * len(head)]]
+    found = {(row.name, row.discretisation): row for row in rows_of(results)}
+    for name in dict.fromkeys(name for name, _ in found):
+        rows = [found.get((name, kind)) for kind in kinds]
+        lines.append([name, *(cell for row in rows for cell in _cells(row))])
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _cells(row: Row | None) -> list[str]:
+    if row is None:
+        return [""] * (len(TOLD) + 1)
+    errors = dict(zip(NODES, row.errors, strict=True))
+    return [*(f"{PERCENT * errors[n]:.2g}" for n in TOLD), f"{row.order:.1f}"]
 
 
 def draw(rows: list[Row], path: Path) -> None:

@@ -90,18 +90,16 @@ def told(certificate: Certificate) -> Table:
 def table(found: Table) -> str:
     """Table in Markdown of all robots and settings."""
     lines = [
-        "| robot | setting | error, repeated | median, repeated | error, all classes | energy after 200 strokes "
-        "| mm/s |",
-        "|---|---|---:|---:|---:|---:|---:|",
+        "| robot | setting | repeated [%] | median [%] | all [%] | energy |",
+        "|---|---|---:|---:|---:|---:|",
     ]
     for name, robot in found["robots"].items():
         for nodes, step in zip(NODES, STEPS, strict=True):
             setting = f"{nodes} nodes, {1e3 * step:g} ms"
             row = robot[setting]
             lines.append(
-                f"| {name} | {setting} | {row['repeated_percent']:g} % | {row['typical_percent']:g} % "
-                f"| {row['promised_percent']:g} % "
-                f"| x {row['energy_growth']:g} | {row['mm_per_s']:.2f} |"
+                f"| {name} | {setting} | {row['repeated_percent']:g} | {row['typical_percent']:g} "
+                f"| {row['promised_percent']:g} | {row['energy_growth']:g} |"
             )
     return "\n".join(lines)
 

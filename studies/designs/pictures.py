@@ -40,20 +40,19 @@ CHAPTER = {
 def robots(found: dict[str, Any]) -> str:
     """Table in Markdown of the best robots: speeds [mm/s] at three fidelities, and work and moment at `reference`."""
     lines = [
-        "| robot | limbs | radius, root to tip | length | modulus | peak angle | `fast` | `balanced` | `reference` "
-        "| work per stroke | peak moment | work per metre |",
-        "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
+        "| robot | limbs | radius [mm] | length [mm] | modulus [MPa] | angle [rad] | `fast` | `balanced` | `reference` "
+        "| work [mJ] | moment [mN m] |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]
     for name, label in ROBOTS.items():
         row = CHAPTER | found[name]
         root, tip = row["root_radius_mm"], row["taper"] * row["root_radius_mm"]
-        radius = f"{root:g} mm" if row["taper"] == 1.0 else f"{root:g} to {tip:.3g} mm"
+        radius = f"{root:g}" if row["taper"] == 1.0 else f"{root:g} to {tip:.3g}"
         speeds = " | ".join(f"{speed:.2f}" for speed in row["mm_per_s"].values())
         lines.append(
-            f"| {label} | {row['n_limbs']} | {radius} | {row['limb_length_mm']:.0f} mm "
-            f"| {row['youngs_modulus_MPa']:.2g} MPa | {row['peak_angle_rad']:.3f} | {speeds} "
-            f"| {row['mJ_per_stroke']['reference']:.3g} mJ | {row['peak_mN_m']['reference']:.3g} mN m "
-            f"| {row['J_per_metre']:.3g} J |"
+            f"| {label} | {row['n_limbs']} | {radius} | {row['limb_length_mm']:.0f} "
+            f"| {row['youngs_modulus_MPa']:.2g} | {row['peak_angle_rad']:.3f} | {speeds} "
+            f"| {row['mJ_per_stroke']['reference']:.3g} | {row['peak_mN_m']['reference']:.3g} |"
         )
     return "\n".join(lines)
 

@@ -183,11 +183,10 @@ def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
 
 def table(results: Mapping[str, Any]) -> str:
     """Table of scenes in Markdown: pictures, code and costs."""
-    lines = ["| | scene | cost | Newton iterations per step |", "|---|---|---:|---:|"]
+    lines = ["| | scene | cost |", "|---|---|---:|"]
     for exhibit in exhibits():
-        picture, found = f"![{exhibit.name}](gallery/{_file_name(exhibit)})", results["scenes"][exhibit.name]
-        numbers = f"{found['cost']:.2f} | {found['iterations_per_step']:.2f}"
-        lines.append(f"| {picture} | **{exhibit.name}**<br>`{exhibit.code}` | {numbers} |")
+        picture, cost = f"![{exhibit.name}](gallery/{_file_name(exhibit)})", results["scenes"][exhibit.name]["cost"]
+        lines.append(f"| {picture} | **{exhibit.name}**<br>`{exhibit.code}` | {cost:.2f} |")
     return "\n".join(lines)
 
 

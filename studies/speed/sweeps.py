@@ -131,9 +131,9 @@ def reckon(found: dict[str, Any], workers: int) -> dict[str, object]:
 
 def table(found: dict[str, Any]) -> str:
     """Table in Markdown of what NODES nodes would do with cells of several sizes."""
-    lines = ["| cell | its time [s] | nodes busy | strokes per second | limit |", "|---|---:|---:|---:|---|"]
+    lines = ["| batch | its time [s] | nodes busy | strokes per second | limit |", "|---|---:|---:|---:|---|"]
     for name, row in found[f"reckoned: {NODES} such nodes"].items():
-        limit = "the workers" if row["nodes kept busy"] >= NODES else "the process that gives cells"
+        limit = "the workers" if row["nodes kept busy"] >= NODES else "the process that hands out batches"
         lines.append(
             f"| {name.removeprefix('a cell ')} | {row['time of a cell [s]']:.2g} | {row['nodes kept busy']:.2g} "
             f"| {round(row['strokes per second'], -2):,.0f} | {limit} |"

@@ -191,10 +191,18 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     draw_cells(cells, sweeps_of(cells), list(dict.fromkeys(cell.step for cell in cells)), results["scheme"], file)
 
 
+TOLD = ("against", "failed", "Newton iterations per step (most)")
+"""Columns of the page."""
+
+
 def table(results: Mapping[str, Any]) -> str:
-    """The summary in Markdown, from plain data."""
+    """Some columns of the summary in Markdown, from plain data."""
     cells = from_data(results)
-    return as_markdown(summarise(cells, sweeps_of(cells)))
+    rows = [list(SUMMARY), *summarise(cells, sweeps_of(cells))]
+    kept = [SUMMARY.index(name) for name in TOLD]
+    lines = [[row[k] for k in kept] for row in rows]
+    lines[1:1] = [["---", *["---:"] * (len(TOLD) - 1)]]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 STUDY = Study(

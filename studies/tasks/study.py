@@ -23,13 +23,14 @@ from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.evaluation.measures import measure_of_challenge
 from seastar_gym.evaluation.rollout import Episodes
 from seastar_gym.scene.numerics import Fidelity
-from studies.frame import DOCS, Results, Study, require_known
+from studies.frame import Results, Study, require_known
 from studies.tasks import heading
 from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
 from studies.tasks.episodes import swim
 from studies.tasks.learning import ALL_LEARNERS, evaluate, train
-from studies.tasks.page import draw, page
+from studies.tasks.page import draw, means, table
 from studies.tasks.rows import rows_of
+from studies.tasks.verdicts import verdicts
 
 IDS: dict[str, str] = {id: about[0] for id, about in TASKS.items()} | {heading.ID: "heading"}
 """Name of the challenge of every id."""
@@ -58,7 +59,7 @@ class Options:
     num_threads: int | None = None
     """Threads of the simulator; all processors by default."""
     out: Path = Path("docs/tasks.json")
-    """File of the results. The page and the picture have the same name with the suffixes .md and .png."""
+    """File of the results. The picture has the same name with the suffix .png."""
 
     def __post_init__(self) -> None:
         require_known("task", self.ids, IDS)
@@ -106,7 +107,7 @@ def cell(id: str, agent: str, seed: int, options: Options) -> dict[str, Any]:
 
 
 def study(options: Options, results: Results) -> None:
-    """Swim the cells that are missing."""
+    """Swim the cells that are missing, and print all tasks."""
     cells = {
         ("cells", f"{id}, {agent}, {seed}"): partial(cell, id, agent, seed, options)
         for seed, id, agent in itertools.product(options.seeds, options.ids, options.agents)
@@ -115,6 +116,7 @@ def study(options: Options, results: Results) -> None:
     results.fill(
         cells, lambda found: f"{np.mean(found['measure']):.2f}", lambda found: len(found["measure"]) >= options.episodes
     )
+    print(*(table(row, has_cell) for row in rows_of(results, IDS)), sep="\n\n")
 
 
 STUDY = Study(
@@ -124,6 +126,9 @@ STUDY = Study(
     "tasks.json",
     settings=lambda options: {name: getattr(options, name) for name in ("decisions", "fidelity")},
     pictures={"tasks.png": lambda results, file: draw(rows_of(results, IDS), file)},
-    pages={"tasks.md": lambda results: page(results, IDS, DOCS / "tasks.png", has_cell)},
+    tables={
+        "tasks": lambda results: means(rows_of(results, IDS)),
+        "tasks verdicts": lambda results: verdicts(rows_of(results, IDS)).partition("\n\n")[2],
+    },
     packages=("torch", "stable_baselines3"),
 )

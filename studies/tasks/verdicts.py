@@ -49,9 +49,9 @@ def _in_the_box(rows: Sequence[Row]) -> str:
     ahead = [row for row in rows if row.is_ahead(BUNDLED, *RULES)]
     also = [row for row in ahead if row.is_ahead(BUNDLED, TOLD)]
     return (
-        f"Six times the training is worth more than a memory alone on {trained} of {len(rows)} tasks. Policies in the "
-        f"box beat every rule that is not told what is hidden on {_names(ahead)}, and also the one that is told on "
-        f"{_names(also)}. Elsewhere rules that remember or plan are ahead."
+        f"Six times the training is worth more than a frame stack alone on {trained} of {len(rows)} tasks. Bundled "
+        f"policies beat every rule that is not told what is hidden on {_names(ahead)}, and also the one that is told "
+        f"on {_names(also)}. Elsewhere rules that remember or plan are ahead."
     )
 
 

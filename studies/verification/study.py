@@ -15,7 +15,7 @@ from studies.pages import show
 from studies.verification.drag import quadratic_drag
 from studies.verification.elastica import elastica
 from studies.verification.frequencies import natural_frequencies
-from studies.verification.page import Section, as_page
+from studies.verification.page import Section, as_page, as_table
 from studies.verification.published import published_codes
 from studies.verification.waves import bending_waves
 
@@ -45,7 +45,8 @@ def run(options: Options, _: Results) -> str | None:
     options.out.parent.mkdir(parents=True, exist_ok=True)
     before = options.out.read_text(encoding="utf-8") if options.out.exists() else ""
     options.out.write_text(as_page(sections) + "".join(before.partition(BESIDE)[1:]), encoding="utf-8")
-    show(as_page(sections))
+    for section in sections:
+        show(f"## {section.title}\n\n{as_table(section.rows)}")
     print(f"Written: {options.out}")
     outside = [row.quantity for section in sections for row in section.rows if not row.holds]
     return f"Outside of their bounds: {'; '.join(outside)}." if outside else None

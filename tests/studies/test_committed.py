@@ -88,14 +88,14 @@ def test_every_picture_is_made_of_its_numbers_or_by_a_study_or_is_final():
 
 def test_every_file_of_numbers_has_a_footer():
     text = "".join(file.read_text(encoding="utf-8") for file in DOCS.glob("*.md"))
-    assert [file.name for file in DOCS.glob("*.json") if f"*Numbers: [{file.name}]" not in text] == []
+    assert [file.name for file in DOCS.glob("*.json") if f"[{file.name}]({file.name}) by `" not in text] == []
 
 
 def test_the_page_of_environments_holds_every_contract():
     """On GitHub as on the site: ids, spaces, observation, reward, info."""
     text = (DOCS / "environments.md").read_text(encoding="utf-8")
     for id in task_ids():
-        assert f"| `{id}` | [Seastar" in text
+        assert f"| `{id}` | [" in text
     parts = dict(re.findall(r"^## (Seastar\w*Env)\n(.*?)(?=^## |\Z)", text, re.DOTALL | re.MULTILINE))
     for name in ("SeastarSwimEnv", "SeastarSwimVectorEnv", "SeastarTaskEnv", "SeastarTaskVectorEnv"):
         assert name in parts
@@ -124,13 +124,13 @@ def test_stale_pages_are_named_and_filled(tmp_path, capsys):
     assert check(tmp_path, alone) == 0
 
 
-def test_footers_say_command_versions_and_machine_and_what_is_not_known():
+def test_footers_say_files_and_commands_and_what_is_not_known():
     made = provenance("python -m studies.luck", "scipy")
-    line = footer(made, "luck.json")
-    assert "made by `python -m studies.luck`" in line and f"seastar-gym {__version__}, python 3." in line
-    assert f"numpy {np.__version__}" in line and "scipy " in line and f"on {machine()}" in line
-    assert "Not recorded" not in line
-    assert footer({"command": "x", "machine": "y"}, "luck.json").endswith("Not recorded by that run: versions.*")
+    assert made["versions"]["seastar-gym"] == __version__ and "scipy" in made["versions"]
+    assert made["machine"] == machine()
+    line = footer({"luck.json": made, "hub.json": {"command": "x", "machine": "y"}})
+    assert "[luck.json](luck.json) by `python -m studies.luck`; [hub.json](hub.json) by `x` at commit 71299f4" in line
+    assert line.endswith("(versions not recorded).*")
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/accuracy.md"])

@@ -81,7 +81,7 @@ def test_the_study_writes_its_figures_and_picture(tmp_path):
 def test_the_page_has_the_strokes_of_the_policies_that_were_counted():
     docs = Path(__file__).resolve().parents[2] / "docs"
     counted = json.loads((docs / "limbs.json").read_text(encoding="utf-8"))["strokes_round_the_pentagon"]
-    page = (docs / "measurements.md").read_text(encoding="utf-8")
+    page = (docs / "validation.md").read_text(encoding="utf-8")
     for limb, strokes in counted.items():
         name = "the chapter's pulse" if limb == "pulse" else limb
         cells = ["-" if n is None else str(n) for n in (strokes["learned"], strokes["pentagon"])]

@@ -30,7 +30,7 @@ from studies.tasks.controllers import (
     straight_on,
 )
 from studies.tasks.episodes import swim
-from studies.tasks.page import page, table
+from studies.tasks.page import means, table
 from studies.tasks.rounds import BestRound, MostPerMetre
 from studies.tasks.rows import Row, rows_of
 from studies.tasks.study import Options, has_cell
@@ -357,7 +357,7 @@ def test_nobody_waits_for_agents_that_a_task_has_not():
     assert "Not swum yet: rest; planner; informed; PPO; PPO, memory; bundled." in table(row_, has_cell)
 
 
-def test_the_study_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
+def test_the_study_goes_on_where_it_was_broken_off(tmp_path, monkeypatch, capsys):
     swum = []
 
     def cell(id, agent, seed, options):
@@ -377,20 +377,15 @@ def test_the_study_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
     assert json.loads(out.read_text())["versions"]["torch"]
     assert main([*arguments, "--episodes", "2", "--seeds", "0"]) == 0
     assert swum[4:] == [("SeastarPrey-v0", "greedy", 0)]  # one episode is fewer than two
-    assert "## SeastarPrey-v0" in out.with_suffix(".md").read_text() and out.with_suffix(".png").is_file()
+    assert "## SeastarPrey-v0" in capsys.readouterr().out and out.with_suffix(".png").is_file()
     (found,) = rows_of(json.loads(out.read_text()), module.IDS)
     assert [values.tolist() for values in found.agents["PPO"]] == [[3.0], [4.0]]
 
 
-def test_the_page_shows_the_pictures_that_there_are(tmp_path):
-    results = {"settings": {"decisions": 1, "fidelity": "fast"}, "cells": {}}
-    for id in ("SeastarPrey-v0", "SeastarPreyTimed-v0", "SeastarStation-v0"):
-        results["cells"][f"{id}, greedy, 0"] = {"measure": [1.0, 2.0]}
-    (tmp_path / "tasks").mkdir()
-    picture = tmp_path / "page.png"
-    assert "studies.tasks.pictures" not in page(results, module.IDS, picture, has_cell)
-    Image.fromarray(np.zeros((2, 2, 3), np.uint8)).save(tmp_path / "tasks" / "prey.png")
-    assert "| ![prey](tasks/prey.png) |  |" in page(results, module.IDS, picture, has_cell)
+def test_the_page_has_a_row_of_means_for_every_task_with_a_greedy_agent():
+    first = row("miswired", greedy=400.0, informed=200.0)._replace(id="SeastarMiswired-v0")
+    rows = means([first, row("prey", rest=1.0)]).splitlines()
+    assert rows[2:] == ["| `Miswired` | time [s] | 400 |  |  | 200 |  |  |  |"]
 
 
 def test_a_picture_shows_an_episode_of_every_task(tmp_path, monkeypatch):

@@ -27,7 +27,7 @@ from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
 from studies.frame import Results, Study, require_known
 from studies.learning.timed.pictures import draw
-from studies.learning.timed.tables import as_markdown
+from studies.learning.timed.tables import summary
 from studies.learning.timed.trainings import TRAININGS, learn
 
 
@@ -116,6 +116,6 @@ STUDY = Study(
     "in_time.json",
     settings=lambda options: {name: getattr(options, name) for name in ("decisions", "fidelity", "paths")},
     pictures={"in_time.png": lambda results, file: draw(results["runs"], file)},
-    tables={"in_time": lambda results: as_markdown(results["runs"])},
+    tables={"in_time": lambda results: summary(results["runs"])},
     packages=("torch", "stable_baselines3"),
 )

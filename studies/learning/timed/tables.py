@@ -44,6 +44,25 @@ def _row(name: str, runs: Runs) -> str:
     return f"| {' | '.join(cells)} |"
 
 
+def summary(runs: Mapping[str, Runs]) -> str:
+    """The page's part of this in Markdown: means, and the fastest and the slowest seed."""
+    lines = ["| training | seeds | pentagon, `fast` [s] | all seeds | `balanced` [s] | held-out paths [s] | J/m |",
+             "|---|---:|---:|---:|---:|---:|---:|"]  # fmt: skip
+    for name, found in runs.items():
+        fast, balanced = (_all(found, "pentagon", fidelity, "seconds") for fidelity in ("fast", "balanced"))
+        if fast:
+            span = f"{min(fast):.1f} to {max(fast):.1f}" if len(fast) > 1 else ""
+            heat = f"{np.mean(_all(found, 'pentagon', 'fast', 'energy_J')) / PENTAGON:.0f}"
+            cells = [str(len(found)), _interval(fast), span, _mean(balanced),
+                     _mean(_all(found, "held_out", "seconds")), heat]  # fmt: skip
+            lines.append(f"| {' | '.join([name, *cells])} |")
+    return "\n".join(lines)
+
+
+def _mean(values: list[float]) -> str:
+    return f"{np.mean(values):.1f}" if values else ""
+
+
 def pulses_per_metre(joules: Iterable[float]) -> float:
     """Mean number of pulses per metre of the pentagon [1/m] of swims that took this heat [J]."""
     return float(np.mean(list(joules))) / JOULES / PENTAGON

@@ -1,0 +1,15 @@
+/* The search of the guide: words in a title count, and pages that few ask for come last. .ci/search.py does the same. */
+var LAST = /^(changelog|contributing|reference|numerics|equations|verification|extending)$/;
+var ASKED = (new URLSearchParams(location.search).get("q") || "").toLowerCase().match(/\w{3,}/g) || [];
+var Scorer = {
+  score: (result) =>
+    result[4] + ASKED.filter((word) => result[1].toLowerCase().includes(word)).length - (LAST.test(result[0]) ? 20 : 0),
+  objNameMatch: 11,
+  objPartialMatch: 6,
+  objPrio: { 0: 15, 1: 5, 2: -5 },
+  objPrioDefault: 0,
+  title: 15,
+  partialTitle: 7,
+  term: 5,
+  partialTerm: 2,
+};
