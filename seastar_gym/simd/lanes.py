@@ -190,7 +190,7 @@ class _AbsentModel(models.DataModel):
         return ir.Constant(NOTHING, None)
 
 
-class Bundle(types.NamedTuple):
+class Bundle(types.containers.NamedTuple):
     """A borrowed named tuple. It goes to another kernel as one value, where numba's own would go member by member, each
     taken out and put in again: half of all that is compiled. Nor does anybody look in it for arrays to count."""
 
