@@ -141,7 +141,7 @@ def test_importing_the_package_leaves_out_what_it_does_not_need():
 
 @pytest.mark.parametrize(
     "code, most",
-    [("import seastar_gym", 4), ("from seastar_gym.controllers import load; load()", 42)],
+    [("import seastar_gym", 4), ("from seastar_gym.controllers import load; load()", 43)],
     ids=["the package", "a policy"],
 )
 def test_what_needs_no_compiler_loads_none(code, most):
