@@ -9,10 +9,10 @@
                                            --strokes
 
 Every run has a folder with the policy, the learner and its checkpoints, the options and the command, TensorBoard logs,
-and the comparison with its table, pictures, videos and report.html. With --ship the policy becomes the one in the box,
-if it is no worse.
+and the comparison with its table, pictures, videos and report.html. With --publish the policy becomes the bundled
+one, if it is no worse.
 
-Exit status: 0 done; 1 a file could not be written, or the policy was not put in the box; 2 wrong options; 130 stopped.
+Exit status: 0 done; 1 a file could not be written, or the policy was not published; 2 wrong options; 130 stopped.
 """
 
 import shlex
@@ -33,11 +33,11 @@ try:
     from agents.learner_file import resume
     from agents.ppo import make_model, make_training_env, require_device
     from agents.training import efficiency
-    from agents.training.box import put_in_the_box
     from agents.training.filming import filmed_beside
     from agents.training.folder import export, held, is_unbegun, recorded, resume_command, write_config
     from agents.training.interruption import Interruption
     from agents.training.options import Options, config_of, read_options, require_consent
+    from agents.training.publishing import publish
     from agents.training.robot import Robot, asked_for, keep, physics, robot_of
     from agents.training.watch import Watch
     from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
@@ -202,13 +202,13 @@ def train_beside(film: Callable[[], Path | None], options: Options, folder: Path
         print(
             f"Stopped after {model.num_timesteps} strokes; {folder / 'model.zip'} is the policy so far. Continue with"
         )
-        asked = ["--ship"] * options.ship + ["--ship-anyway"] * options.ship_anyway
+        asked = ["--publish"] * options.publish + ["--publish-anyway"] * options.publish_anyway
         print(" ".join(["   ", resume_command(folder), *asked]))
         return 130
     compare(options, folder, describe(options, folder, model.num_timesteps, watch), film)
     print(f"Report:  {folder / 'evaluation' / 'report.html'}\nPolicy:  {folder / 'policy.safetensors'}")
     print(f"Logs:    tensorboard --logdir {folder}\n{watch.efficiency}")
-    return put_in_the_box(options, folder) if options.ship else 0
+    return publish(options, folder) if options.publish else 0
 
 
 @contextmanager

@@ -1,8 +1,8 @@
-"""Model cards: what a policy in the box is, how it was trained and how it swims, as Markdown beside its file.
+"""Model cards: what a bundled policy is, how it was trained and how it swims, as Markdown beside its file.
 
     python -m agents.cards
 
-measures every policy in the box and writes its card anew; `python train.py --ship` does so for the one that it ships.
+measures every bundled policy and writes its card anew; `python train.py --publish` does so for its own.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ import numpy as np
 import tyro
 
 from seastar_gym.command import answered, run_command
-from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, load
+from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, load
 from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 from seastar_gym.evaluation.swim import TIME_LIMIT, Swim
@@ -23,7 +23,7 @@ from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity
 
 HELD_OUT_PATHS = 64
-"""Number of random paths that a card counts, those on which `train.py --ship` compares policies."""
+"""Number of random paths that a card counts, those on which `train.py --publish` compares policies."""
 FIDELITIES: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
 CHEAP: tuple[Fidelity, ...] = ("fast", "balanced")
 """Fidelities at which held-out paths are swum."""
@@ -144,7 +144,7 @@ class Options:
     """Measure policies and write their cards beside them."""
 
     policies: tuple[Path, ...] = ()
-    """Files of policies (.safetensors); by default all in the box."""
+    """Files of policies (.safetensors); by default all bundled ones."""
     num_threads: int | None = None
     """Threads of the simulator; by default one for every processor."""
 
@@ -154,7 +154,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = tyro.cli(Options, prog="python -m agents.cards", args=arguments)
 
     def write_all() -> None:
-        for file in options.policies or sorted(SHIPPED.parent.glob("*.safetensors")):
+        for file in options.policies or sorted(BUNDLED.parent.glob("*.safetensors")):
             print(write_card(file, options.num_threads), flush=True)
 
     return answered(write_all)

@@ -15,7 +15,7 @@ from agents.ppo import actor, describe
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.layout import Layout
-from seastar_gym.envs.symmetry import Symmetry, VectorMemory
+from seastar_gym.envs.symmetry import Symmetry, VectorFrameStack
 from seastar_gym.scene.checks import require_count, require_kind
 
 ROUND = 32
@@ -58,21 +58,21 @@ class Teacher:
 
 
 def distil(
-    teacher: LearnedPolicy, batch: VectorMemory, decisions: int, seed: int, hidden: tuple[int, ...] = (128, 128)
+    teacher: LearnedPolicy, batch: VectorFrameStack, decisions: int, seed: int, hidden: tuple[int, ...] = (128, 128)
 ) -> LearnedPolicy:
     """Policy that has learned from a teacher in a batch in autoreset mode SAME_STEP, which is closed then.
 
     decisions: Length of the training, all robots together. seed: Of the network, the exploration and the episodes.
     hidden: Widths of the hidden layers.
     """
-    require_kind("batch", batch, VectorMemory, "a VectorMemory")
+    require_kind("batch", batch, VectorFrameStack, "a VectorFrameStack")
     require_count("decisions", decisions, 1, 10**8)
-    inner, guide = batch.unwrapped, Teacher(teacher, batch.recollection.symmetry)
+    inner, guide = batch.unwrapped, Teacher(teacher, batch.frame_stack.symmetry)
     if teacher.description.layout != Layout.of(inner.scene):  # type: ignore[attr-defined]
         raise ValueError("The teacher does not see what this batch's robots would show without a Sight.")
     rng = np.random.default_rng(seed)
     torch.manual_seed(seed)
-    network = _network((batch.recollection.size, *hidden, guide.n_actions))
+    network = _network((batch.frame_stack.size, *hidden, guide.n_actions))
     adam = torch.optim.Adam(network.parameters())
     rounds = max(1, decisions // (ROUND * batch.num_envs))
     seen, told = list[torch.Tensor](), list[torch.Tensor]()

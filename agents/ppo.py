@@ -14,12 +14,12 @@ from stable_baselines3.common.utils import LinearSchedule
 from agents.coasting import WAYPOINT_RADIUS, CoastingProgress, fit_coasting
 from agents.hyperparameters import Hyperparameters
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.controllers import learner_zip
+from seastar_gym.controllers import checkpoint
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, Weights
-from seastar_gym.controllers.roster import task_of
+from seastar_gym.controllers.registry import task_of
 from seastar_gym.envs.options import Path as SwimPath
-from seastar_gym.envs.symmetry import VectorMemory, VectorSymmetryReduction, observed_mirror
+from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction, observed_mirror
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.checks import require_count, require_kind, shown
@@ -99,11 +99,11 @@ def require_device(device: str) -> None:
 def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
     """Description of a policy with these widths of hidden layers that learns in an environment."""
     batch: Any = env.env.unwrapped
-    memory = next((layer for layer in env.layers() if isinstance(layer, VectorMemory)), None)
+    memory = next((layer for layer in env.layers() if isinstance(layer, VectorFrameStack)), None)
     symmetry = memory is not None or env.env_is_wrapped(VectorSymmetryReduction)[0]
     in_strokes = batch.decision_period == batch.scene.actuator.period
     about = Description(batch.actions, symmetry, batch.scene, hidden, None if in_strokes else batch.decision_period)
-    past = 0 if memory is None else memory.recollection.past
+    past = 0 if memory is None else memory.frame_stack.past
     at = batch.layout
     about = about._replace(past=past, entries=at.entries, shows_limbs=at.shows_limbs, stations=at.stations)
     if not isinstance(batch, SeastarTaskVectorEnv):
@@ -123,4 +123,4 @@ def policy_of(model: PPO) -> LearnedPolicy:
 
 def actor(weights: Mapping[str, torch.Tensor]) -> Weights:
     """Weights of the policy in Stable-Baselines3's network, under the names of `LearnedPolicy`."""
-    return learner_zip.actor({name: tensor.detach().cpu().numpy().copy() for name, tensor in weights.items()})
+    return checkpoint.actor({name: tensor.detach().cpu().numpy().copy() for name, tensor in weights.items()})

@@ -1,11 +1,11 @@
-"""The ten lines of README: the policy in the box swims round the pentagon, in a window."""
+"""The ten lines of README: the bundled policy swims round the pentagon, in a window."""
 
 import gymnasium as gym
 
 import seastar_gym  # noqa: F401, registers the environments
-from seastar_gym.controllers import in_the_box, load
+from seastar_gym.controllers import pretrained
 
-policy = load(in_the_box(0.2))  # trained for decisions every 0.2 s; numpy runs it
+policy = pretrained("timed-0.2s")  # trained for decisions every 0.2 s; numpy runs it
 env = gym.make("SeastarSwimTimedModerate-v0", actions=policy.actions, render_mode="human")
 observation, info = env.reset(seed=0)
 terminated = truncated = False

@@ -14,7 +14,7 @@ from seastar_gym.lazy import lazily
 if TYPE_CHECKING:
     from seastar_gym.accuracy.certificate import Certificate as Certificate
     from seastar_gym.accuracy.measure import certify as certify
-    from seastar_gym.envs.headings import Headings as Headings
+    from seastar_gym.envs.headings import HeadingTargets as HeadingTargets
     from seastar_gym.envs.randomization import DomainRandomization as DomainRandomization
     from seastar_gym.envs.randomization import LogUniform as LogUniform
     from seastar_gym.envs.randomization import Normal as Normal

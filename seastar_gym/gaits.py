@@ -7,6 +7,7 @@ anti-clockwise. In time, a stroke is a decision, and the share is that of a puls
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym import renamed
 from seastar_gym.scene.checks import (
     as_finite,
     is_whole_number,
@@ -72,6 +73,8 @@ LAG, THRIFTY_LAG = 0.6, 0.5
 """Best time from one pair of the lagged gait to the other [s], for full pulses and for those of the thrifty gait."""
 THRIFTY_LEVEL = 0.6
 """Share of a full pulse in the thrifty gait."""
+__getattr__ = renamed.names_of(__name__)
+
 MOST_DECISIONS = 1_000_000
 """Most strokes of a side of the pentagon, and most numbers of strokes that are written as decisions."""
 SHORTEST = 1e-3
@@ -83,7 +86,7 @@ LAGGED_SIDES, LAGGED_REST = {0.5: 22, 0.6: 20}, 2
 are still rotated turn the robot at every corner, by 4 degrees."""
 
 
-def in_time(strokes: Floats, decision_period: float) -> Floats:
+def timed(strokes: Floats, decision_period: float) -> Floats:
     """Strokes of a second each as decisions, shape (n_decisions, n_limbs): no commands between those of the strokes."""
     every = decisions_per_second(decision_period)
     strokes = as_finite("strokes", strokes, (None, None))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from studies.kept import keep
+from studies.results_file import keep
 
 DOCS = Path(__file__).parents[1] / "docs"
 

@@ -18,7 +18,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym import DomainRandomization, Headings, Sight, Uniform
+from seastar_gym import DomainRandomization, HeadingTargets, Sight, Uniform
 from seastar_gym.envs.buffers import Buffers
 from seastar_gym.scene import (
     AlongLimb,
@@ -38,7 +38,7 @@ from seastar_gym.scene.numerics import Fidelity, SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study, require_known
-from studies.kept import rounded
+from studies.results_file import rounded
 from studies.speed.operations import count_operations, numbers_moved
 from studies.speed.terms import scenes as scenes_of_terms
 from studies.style import CYCLE, FAINT, subplots
@@ -136,7 +136,7 @@ def environments() -> dict[str, dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {
         "pairs": {"actions": "pairs"},
         "continuous": {"actions": "continuous", "random_heading": True, "autoreset_mode": "SameStep"},
-        "headings": {"headings": Headings("random"), "autoreset_mode": "SameStep"},
+        "headings": {"headings": HeadingTargets("random"), "autoreset_mode": "SameStep"},
         "camera": {"sight": Sight(10.0, delay=0.1, noise=1e-3)},
         "timed": {"decision_period": 0.2},
         "numbers of each robot": {"randomization": numbers, "autoreset_mode": "SameStep"},

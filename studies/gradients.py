@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from seastar_gym.controllers.learned import in_the_box, load
+from seastar_gym.controllers.learned import bundled_file, load
 from seastar_gym.envs.commands import to_commands
-from seastar_gym.gaits import PAIRS, STRAIGHT, in_time, lagged_gait, pentagon_gait
+from seastar_gym.gaits import PAIRS, STRAIGHT, lagged_gait, pentagon_gait, timed
 from seastar_gym.scene import Contact, Scene, SmaWires, Vortex, Water
 from seastar_gym.simulator import Simulator
 from studies.frame import InDocs, Results, Study
-from studies.kept import rounded
+from studies.results_file import rounded
 from studies.style import DPI, INK, subplots
 
 Floats = NDArray[np.float64]
@@ -77,7 +77,7 @@ def gaits(strokes: int, swims: int, rng: np.random.Generator) -> Floats:
 def lagged(decisions: int, swims: int, rng: np.random.Generator) -> Floats:
     """The lagged gait and, as decisions, the straight swim."""
     seconds = decisions // 5
-    straight = in_time(np.tile(STRAIGHT, (seconds, 1)), 0.2)
+    straight = timed(np.tile(STRAIGHT, (seconds, 1)), 0.2)
     return np.stack([np.tile(lagged_gait(0.2), (seconds, 1)), straight], axis=1)
 
 
@@ -89,7 +89,7 @@ def of_policy(decision_period: float | None) -> Commands:
         name = "SeastarSwim-v0" if decision_period is None else "SeastarSwimTimed-v0"
         options: dict[str, Any] = {"path": "random", "actions": "pairs", **timed}
         batch = gym.make_vec(name, swims, vectorization_mode="vector_entry_point", **options)
-        policy, (seen, _) = load(in_the_box(decision_period)), batch.reset(seed=0)
+        policy, (seen, _) = load(bundled_file(decision_period)), batch.reset(seed=0)
         state, begins, told = None, np.ones(swims, bool), []
         for _ in range(decisions):
             actions, state = policy.predict(seen, state=state, episode_start=begins, deterministic=True)

@@ -27,10 +27,10 @@ from agents.ppo import make_model, make_training_env, policy_of
 from agents.tasks.learning import ENOUGH, PAST
 from seastar_gym import DomainRandomization, Limb, Scene, Seastar, Sight, Simulator, SmaWires, Strip, Uniform, Water
 from seastar_gym.controllers.contract import Policy
-from seastar_gym.controllers.learned import LearnedPolicy, in_the_box, load
+from seastar_gym.controllers.learned import LearnedPolicy, bundled_file, load
 from seastar_gym.controllers.scripted import GAITS as SCRIPTED
 from seastar_gym.controllers.scripted import scripted
-from seastar_gym.envs.symmetry import VectorMemory
+from seastar_gym.envs.symmetry import VectorFrameStack
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.identify import Measurement, identify
 from seastar_gym.plant.guard import Limits
@@ -253,7 +253,7 @@ def teach(results: Mapping[str, Any]) -> LearnedPolicy:
         path="random", random_heading=True, sight=sight, randomization=draws, threads=1,
         autoreset_mode=AutoresetMode.SAME_STEP, max_episode_steps=ppo.max_episode_steps,
     )  # fmt: skip
-    return distil(policy_of(teacher), VectorMemory(batch, PAST), ENOUGH, 0)
+    return distil(policy_of(teacher), VectorFrameStack(batch, PAST), ENOUGH, 0)
 
 
 def run_to_the_end(policy: Policy, scene: Scene, path: str, seed: int) -> float:
@@ -276,7 +276,7 @@ def runs(results: Mapping[str, Any]) -> dict[str, Any]:
     """Times [s] of RUNS swims along every path by the policies, and by the script, which knows the pentagon alone."""
     scene, found = written_down(results), dict[str, Any]()
     policies: dict[str, Policy] = {
-        "trained on the fit": teach(results), "bundled": load(in_the_box(PERIOD, task="sim-to-real")),
+        "trained on the fit": teach(results), "bundled": load(bundled_file(PERIOD, task="sim-to-real")),
         "script": scripted("lagged-pentagon", "pairs", decision_period=PERIOD),
     }  # fmt: skip
     for name, policy in policies.items():

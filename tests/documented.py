@@ -26,7 +26,7 @@ MOTIVE = (
     "Frame,Time (Seconds),X,Y,Z\n0,0,1,2,3\n"
 )
 MADE_BY_THE_PACKAGE = {
-    "Setting", "Episode", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Tally",
+    "Setting", "Episode", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Progress",
     "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
     "Plant", "PlantError", "Sighting", "Derivatives", "Motion",
 }  # fmt: skip
@@ -89,7 +89,7 @@ def training_env() -> Any:
 @cache
 def of_batch(name: str, mode: str = "NextStep") -> Any:
     """A wrapper of a batch after its reset."""
-    more = {"past": 1} if name == "VectorMemory" else {}
+    more = {"past": 1} if name == "VectorFrameStack" else {}
     made = named(name)(batch(mode, actions="pairs"), **more)
     made.reset()
     return made
@@ -160,7 +160,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     gaits = {"n_limbs": 5}
     for name, arguments in {
         "decisions_per_second": dict(decision_period=0.5),
-        "in_time": dict(strokes=np.zeros((2, 5)), decision_period=0.5),
+        "timed": dict(strokes=np.zeros((2, 5)), decision_period=0.5),
         "lagged_gait": dict(decision_period=0.1, n_limbs=5, lag=0.6, level=1.0),
         "lagged_pentagon": dict(decision_period=0.1),
         "pair_gait": dict(plus=1, minus=2, n_limbs=5),
@@ -176,17 +176,17 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "SimulatedPlant": dict(simulator=Simulator(WIRES), sight=Sight(), seed=0, paced=False),
         "PlantSwim": dict(plant=named("SimulatedPlant")(Simulator(WIRES)), limits=named("Limits")(), logs=None,
                           render_mode=None, frames_per_stroke=None, decision_period=0.5, scene=WIRES),
-        "Recollection": dict(symmetry=symmetry_for(5), past=1),
+        "FrameStack": dict(symmetry=symmetry_for(5), past=1),
         "Symmetry": dict(group=5, mirror=(), layout=named("Layout")(5), actions="limbs"),
-        "VectorMemory": dict(env=batch(), past=1),
+        "VectorFrameStack": dict(env=batch(), past=1),
         "memory_mirror": dict(actuator=FAST.actuator),
         "symmetry_of": dict(scene=FAST),
         "GoalForm": dict(env=env()),
         "GreedyPolicy": dict(scene=FAST, waypoint_radius=0.01, decision_period=None),
         "LearnedPolicy": dict(description=learned().description, weights=learned().weights, training=None, rng=None),
         "Planner": dict(scene=FAST, waypoint_radius=0.01, budget=None, threads=1, decision_period=None, headings=None),
-        "in_the_box": dict(decision_period=None, task=None),
-        "load": dict(path=named("in_the_box")(None)),
+        "bundled_file": dict(decision_period=None, task=None),
+        "load": dict(path=named("bundled_file")(None)),
         "load_agent": dict(name="straight", env=env(), seed=0),
         "load_agents": dict(names=["straight"], seed=0, fidelity="fast", decision_period=None, scene=FAST),
         "scripted": dict(name="straight", actions=None, n_limbs=5, rng=None, decision_period=None),
@@ -207,9 +207,9 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "with_parameters": dict(scene=FAST, names=["fluid.density"], values=[900.0]),
         "Choices": dict(name="robot.n_limbs", values=(3, 4), labels=()),
         "Range": dict(name="robot.limb_length", low=0.1, high=0.2, is_log=False),
-        "Course": dict(path=PATH, seconds=1.0, decision_period=None),
+        "Route": dict(path=PATH, seconds=1.0, decision_period=None),
         "Sweep": dict(scene=FAST, axes=(), gait="straight", settling=0, measured=1, samples=0, seed=0, robots=1),
-        "read_parts": dict(folder=folder()),
+        "read_results": dict(folder=folder()),
         "Processes": dict(workers=1),
         "Recorder": dict(env=batch()),
         "BatchVecEnv": dict(env=batch("SameStep")),
@@ -252,7 +252,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     yield "Range", named("Range")("a", 0.0, 1.0).spaced, dict(n=3)
     yield "Range", named("Range")("a", 0.0, 1.0).at, dict(share=0.5)
     yield "Buffers", lambda out: batch_to_step().step(np.zeros((2, 5), int), out=out), dict(out=None)
-    for name in ("VectorMemory", "Recorder"):
+    for name in ("VectorFrameStack", "Recorder"):
         yield name, of_batch(name).reset, dict(seed=0, options=None)
         yield name, of_batch(name).step, dict(actions=np.zeros(2, int))
     yield "BatchVecEnv", of_batch("BatchVecEnv", "SameStep").step, dict(actions=np.zeros(2, int))

@@ -47,7 +47,7 @@ ACTUATORS = {
     "thermal": ThermalSma(austenite_finish=70.1),
     "thermal with a limit": ThermalSma(largest_temperature=60.0 + 1 / 3, heating_power=1 / 3),
     "wires": SmaWires(0.3 + 1e-16, 1 / 7, 6 / 7, period=1 / 3),
-    "deaf wires of each robot": SmaWires(0.5 * EACH, deaf=True),
+    "refractory wires of each robot": SmaWires(0.5 * EACH, refractory=True),
     "measured limb": SmaLimb.preset(20, period=1 / 3),
     "measured limbs of each robot": SmaLimb(0.5 * EACH, rise=9.0 * EACH, time_constant=0.7 * EACH),
     "thermal of each robot": ThermalSma(water_temperature=20.0 + EACH),

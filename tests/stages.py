@@ -11,8 +11,8 @@ from hubs import robot_with
 from oracle import Star
 from seastar_gym import Scene, Seastar, SmaPulse, Water
 from seastar_gym.der.body.body import freeze_body, move_roots, place_roots
+from seastar_gym.der.contact.broad_phase import freeze_contact
 from seastar_gym.der.contact.coupled import solve_coupled
-from seastar_gym.der.contact.near_pairs import freeze_contact
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import Rods, Work, make_work
 from seastar_gym.der.stepping.newton import move_along

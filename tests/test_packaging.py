@@ -106,6 +106,17 @@ def test_every_base_dependency_is_imported_by_the_package():
     assert names(requirements()) <= imports_of(ROOT / "seastar_gym")
 
 
+def test_every_extra_is_in_the_table_of_the_guide():
+    text = (ROOT / "docs" / "start.md").read_text(encoding="utf-8")
+    (table,) = re.findall(r"^\| extra \| for \|\n\|[-|]+\|\n((?:\|.*\n)+)", text, re.MULTILINE)
+    rows = [row.split("|")[1:3] for row in table.splitlines()]
+    names_and_uses = {name.strip(" `"): use for name, use in rows if name.strip() != "none"}
+    assert len(names_and_uses) == len(rows) - 1 and set(names_and_uses) == set(PROJECT["optional-dependencies"])
+    for extra, lines in PROJECT["optional-dependencies"].items():
+        brought = {part for line in map(Requirement, lines) if line.name == PROJECT["name"] for part in line.extras}
+        assert brought == set(re.findall(r"`([a-z-]+)`", names_and_uses[extra].partition("with ")[2])), extra
+
+
 @pytest.mark.parametrize(
     ("folders", "extras"),
     [
@@ -130,7 +141,7 @@ def test_importing_the_package_leaves_out_what_it_does_not_need():
 
 @pytest.mark.parametrize(
     "code, most",
-    [("import seastar_gym", 4), ("from seastar_gym.controllers import load; load()", 42)],
+    [("import seastar_gym", 4), ("from seastar_gym.controllers import load; load()", 43)],
     ids=["the package", "a policy"],
 )
 def test_what_needs_no_compiler_loads_none(code, most):

@@ -147,7 +147,7 @@ def scenes_of_pages(tmp_path, monkeypatch):
 def test_lines_that_certify_find_a_setting_as_pages_say(line):
     """Of two sequences per class."""
     assert command.main([*shlex.split(line), "--samples", "2"]) == 0
-    assert any(each.endures for each in Certificate.load("certificate.json").settings)
+    assert any(each.is_energy_stable for each in Certificate.load("certificate.json").settings)
 
 
 @pytest.mark.usefixtures("scenes_of_pages", "one_setting")

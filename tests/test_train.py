@@ -26,15 +26,14 @@ import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 import train
-from agents.training import box as shipping
-from agents.training import efficiency, filming
+from agents.training import efficiency, filming, publishing
 from agents.training.efficiency import Efficiency
 from agents.training.folder import held, recorded
 from agents.training.options import Options, read_options, saved_options
 from agents.training.robot import robot_of
 from seastar_gym import DomainRandomization, Numerics, Scene, Seastar, Uniform
 from seastar_gym.controllers import learned as policies
-from seastar_gym.controllers.learner_zip import load
+from seastar_gym.controllers.checkpoint import load
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import part_name
 
@@ -179,7 +178,7 @@ def test_the_exported_policy_is_the_model_s(finished):
     assert policy.training["commands"] == config["commands"]
     assert policy.training["versions"] == config["versions"]
     assert (policy.training["seed"], policy.training["strokes"]) == (4, 512)
-    assert [trained for trained, *_ in policy.training["progress"]] == [256, 512]
+    assert [trained for trained, *_ in policy.training["progress"]] == [0, 256, 512]
 
 
 @pytest.fixture
@@ -191,11 +190,11 @@ def short_cards(monkeypatch):
 
 def test_one_option_puts_the_policy_in_the_box(finished, tmp_path, monkeypatch, short_cards):
     shutil.copytree(finished, tmp_path / "tiny")
-    monkeypatch.setattr(shipping, "SHIPPED", tmp_path / "box" / "seastar.safetensors")
+    monkeypatch.setattr(publishing, "BUNDLED", tmp_path / "box" / "strokes.safetensors")
     assert train.main(["--resume", str(tmp_path / "tiny")]) == 0
     assert not (tmp_path / "box").exists()
-    assert train.main(["--resume", str(tmp_path / "tiny"), "--ship"]) == 0
-    shipped = policies.load(tmp_path / "box" / "seastar.safetensors")
+    assert train.main(["--resume", str(tmp_path / "tiny"), "--publish"]) == 0
+    shipped = policies.load(tmp_path / "box" / "strokes.safetensors")
     assert shipped.training["seed"] == 4
 
 
@@ -210,7 +209,7 @@ def test_a_finished_run_can_be_trained_for_more_strokes(finished, tmp_path, caps
     steps = [step for step, _ in scalars(folder)["time/fps"]]
     assert steps == sorted(steps) and steps[-1] == 768
     trained = np.loadtxt(folder / "progress.csv", delimiter=",")[:, 0]
-    np.testing.assert_array_equal(trained, [256, 512, 768])
+    np.testing.assert_array_equal(trained, [0, 256, 512, 768])
     capsys.readouterr()
     for option in (["--seed", "5"], ["--learning-rate", "0.1"], ["--path", "pentagon"]):
         assert train.main(["--resume", str(folder), *option]) == 2
@@ -222,7 +221,7 @@ ENDLESS = [*TINY, "--strokes", "10000000", "--out"]
 
 def first_checkpoint(folder):
     deadline = time.monotonic() + 120
-    while not (folder / "progress.csv").exists() and time.monotonic() < deadline:
+    while not (folder / "checkpoints").exists() and time.monotonic() < deadline:
         time.sleep(0.1)
 
 
@@ -411,7 +410,8 @@ def test_a_damaged_folder_is_refused_in_a_sentence(damage, finished, tmp_path, c
 def test_a_checkpoint_that_a_kill_cut_short_is_completed(finished, tmp_path):
     folder = tmp_path / "tiny"
     shutil.copytree(finished, folder)
-    (folder / "progress.csv").write_text((finished / "progress.csv").read_text().splitlines()[0] + "\n")
+    lines = (finished / "progress.csv").read_text().splitlines()
+    (folder / "progress.csv").write_text("\n".join(lines[:-1]) + "\n")
     (folder / "checkpoints" / "model_000000512.zip").unlink()
     assert train.main(["--resume", str(folder)]) == 0
     assert (folder / "progress.csv").read_text() == (finished / "progress.csv").read_text()
@@ -474,15 +474,15 @@ def test_a_device_that_is_not_there_is_refused_before_anything_is_written(tmp_pa
     assert refused.value.code == 2
 
 
-# The policy in the box
+# The bundled policy
 
 
 @pytest.fixture
 def box(tmp_path, monkeypatch):
     """The box with the policy that swims best, to be overwritten without regret."""
-    file = tmp_path / "box" / "seastar.safetensors"
-    shutil.copytree(policies.SHIPPED.parent, file.parent)
-    monkeypatch.setattr(shipping, "SHIPPED", file)
+    file = tmp_path / "box" / "strokes.safetensors"
+    shutil.copytree(policies.BUNDLED.parent, file.parent)
+    monkeypatch.setattr(publishing, "BUNDLED", file)
     return file
 
 
@@ -490,13 +490,13 @@ def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_pa
     folder = tmp_path / "tiny"
     shutil.copytree(finished, folder)
     before = box.read_bytes()
-    assert train.main(["--resume", str(folder), "--ship"]) == 1
+    assert train.main(["--resume", str(folder), "--publish"]) == 1
     printed = capsys.readouterr().err
     assert re.search(r"stays: it takes 1[0-9.]+ strokes on 64 held-out random paths, the new one [0-9.]+", printed)
-    assert f"--resume {folder} --ship --ship-anyway" in printed
+    assert f"--resume {folder} --publish --publish-anyway" in printed
     assert box.read_bytes() == before
     assert train.main(["--resume", str(folder)]) == 0 and box.read_bytes() == before
-    assert train.main(["--resume", str(folder), "--ship", "--ship-anyway"]) == 0
+    assert train.main(["--resume", str(folder), "--publish", "--publish-anyway"]) == 0
     assert policies.load(box).training["seed"] == 4
     card = box.with_suffix(".md").read_text(encoding="utf-8")
     assert hashlib.sha256(box.read_bytes()).hexdigest() in card and "seed: 4" in card and "processors" in card
@@ -504,21 +504,21 @@ def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_pa
 
 
 def test_a_policy_no_worse_than_that_in_the_box_needs_no_second_word(finished, box, monkeypatch):
-    monkeypatch.setattr(shipping, "HELD_OUT_PATHS", 2)
+    monkeypatch.setattr(publishing, "HELD_OUT_PATHS", 2)
     policies.save(policies.load(finished / "policy.safetensors"), box)
-    assert shipping.why_not(policies.load(finished / "policy.safetensors"), saved_options(finished)) is None
+    assert publishing.why_not(policies.load(finished / "policy.safetensors"), saved_options(finished)) is None
 
 
 def test_a_box_that_cannot_be_read_is_not_overwritten_at_once(finished, box):
     box.write_bytes(b"")
     policy, options = policies.load(finished / "policy.safetensors"), saved_options(finished)
-    assert "nothing to compare with" in shipping.why_not(policy, options)
+    assert "nothing to compare with" in publishing.why_not(policy, options)
 
 
 def test_a_quick_run_is_asked_twice_before_it_begins(tmp_path, capsys):
-    assert train.main(["--quick", "--ship", "--out", str(tmp_path / "run")]) == 2
-    assert_one_sentence(capsys, "only with --ship-anyway")
-    assert train.main(["--ship-anyway", "--out", str(tmp_path / "run")]) == 2
+    assert train.main(["--quick", "--publish", "--out", str(tmp_path / "run")]) == 2
+    assert_one_sentence(capsys, "only with --publish-anyway")
+    assert train.main(["--publish-anyway", "--out", str(tmp_path / "run")]) == 2
     assert_one_sentence(capsys, "give both")
     assert not (tmp_path / "run").exists()
 
@@ -584,7 +584,7 @@ def test_several_seeds_are_runs_of_their_own(tmp_path, capsys, short_swims):
     table = capsys.readouterr().out.splitlines()[-3:]
     assert table[0].startswith("seed, strokes round the pentagon") and [line[0] for line in table[1:]] == ["3", "4"]
     assert train.main(["--resume", str(tmp_path / "seed_3"), "--strokes", "256"]) == 0
-    for wrong in (["--seeds", "1", "1"], ["--seeds", "1", "--ship"]):
+    for wrong in (["--seeds", "1", "1"], ["--seeds", "1", "--publish"]):
         with pytest.raises(SystemExit):
             train.main([*TINY, *wrong])
 
@@ -667,12 +667,12 @@ def test_a_timed_training_is_evaluated_and_kept_in_its_own_decisions(tmp_path, m
     assert float(rows["learned"]["simulated_time_s"]) <= 400.0
     assert "--decision-period 0.5" in (folder / "evaluation" / "report.html").read_text()
     assert saved_options(folder).ppo.decision_period == 0.5
-    monkeypatch.setattr(shipping, "SHIPPED", tmp_path / "box" / "seastar.safetensors")
-    monkeypatch.setattr(shipping, "HELD_OUT_PATHS", 2)
-    assert train.main(["--resume", str(folder), "--ship"]) == 0
-    shipped = policies.in_the_box(0.5, tmp_path / "box" / "seastar.safetensors")
+    monkeypatch.setattr(publishing, "BUNDLED", tmp_path / "box" / "strokes.safetensors")
+    monkeypatch.setattr(publishing, "HELD_OUT_PATHS", 2)
+    assert train.main(["--resume", str(folder), "--publish"]) == 0
+    shipped = policies.bundled_file(0.5, tmp_path / "box" / "strokes.safetensors")
     assert policies.load(shipped).decision_period == 0.5
-    assert shipping.why_not(policy, saved_options(folder)) is None
+    assert publishing.why_not(policy, saved_options(folder)) is None
 
 
 def test_decisions_of_no_gait_are_evaluated_without_a_script():

@@ -6,7 +6,7 @@ import numpy as np
 
 from oracle import Star
 from seastar_gym import Contact, Scene, Seastar, SmaPulse
-from seastar_gym.der.contact.near_pairs import freeze_contact
+from seastar_gym.der.contact.broad_phase import freeze_contact
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles

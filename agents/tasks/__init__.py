@@ -1,1 +1,1 @@
-"""Training on the tasks whose headroom is measured: hyperparameters of each, memory, and the policies in the box."""
+"""Training on the tasks whose headroom is measured: hyperparameters of each, memory, and the bundled policies."""

@@ -3,7 +3,7 @@
     python -m agents.tasks
 
 PPO is trained on a task's split "train". Of several seeds, the one with the largest mean return in other episodes of
-that split goes into the box, with a card that says how it swims the split "test". The policies in the box are those of
+that split is published, with a card that says how it swims the split "test". The bundled policies are those of
 seed 0; that of `SeastarStation-v0` is the better of two.
 """
 
@@ -33,7 +33,7 @@ from seastar_gym.scene.numerics import Fidelity
 OTHERS = {"obst-trap": "PPO, memory, told the way", "sim-to-real": IMITATION}
 """Learners of challenges that a memory alone does not serve best."""
 RECIPES: dict[str, str] = {id: OTHERS.get(about[0], "PPO, memory") for id, about in TASKS.items()}
-"""Learner of every task that has a policy in the box."""
+"""Learner of every task that has a bundled policy."""
 VALIDATION = 64
 """Episodes of the split "train" by which seeds are compared."""
 FAR_SEED = 10**6
@@ -47,7 +47,7 @@ class Options:
     ids: tuple[str, ...] = tuple(RECIPES)
     """Environments."""
     seeds: tuple[int, ...] = (0, 1)
-    """Seeds of the trainings, of which the best goes into the box."""
+    """Seeds of the trainings, of which the best is published."""
     decisions: int = 1_200_000
     """Length of every training [decisions]."""
     fidelity: Fidelity = "fast"
@@ -61,7 +61,7 @@ class Options:
 
     def __post_init__(self) -> None:
         if unknown := set(self.ids) - set(RECIPES):
-            raise ValueError(f"{min(unknown)!r} has no policy in the box: choose of {', '.join(RECIPES)}.")
+            raise ValueError(f"{min(unknown)!r} has no bundled policy: choose of {', '.join(RECIPES)}.")
         require_count("decisions", self.decisions, 1, 10**9)
         if not self.seeds:
             raise ValueError("There must be at least one seed.")
@@ -99,7 +99,7 @@ def validated(id: str, policy: LearnedPolicy, options: Options) -> float:
     return float(np.mean(swum.returns))
 
 
-def put_in_the_box(id: str, options: Options, command: str) -> Path:
+def publish(id: str, options: Options, command: str) -> Path:
     """Train the seeds of a task, and keep the best; returns the policy's file."""
     found = []
     for seed in options.seeds:
@@ -132,7 +132,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = tyro.cli(Options, prog="python -m agents.tasks", args=given)
         for id in options.ids:
             if not options.cards_only:
-                put_in_the_box(id, options, shlex.join(["python", "-m", "agents.tasks", *given]))
+                publish(id, options, shlex.join(["python", "-m", "agents.tasks", *given]))
             file = file_of(id, options.out)
             print(write_card(id, load(file), file), flush=True)
 

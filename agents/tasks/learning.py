@@ -15,8 +15,8 @@ from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model
 from seastar_gym import TASKS
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.controllers.learned import LearnedPolicy, in_the_box, load
-from seastar_gym.envs.symmetry import VectorMemory, VectorSymmetryReduction
+from seastar_gym.controllers.learned import LearnedPolicy, bundled_file, load
+from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
 from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.evaluation.tasks import make_batch
 from seastar_gym.scene.numerics import Fidelity
@@ -60,7 +60,7 @@ class Learner(NamedTuple):
             coasting = fit_coasting(inner.scene, inner.decision_period, np.random.default_rng(0))
             batch = CoastingProgress(batch, coasting, inner.challenge.reward)
         if self.past:
-            return VectorMemory(batch, self.past)
+            return VectorFrameStack(batch, self.past)
         return VectorSymmetryReduction(batch) if self.symmetric else batch
 
     def arguments(self) -> dict[str, Any]:
@@ -122,4 +122,4 @@ def imitate(id: str, seed: int, decisions: int, fidelity: Fidelity, threads: int
         autoreset_mode=AutoresetMode.SAME_STEP,
     )  # fmt: skip
     period = float(batch.unwrapped.decision_period)  # type: ignore[attr-defined]
-    return distil(load(in_the_box(period)), VectorMemory(batch, PAST), decisions, seed)
+    return distil(load(bundled_file(period)), VectorFrameStack(batch, PAST), decisions, seed)

@@ -1,1 +1,1 @@
-"""Parts of a training run by `train.py`: its options, its folder, what watches it, and the policy in the box."""
+"""Parts of a training run by `train.py`: its options, its folder, what watches it, and the bundled policy."""

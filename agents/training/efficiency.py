@@ -38,6 +38,11 @@ class Efficiency:
             return now
         return replace(now, strokes_to_target=strokes, seconds_to_target=seconds)
 
+    @property
+    def progress(self) -> str:
+        """How long the training was until now."""
+        return f"{self.strokes} decisions, {self.seconds:.0f} s of training"
+
     def __str__(self) -> str:
         if self.strokes_to_target is None:
             return f"The pentagon was not rounded in {TARGET:g} s yet."

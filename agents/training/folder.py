@@ -122,7 +122,8 @@ def recorded(folder: Path) -> list[list[int]]:
 
 def is_unbegun(folder: Path) -> bool:
     """Whether a run was stopped before its first checkpoint, so that continuing it begins anew."""
-    return not any((folder / name).exists() for name in ("model.zip", "checkpoints", "progress.csv"))
+    has_learned = any(strokes > 0 for strokes, *_ in recorded(folder))
+    return not has_learned and not any((folder / name).exists() for name in ("model.zip", "checkpoints"))
 
 
 def resume_command(folder: Path) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import tyro
 
 from agents.hyperparameters import Hyperparameters
-from seastar_gym import RewardWeights
+from seastar_gym import RewardWeights, renamed
 from seastar_gym.controllers.learned import reason_of
 from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
@@ -80,15 +80,15 @@ class Options(Lengths):
     """Write videos of the swims of the comparison."""
     out: Path | None = None
     """Folder of the run; by default a folder in runs/ named after the time."""
-    ship: bool = False
-    """Make the trained policy the one in the box, the default of `seastar evaluate`, unless that one needs fewer
+    publish: bool = False
+    """Make the trained policy the bundled one, the default of `seastar evaluate`, unless that one needs fewer
     strokes on held-out random paths."""
-    ship_anyway: bool = False
-    """Confirm --ship for a worse policy, or for that of a --quick run."""
+    publish_anyway: bool = False
+    """Confirm --publish for a worse policy, or for that of a --quick run."""
     resume: Path | None = None
-    """Folder of a run to continue with its own options; strokes, num_threads, device, save_freq, video and ship may
-    differ. It is safe to continue a run of others: its files are read as JSON and tensors, and nothing is unpickled.
-    Stable-Baselines3's own PPO.load, however, would execute code in its model.zip."""
+    """Folder of a run to continue with its own options; strokes, num_threads, device, save_freq, video and publish
+    may differ. It is safe to continue a run of others: its files are read as JSON and tensors, and nothing is
+    unpickled. Stable-Baselines3's own PPO.load, however, would execute code in its model.zip."""
     quick: bool = False
     """Train for 32,768 strokes at fidelity "fast": a third of the default training."""
     ppo: Annotated[Hyperparameters, tyro.conf.arg(name="")] = Hyperparameters()
@@ -103,19 +103,22 @@ class Options(Lengths):
         require_choice("device", self.device, ("cpu", "cuda", "auto"))
         for name in ("random_heading", "video", "quick"):
             require_flag(name, getattr(self, name))
-        if self.seeds and (self.resume is not None or self.ship or len(set(self.seeds)) < len(self.seeds)):
-            raise ValueError("--seeds are different ones of new runs, without --resume and --ship.")
-        if self.ship and not (self.scene is None and self.intervals is None):
-            raise ValueError("--ship is for policies of the chapter's robot, without --scene and --intervals.")
+        if self.seeds and (self.resume is not None or self.publish or len(set(self.seeds)) < len(self.seeds)):
+            raise ValueError("--seeds are different ones of new runs, without --resume and --publish.")
+        if self.publish and not (self.scene is None and self.intervals is None):
+            raise ValueError("--publish is for policies of the chapter's robot, without --scene and --intervals.")
         make_path(self.path, np.random.default_rng(0))
 
 
-CHANGEABLE = {"strokes", "num_threads", "device", "save_freq", "video", "ship", "ship_anyway", "out", "resume", "quick"}
+CHANGEABLE = {
+    "strokes", "num_threads", "device", "save_freq", "video", "publish", "publish_anyway", "out", "resume", "quick",
+}  # fmt: skip
 """Names of the options that may change when a run is continued."""
 
 
 def read_options(arguments: Sequence[str]) -> Options:
     """Options of the command line; with --resume, those of the run where the command line has no others."""
+    arguments = renamed.options(arguments)
     options = tyro.cli(Options, prog="python train.py", args=arguments)
     if options.resume is None:
         return replace(options, strokes=32_768, fidelity="fast") if options.quick else options
@@ -128,11 +131,11 @@ def read_options(arguments: Sequence[str]) -> Options:
 
 
 def saved_options(folder: Path) -> Options:
-    """Options of the run in a folder, without --ship, which has to be asked for again."""
-    options = config_of(folder)["options"]
+    """Options of the run in a folder, without --publish, which has to be asked for again."""
+    options = renamed.fields("Options", config_of(folder)["options"])
     with faults_of(folder / CONFIG):
         here: dict[str, Any] = {"out": folder, "resume": None, "ppo": hyperparameters_of(options), "seeds": ()}
-        here |= {"ship": False, "ship_anyway": False}
+        here |= {"publish": False, "publish_anyway": False}
         here |= {name: Path(options[name]) for name in ("scene", "intervals") if options.get(name) is not None}
         return Options(**{**options, **here})
 
@@ -169,8 +172,8 @@ def faults_of(file: Path) -> Iterator[None]:
 
 
 def require_consent(options: Options) -> None:
-    """ValueError where --ship is not confirmed for the policy of a --quick run, or is confirmed but not asked for."""
-    if options.ship_anyway and not options.ship:
-        raise ValueError("--ship-anyway confirms --ship: give both.")
-    if options.ship and options.quick and not options.ship_anyway:
-        raise ValueError("A --quick run replaces the policy in the box only with --ship-anyway beside --ship.")
+    """ValueError where --publish is not confirmed for the policy of a --quick run, or is confirmed without it."""
+    if options.publish_anyway and not options.publish:
+        raise ValueError("--publish-anyway confirms --publish: give both.")
+    if options.publish and options.quick and not options.publish_anyway:
+        raise ValueError("A --quick run replaces the bundled policy only with --publish-anyway beside --publish.")

@@ -46,9 +46,11 @@ class Watch(BaseCallback):
         )
 
     def _on_training_start(self) -> None:
+        if self.learner.num_timesteps == 0:
+            self.measure()  # the untrained policy: where the learning curve begins
         # On a terminal only: elsewhere, a line at every checkpoint says how far it is.
         total, done = self.options.length, self.learner.num_timesteps
-        self.bar = tqdm(total=total, initial=done, unit=" strokes", unit_scale=True, disable=None, smoothing=0.1)
+        self.bar = tqdm(total=total, initial=done, unit=" decisions", unit_scale=True, disable=None, smoothing=0.1)
         self.next_save = done + self.options.save_freq
         self.clock = time.perf_counter()
 
@@ -89,21 +91,25 @@ class Watch(BaseCallback):
         """Save the model, and log how it swims round the pentagon."""
         save(self.learner, self.folder / "model.zip")
         done = self.keep()
-        strokes = self.learner.num_timesteps
-        reached = "" if done.finished else f" (only {done.waypoints_reached} waypoints)"
-        self.bar.set_postfix_str(f"pentagon in {done.strokes}{reached}")
+        lap = f"{done.time[-1]:.0f} s of swimming" if done.finished else f"only {done.waypoints_reached} waypoints"
+        self.bar.set_postfix_str(f"pentagon: {lap}")
         if self.bar.disable:
-            print(f"{strokes} strokes trained: the pentagon takes {done.strokes}{reached}.", flush=True)
+            print(f"{self.efficiency.progress}, pentagon: {lap}", flush=True)
 
     def keep(self) -> Swim:
         """Copy the saved model to the checkpoints, and log how it swims round the pentagon; returns that swim."""
-        strokes = self.learner.num_timesteps
-        copy = self.folder / "checkpoints" / f"model_{strokes:09d}.zip"
+        copy = self.folder / "checkpoints" / f"model_{self.learner.num_timesteps:09d}.zip"
         write_atomically(copy, (self.folder / "model.zip").read_bytes())
+        return self.measure()
+
+    def measure(self) -> Swim:
+        """Log how the policy swims round the pentagon now; returns that swim."""
+        strokes = self.learner.num_timesteps
         done = swim("learned", policy_of(self.learner), self.pentagon, max_strokes=self.options.limit)
         self.learner.logger.record("eval/pentagon_strokes", done.strokes)
         self.learner.logger.record("eval/pentagon_waypoints", done.waypoints_reached)
-        rows = [*recorded(self.folder), [strokes, done.strokes, done.waypoints_reached]]
+        earlier = [row for row in recorded(self.folder) if row[0] < strokes]
+        rows = [*earlier, [strokes, done.strokes, done.waypoints_reached]]
         text = "".join(",".join(map(str, row)) + "\n" for row in rows)
         write_atomically(self.folder / "progress.csv", text)
         seconds = self._before.seconds + sum(self.seconds.values())

@@ -104,7 +104,7 @@ class Certificate:
 
     def _fastest(self) -> list[tuple[str, str, str]]:
         """Error [%], speed [times real time] and name of the fastest setting within each of LEVELS, none twice."""
-        enduring = [each for each in self.settings if each.endures]
+        enduring = [each for each in self.settings if each.is_energy_stable]
         within = [[each for each in enduring if each.error(self.promised) <= level] for level in LEVELS]
         fastest = dict.fromkeys(id(max(some, key=lambda each: each.speed)) for some in within if some)
         known = {id(each): each for each in enduring}
@@ -172,7 +172,7 @@ class Certificate:
         if unknown := sorted(set(asked) - set(self.settings[0].errors)):
             known = ", ".join(self.settings[0].errors)
             raise ValueError(f"Classes of commands are {known}, not {', '.join(map(str, unknown))}.")
-        enduring = [each for each in self._of_resolution(robot) if each.endures]
+        enduring = [each for each in self._of_resolution(robot) if each.is_energy_stable]
         if not enduring:
             raise ValueError("Every measured setting of this scene gathers energy over long swims.")
         for setting in sorted(enduring, key=lambda each: -each.speed):

@@ -33,7 +33,7 @@ def as_text(certificate: Certificate) -> str:
         shares = " ".join(_percent(error, 6) for error in (each.space_error, each.time_error))
         for some in bounds.values():
             shares += f" {_percent(each.error(some), 6)} ({_percent(each.typical_error(some))})".ljust(18)
-        gathers = "" if each.endures else "  gathers energy over long swims, not chosen"
+        gathers = "" if each.is_energy_stable else "  gathers energy over long swims, not chosen"
         lines.append(f"{each!s:44} {shares} {each.speed:>12,.0f}{gathers}")
     lines.append(
         f"With {100 * certificate.confidence():.0f} % confidence, at most 5 % of the sequences of a class exceed its "

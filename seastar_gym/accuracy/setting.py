@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, cast, get_args
 
+from seastar_gym import renamed
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.checks import require_choice, require_count, require_number, shown
 from seastar_gym.scene.numerics import Resolution, SchemeName
@@ -15,6 +16,7 @@ LARGEST_GROWTH = 1.5
 """Growth of the kinetic energy over a long swim above which `Certificate.for_error` does not choose a setting."""
 
 
+@renamed.methods
 @dataclass(frozen=True)
 class Setting:
     """A resolution and numerics, with the errors and the speed of one scene.
@@ -86,7 +88,7 @@ class Setting:
         return self.resolution.numerics
 
     @property
-    def endures(self) -> bool:
+    def is_energy_stable(self) -> bool:
         """Whether long swims gather no energy, as far as was measured: errors of ten strokes would not show it."""
         return not self.energy_growth > LARGEST_GROWTH
 

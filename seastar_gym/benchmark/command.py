@@ -22,7 +22,7 @@ from seastar_gym.benchmark import page
 from seastar_gym.benchmark.jobs import Answer, Job, answers
 from seastar_gym.benchmark.results import Entry, merged, read, write
 from seastar_gym.command import INTERRUPTED, answered, command_parser
-from seastar_gym.controllers.roster import HELP
+from seastar_gym.controllers.registry import HELP
 from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.measures import measure_of
 from seastar_gym.evaluation.tasks import env_of, held_out, require_task, task_ids

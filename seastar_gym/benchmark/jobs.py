@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seastar_gym.controllers.roster import load_agent
+from seastar_gym.controllers.registry import load_agent
 from seastar_gym.evaluation.measures import measure_of
 from seastar_gym.evaluation.rollout import Episodes
 from seastar_gym.evaluation.tasks import env_of, held_out, swim_episodes
@@ -20,7 +20,7 @@ Row = dict[str, Any]
 
 
 class Job(NamedTuple):
-    """Episodes with these seeds. agent: As the command names it. policy: Name of the policy, see the roster.
+    """Episodes with these seeds. agent: As the command names it. policy: Name of the policy, see the registry.
 
     fidelity: None means the task's own. decisions: Time limit, None means the task's. threads: Of the simulator; None
     means one per processor.

@@ -17,7 +17,7 @@ import numpy as np
 from seastar_gym.cli.swim import sight
 from seastar_gym.command import answered, command_parser
 from seastar_gym.controllers.contract import Policy, actions_in
-from seastar_gym.controllers.roster import HELP, load_agent
+from seastar_gym.controllers.registry import HELP, load_agent
 from seastar_gym.envs.options import SwimOptions, make_scene, scene_at
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.pictures import draw_traces

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, get_args
 from seastar_gym.command import answered, command_parser
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy
-from seastar_gym.controllers.roster import DEFAULTS, HELP, fitting_agents, load_agents
+from seastar_gym.controllers.registry import DEFAULTS, HELP, fitting_agents, load_agents
 from seastar_gym.envs.options import scene_at
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path

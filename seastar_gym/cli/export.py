@@ -1,6 +1,6 @@
 """Writes a learned policy as one file of C, or of ONNX, for robots and computers without Python.
 
-The policy is one in the box, by its name (learned, seastar-0.2s, or that of a task such as prey or miswired-0.5s), or a
+The policy is a bundled one, by its name (learned, timed-0.2s, or that of a task such as prey or miswired-0.5s), or a
 file: .safetensors, or a model.zip of train.py. The most probable action is taken.
 
 C is C99 with <math.h>, without allocation. seastar_observe makes the observation from the last positions of tracked
@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from seastar_gym.command import answered, command_parser
-from seastar_gym.controllers import learned, learner_zip
+from seastar_gym.controllers import checkpoint, learned
 from seastar_gym.controllers.export.c_code import to_c
 from seastar_gym.controllers.export.onnx_graph import to_onnx
-from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy
+from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy
 from seastar_gym.files import write_atomically
 
 FORMATS = ("c", "onnx")
@@ -35,15 +35,15 @@ def parser() -> argparse.ArgumentParser:
 
 def load_policy(name: str) -> LearnedPolicy:
     """Policy of a name or a file."""
-    known = {"learned": SHIPPED, **learned.by_name()}
-    if name in known:
-        return learned.load(known[name])
+    bundled = BUNDLED if name == "learned" else learned.file_of(name)
+    if bundled is not None:
+        return learned.load(bundled)
     if name.endswith(".zip"):
-        return learner_zip.load(name)
-    if not name.endswith(SHIPPED.suffix):
+        return checkpoint.load(name)
+    if not name.endswith(BUNDLED.suffix):
         raise ValueError(
             f"{name} is no learned policy: name a file, .safetensors or the model.zip of train.py, or one of "
-            f"{', '.join(known)}."
+            f"{', '.join(['learned', *learned.by_name()])}."
         )
     return learned.load(name)
 
@@ -51,7 +51,7 @@ def load_policy(name: str) -> LearnedPolicy:
 def export(options: argparse.Namespace) -> str:
     """Write the file; returns a sentence on it."""
     policy = load_policy(options.policy)
-    name = Path(options.policy).name.removesuffix(SHIPPED.suffix).removesuffix(".zip")
+    name = Path(options.policy).name.removesuffix(BUNDLED.suffix).removesuffix(".zip")
     out = Path(f"{name}.{options.to}") if options.out is None else options.out
     if options.to == "onnx" and options.points is not None:
         raise ValueError("--points is for c: ONNX begins with the observation.")

@@ -15,7 +15,7 @@ import gymnasium as gym
 from seastar_gym.cli.screen import Show, outcome, rate, screen, show_all
 from seastar_gym.command import answered, command_parser
 from seastar_gym.controllers.contract import Policy, actions_in
-from seastar_gym.controllers.roster import HELP, load_agent
+from seastar_gym.controllers.registry import HELP, load_agent
 from seastar_gym.envs.options import read
 from seastar_gym.envs.sight import Sight
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path

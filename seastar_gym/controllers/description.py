@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, cast, get_args
 from seastar_gym.envs import TASKS
 from seastar_gym.envs.commands import Actions, Discrete, checked_decision_period, choices
 from seastar_gym.envs.layout import N_STATIONS, OBSERVATION_LAYOUT, Entry, Layout, memory_size
-from seastar_gym.envs.symmetry import Recollection, Symmetry, memory_mirror, symmetry_of
+from seastar_gym.envs.symmetry import FrameStack, Symmetry, memory_mirror, symmetry_of
 from seastar_gym.envs.symmetry.symmetry import MOST_PAST
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror
@@ -33,7 +33,7 @@ class Description(NamedTuple):
     task: Name of the challenge that the policy was trained for, such as "miswired". None means waypoints.
     limb_mirror: What a mirror does to the numbers that are observed of every limb. None means those of the actuators.
     entries, shows_limbs, stations: Of the observations, see `Layout`. past: Number of past observations that the
-    policy sees, see `Recollection`.
+    policy sees, see `FrameStack`.
     """
 
     actions: Actions
@@ -137,14 +137,14 @@ class Description(NamedTuple):
         return Symmetry(symmetry_of(self.scene), self.mirror, self.layout, self.actions) if self.symmetry else None
 
     @property
-    def recollection(self) -> Recollection | None:
+    def frame_stack(self) -> FrameStack | None:
         """What the policy sees of present and past observations; None for a policy without memory."""
-        return Recollection(self.reduction, self.past) if self.reduction is not None and self.past else None
+        return FrameStack(self.reduction, self.past) if self.reduction is not None and self.past else None
 
     @property
     def input_size(self) -> int:
         """Number of inputs of the network."""
-        return self.layout.size if self.recollection is None else self.recollection.size
+        return self.layout.size if self.frame_stack is None else self.frame_stack.size
 
     @property
     def distributions(self) -> tuple[int, int]:

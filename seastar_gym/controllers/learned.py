@@ -1,8 +1,8 @@
 """Learned policies on disk: weights in a safetensors file, and a description in JSON beside it.
 
-    from seastar_gym.controllers.learned import load
+    from seastar_gym.controllers import load, pretrained
 
-    policy = load()  # the one in the box; or load("runs/mine/policy.safetensors")
+    policy = pretrained("timed-0.2s")  # a bundled one; or load("runs/mine/policy.safetensors")
     env = gym.make(
         "SeastarSwim-v0", actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period
     )
@@ -23,10 +23,11 @@ import safetensors
 import safetensors.numpy
 from numpy.typing import NDArray
 
+from seastar_gym import renamed
 from seastar_gym.controllers.contract import as_floating, starts
 from seastar_gym.controllers.description import Description, read_facts
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.symmetry import Recollection
+from seastar_gym.envs.symmetry import FrameStack
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number, require_file, require_flag, require_kind, require_number, shown
@@ -34,10 +35,12 @@ from seastar_gym.scene.checks import is_finite_number, require_file, require_fla
 if TYPE_CHECKING:
     from seastar_gym.envs.tasks.challenge import Challenge
 
-SHIPPED = Path(__file__).parent / "policies" / "seastar.safetensors"
-"""File of the policy in the box that decides stroke by stroke; `python train.py --ship` replaces it."""
+__getattr__ = renamed.names_of(__name__)
 
-TASKS = SHIPPED.parent / "tasks"
+BUNDLED = Path(__file__).parent / "policies" / "strokes.safetensors"
+"""File of the bundled policy that decides stroke by stroke; `python train.py --publish` replaces it."""
+
+TASKS = BUNDLED.parent / "tasks"
 """Folder of the policies of tasks; `python -m agents.tasks` replaces them."""
 
 Weights = dict[str, NDArray[np.float32]]
@@ -47,6 +50,7 @@ RESOLUTION = "robot.nodes_per_limb"
 """Fact of a scene that a policy does not depend on."""
 
 
+@renamed.methods
 class LearnedPolicy:
     """Trained policy with the `predict` of Stable-Baselines3, from observations of the environment to its actions.
 
@@ -80,7 +84,7 @@ class LearnedPolicy:
         self.weights = weights
         self.actions = description.actions
         self.scene = description.scene
-        self.reduction, self.recollection = description.reduction, description.recollection
+        self.reduction, self.frame_stack = description.reduction, description.frame_stack
         self.decision_period = description.decision_period or description.scene.actuator.period
         self.training = training or {}
         self.rng = np.random.default_rng(0) if rng is None else rng
@@ -109,14 +113,14 @@ class LearnedPolicy:
             )
         if self.reduction is None:
             return self._choose(observation, deterministic), None
-        if self.recollection is not None:
-            return self._remembering(self.recollection, observation, state, episode_start, deterministic)
+        if self.frame_stack is not None:
+            return self._stacking(self.frame_stack, observation, state, episode_start, deterministic)
         reduced, elements = self.reduction.reduce(observation)
         return self.reduction.restore(self._choose(reduced, deterministic), elements), None
 
-    def _remembering(
+    def _stacking(
         self,
-        recollection: Recollection,
+        frame_stack: FrameStack,
         observation: NDArray[Any],
         state: tuple[NDArray[Any], ...] | None,
         episode_start: NDArray[np.bool_] | None,
@@ -124,12 +128,12 @@ class LearnedPolicy:
     ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...]]:
         """`predict` of a policy that sees past observations."""
         present = np.atleast_2d(observation).astype(np.float32)
-        _require_past(state, (len(present), recollection.past, present.shape[1]))
-        at_first = np.repeat(present[:, None], recollection.past, axis=1)
+        _require_past(state, (len(present), frame_stack.past, present.shape[1]))
+        at_first = np.repeat(present[:, None], frame_stack.past, axis=1)
         begun = starts(episode_start, len(present))
         past = at_first if state is None else np.where(begun[:, None, None], at_first, state[0])
-        shown, elements = recollection.shown(present, past)
-        chosen = recollection.symmetry.restore(self._choose(shown, deterministic), elements)
+        shown, elements = frame_stack.stacked(present, past)
+        chosen = frame_stack.symmetry.restore(self._choose(shown, deterministic), elements)
         later = np.concatenate([present[:, None], past[:, :-1]], axis=1)
         return (chosen if observation.ndim == 2 else chosen[0]), (later,)
 
@@ -238,8 +242,8 @@ def save(policy: LearnedPolicy, path: str | os.PathLike[str], **training: Any) -
     write_atomically(path.with_suffix(".json"), f"{text}\n")
 
 
-def in_the_box(decision_period: float | None, shipped: Path = SHIPPED, task: str | None = None) -> Path:
-    """File of the policy in the box for a time between decisions [s], None for strokes, and a task by its name.
+def bundled_file(decision_period: float | None, bundled: Path = BUNDLED, task: str | None = None) -> Path:
+    """File of the bundled policy for a time between decisions [s], None for strokes, and a task by its name.
 
     A task without a policy of its own has that of waypoints.
     """
@@ -248,26 +252,38 @@ def in_the_box(decision_period: float | None, shipped: Path = SHIPPED, task: str
     require_kind("task", task, str | None, "the name of a task, or None")
     if task is not None and (file := of_task(task, decision_period)).is_file():
         return file
-    return _of_period(shipped, decision_period)
+    return bundled if decision_period is None else bundled.with_stem(f"timed-{decision_period:g}s")
 
 
 def by_name() -> dict[str, Path]:
-    """Files of all policies in the box by their names."""
-    return {file.stem: file for folder in (SHIPPED.parent, TASKS) for file in sorted(folder.glob(f"*{SHIPPED.suffix}"))}
+    """Files of all bundled policies by their names."""
+    return {file.stem: file for folder in (BUNDLED.parent, TASKS) for file in sorted(folder.glob(f"*{BUNDLED.suffix}"))}
+
+
+def file_of(name: str) -> Path | None:
+    """File of the bundled policy of a name; None if there is none."""
+    return by_name().get(renamed.policy(name))
+
+
+def pretrained(name: str = BUNDLED.stem) -> LearnedPolicy:
+    """Bundled policy of a name, such as "strokes", "timed-0.2s" or "prey".
+
+    ValueError, with the names that there are, for another one.
+    """
+    file = file_of(name) if isinstance(name, str) else None
+    if file is None:
+        raise ValueError(f"There is no bundled policy {shown(name)}: take one of {', '.join(by_name())}.")
+    return load(file)
 
 
 def of_task(task: str, decision_period: float | None, folder: Path = TASKS) -> Path:
     """File of the policy of a task, by the name of its challenge, whether it is there or not."""
-    return _of_period(folder / f"{task}{SHIPPED.suffix}", decision_period)
-
-
-def _of_period(file: Path, decision_period: float | None) -> Path:
     period = "" if decision_period is None else f"-{decision_period:g}s"
-    return file.with_name(f"{file.stem}{period}{file.suffix}")
+    return folder / f"{task}{period}{BUNDLED.suffix}"
 
 
-def load(path: str | os.PathLike[str] = SHIPPED) -> LearnedPolicy:
-    """Policy that `save` wrote; by default the one in the box.
+def load(path: str | os.PathLike[str] = BUNDLED) -> LearnedPolicy:
+    """Policy that `save` wrote; by default the bundled one of strokes.
 
     FileNotFoundError or ValueError, with one sentence, if there is none.
     """

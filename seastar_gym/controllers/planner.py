@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.controllers.contract import observed, starts
 from seastar_gym.controllers.greedy import Searcher, require_search, waypoints_of
 from seastar_gym.envs.commands import checked_decision_period, command_table
-from seastar_gym.envs.headings import Headings, wrapped
+from seastar_gym.envs.headings import HeadingTargets, wrapped
 from seastar_gym.envs.layout import HEADINGS, N_STATIONS, VELOCITY_SCALE, Layout, memory_size
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.reward import RewardWeights
@@ -209,10 +209,10 @@ class Planner(Searcher):
         threads: int | None = None,
         reward: RewardWeights = RewardWeights(),
         decision_period: float | None = None,
-        headings: Headings | None = None,
+        headings: HeadingTargets | None = None,
         moves: ArrayLike | None = None,
     ):
-        require_kind("headings", headings, Headings | None, "Headings, or None")
+        require_kind("headings", headings, HeadingTargets | None, "HeadingTargets, or None")
         require_kind("budget", budget, Budget | None, "a Budget, or None")
         self.headings = headings
         self.scene = make_scene(None, "fast", decision_period) if scene is None else scene

@@ -23,13 +23,13 @@ from seastar_gym.controllers.contract import observed, starts
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, action_space, command_table
 from seastar_gym.gaits import (
     PERIOD,
-    in_time,
     lagged_gait,
     lagged_pentagon,
     pair_gait,
     pentagon_gait,
     straight_gait,
     thrifty_gait,
+    timed,
     turning_wave,
 )
 from seastar_gym.scene.checks import as_finite, require_choice, require_kind, require_limbs, require_number, shown
@@ -141,8 +141,8 @@ def _of_five(gait: Callable[[float], Floats]) -> Callable[[int, float], Floats]:
 
 
 GAITS: dict[str, Callable[[int, float], Floats]] = {
-    "pentagon": _of_five(partial(in_time, pentagon_gait())),
-    "straight": lambda n_limbs, decision_period: in_time(straight_gait(n_limbs), decision_period),
+    "pentagon": _of_five(partial(timed, pentagon_gait())),
+    "straight": lambda n_limbs, decision_period: timed(straight_gait(n_limbs), decision_period),
     "rest": lambda n_limbs, decision_period: np.zeros((1, n_limbs)),
     "lagged": lambda n_limbs, decision_period: lagged_gait(decision_period, n_limbs),
     "thrifty": lambda n_limbs, decision_period: thrifty_gait(decision_period, n_limbs),
@@ -183,7 +183,7 @@ def _gait(name: str, n_limbs: int, decision_period: float) -> Floats:
     pair = _PAIR.fullmatch(name.replace(" ", ""))
     if pair is not None and pair[2] != pair[4]:
         limbs = {pair[2]: int(pair[1]), pair[4]: int(pair[3])}
-        return in_time(pair_gait(limbs["+"], limbs["-"], n_limbs), decision_period)
+        return timed(pair_gait(limbs["+"], limbs["-"], n_limbs), decision_period)
     if name in GAITS:
         return GAITS[name](n_limbs, decision_period)
     names = ", ".join((*GAITS, "random"))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.scripted import to_actions
 from seastar_gym.envs.commands import Actions, to_commands
-from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.layout import HEADINGS, Layout
 from seastar_gym.envs.symmetry import transform_commands
 from seastar_gym.scene import Scene
@@ -38,7 +38,7 @@ class TurnThenSwim:
     swimmer: Policy
     swims_in: Actions
     scene: Scene
-    headings: Headings
+    headings: HeadingTargets
     decision_period: float | None
     actions: Actions = "joint"
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from seastar_gym.command import answered, command_parser
 from seastar_gym.controllers.contract import Policy, actions_in
-from seastar_gym.controllers.roster import HELP, load_agent
+from seastar_gym.controllers.registry import HELP, load_agent
 from seastar_gym.controllers.scripted import RandomPolicy
 from seastar_gym.data.dataset import record, require_new, summary, write
 from seastar_gym.evaluation.tasks import env_of, parameters_of, require_seen, require_task

@@ -43,13 +43,13 @@ from seastar_gym.der.linear.star_matrix import (
 )
 from seastar_gym.der.motion import node_motion
 from seastar_gym.der.star import load_root_edge, root_place, tail_node
-from seastar_gym.der.terms.added_mass import add_fluid_inertia, less_edge_fluid_inertia
+from seastar_gym.der.terms.added_mass import add_fluid_inertia, subtract_edge_fluid_inertia
 from seastar_gym.der.terms.along import bending_compliance, bending_stiffness, natural_moment
 from seastar_gym.der.terms.bending import bending_energy, bending_slopes, moment
 from seastar_gym.der.terms.clamp import assemble_clamps
 from seastar_gym.der.terms.damping import damped_energy, damped_stiffness, damped_stress
 from seastar_gym.der.terms.drag import add_cross_flow, add_middle_drag, drag_slopes
-from seastar_gym.der.terms.inertia import less_edge_inertia
+from seastar_gym.der.terms.inertia import subtract_edge_inertia
 from seastar_gym.der.terms.load import load_power, nodal_load
 from seastar_gym.der.terms.stretching import stretching_energy, tension
 from seastar_gym.simd.compilation import inlined_kernel, kernel
@@ -63,8 +63,8 @@ def edge_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex, tail,
     tail, head: Motions of its ends.
     """
     slopes = elastic_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex)
-    slopes = less_edge_inertia(rods, stage, e, tail, head, slopes)
-    return less_edge_fluid_inertia(rods, work, stage, e, tail, head, slopes)
+    slopes = subtract_edge_inertia(rods, stage, e, tail, head, slopes)
+    return subtract_edge_fluid_inertia(rods, work, stage, e, tail, head, slopes)
 
 
 @kernel

@@ -36,7 +36,7 @@ for _id, _decision_period in TIMED.items():
 register(
     id="SeastarSwimHeading-v0",
     max_episode_steps=600,
-    kwargs={"decision_period": 0.5, "actions": "pairs", "headings": {"version": 1, "kind": "Headings"}},
+    kwargs={"decision_period": 0.5, "actions": "pairs", "headings": {"version": 1, "kind": "HeadingTargets"}},
     **_ENTRY_POINTS,
 )
 

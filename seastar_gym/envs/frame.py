@@ -30,7 +30,7 @@ class Frame:
     """The waypoint that the robot swims to; the number of waypoints once all are reached."""
     time: float
     """Simulated time [s]."""
-    warmth: FloatArray | None = None
+    wire_state: FloatArray | None = None
     """How warm wires + and - of every limb are, from 0 to 1, shape (n_limbs, 2); None without wires."""
     scenery: Scenery = NOTHING
     """What the task shows besides."""
@@ -61,7 +61,7 @@ def frames_of(task: Swimming, commands: FloatArray, trails: Mapping[int, FloatAr
     trails: As in `Frame`, by the numbers of the robots that are shown.
     """
     simulator = task.simulator
-    positions, time, warmth = simulator.positions, simulator.time, task.warmth()
+    positions, time, wire_state = simulator.positions, simulator.time, task.wire_state()
     roots, outlines = body_of(simulator)
     fluid = simulator.scene.fluid
     for robot, trail in trails.items():
@@ -71,7 +71,7 @@ def frames_of(task: Swimming, commands: FloatArray, trails: Mapping[int, FloatAr
             trail=trail,
             waypoint_index=int(task.waypoint_index[robot]),
             time=float(time[robot]),
-            warmth=None if warmth is None else warmth[robot],
+            wire_state=None if wire_state is None else wire_state[robot],
             scenery=task.scenery(robot),
             roots=None if roots is None else roots[robot],
             outline=None if outlines is None else outlines[robot],

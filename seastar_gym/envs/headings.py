@@ -15,52 +15,57 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym import renamed
 from seastar_gym.scene.checks import is_finite_number, require_number, shown
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
+
+__getattr__ = renamed.names_of(__name__)
 
 LARGEST = 1e6
 """Largest angle that may be asked for [rad]: beyond it, rounding is seen."""
 
 
 @register_part
+@renamed.arguments
 @dataclass(frozen=True)
-class Headings:
+class HeadingTargets:
     """Headings at the waypoints, without which they are not reached.
 
-    asked: "along", the direction of the leg that ends at the waypoint; "random", drawn for every waypoint of every
+    target: "along", the direction of the leg that ends at the waypoint; "random", drawn for every waypoint of every
         episode; angles [rad], one for each waypoint; or one angle for all.
     tolerance: Largest difference between heading and asked heading at which a waypoint is reached [rad], at most pi.
     """
 
-    asked: Literal["along", "random"] | float | tuple[float, ...] = "along"
+    target: Literal["along", "random"] | float | tuple[float, ...] = "along"
     tolerance: float = math.radians(10.0)
 
     def __post_init__(self) -> None:
-        angles = self.asked if isinstance(self.asked, tuple) else (self.asked,)
-        is_named = isinstance(self.asked, str) and self.asked in ("along", "random")
+        angles = self.target if isinstance(self.target, tuple) else (self.target,)
+        is_named = isinstance(self.target, str) and self.target in ("along", "random")
         if not is_named and not (angles and all(map(_is_angle, angles))):
             raise ValueError(
-                f"Headings.asked must be 'along', 'random', an angle or a tuple of angles [rad], at most {LARGEST:g}, "
-                f"not {shown(self.asked)}."
+                f"HeadingTargets.target must be 'along', 'random', an angle or a tuple of angles [rad], at most "
+                f"{LARGEST:g}, not {shown(self.target)}."
             )
-        require_number("Headings.tolerance", self.tolerance, "rad")
+        require_number("HeadingTargets.tolerance", self.tolerance, "rad")
         if self.tolerance > math.pi:
-            raise ValueError(f"Headings.tolerance must be at most pi, not {shown(self.tolerance)} rad.")
+            raise ValueError(f"HeadingTargets.tolerance must be at most pi, not {shown(self.tolerance)} rad.")
 
     def of_path(self, waypoints: Floats, rng: np.random.Generator) -> Floats:
         """Asked headings [rad], shape (n,), at waypoints [m], shape (n, 2). rng: Generator of random ones.
 
         ValueError: the waypoints are not as many as the angles, or a leg has no direction.
         """
-        if self.asked == "random":
+        if self.target == "random":
             return rng.uniform(-np.pi, np.pi, len(waypoints))
-        if self.asked == "along":
+        if self.target == "along":
             return _along(waypoints)
-        angles = np.array(self.asked, dtype=np.float64)
+        angles = np.array(self.target, dtype=np.float64)
         if angles.ndim and len(angles) != len(waypoints):
-            raise ValueError(f"Headings.asked has {len(angles)} angles, but the path has {len(waypoints)} waypoint(s).")
+            counts = f"{len(angles)} angles, but the path has {len(waypoints)} waypoint(s)"
+            raise ValueError(f"HeadingTargets.target has {counts}.")
         return np.broadcast_to(angles, len(waypoints)).copy()
 
 
@@ -82,10 +87,10 @@ def wrapped(angles: Floats) -> Floats:
     return np.asarray(np.remainder(angles + np.pi, 2.0 * np.pi) - np.pi)
 
 
-class AskedHeadings:
+class EpisodeHeadings:
     """Asked headings of robots on their present paths, and the turns between them."""
 
-    def __init__(self, headings: Headings, n_robots: int):
+    def __init__(self, headings: HeadingTargets, n_robots: int):
         self.headings = headings
         self._asked = [np.zeros(1)] * n_robots
         self._turn_after = [np.zeros(1)] * n_robots  # from the heading at waypoint k to that at the last one [rad]

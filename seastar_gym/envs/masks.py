@@ -20,19 +20,22 @@ Mask = NDArray[np.bool_]
 
 def can_be_masked(actuator: Actuator) -> bool:
     """Whether an actuator ever has wires that cannot be heated."""
-    return complete(actuator).can_be_deaf
+    return complete(actuator).can_be_refractory
 
 
-def action_masks(actions: Actions, deaf: Mask) -> Mask:
-    """Masks of the robots' actions, shape (n_robots, k). deaf: As `Simulator.deaf_wires`, (n_robots, n_limbs, 2)."""
-    n_robots, n_limbs, _ = deaf.shape
+def action_masks(actions: Actions, refractory: Mask) -> Mask:
+    """Masks of the robots' actions, shape (n_robots, k).
+
+    refractory: As `Simulator.refractory_wires`, shape (n_robots, n_limbs, 2).
+    """
+    n_robots, n_limbs, _ = refractory.shape
     if actions == "continuous":
-        return ~deaf.reshape(n_robots, -1)
+        return ~refractory.reshape(n_robots, -1)
     if actions == "limbs":
-        return np.concatenate([np.ones((n_robots, n_limbs, 1), bool), ~deaf], axis=-1).reshape(n_robots, -1)
-    return np.asarray(~masked_limbs(command_table(actions, n_limbs), deaf[:, None]).any(axis=-1))
+        return np.concatenate([np.ones((n_robots, n_limbs, 1), bool), ~refractory], axis=-1).reshape(n_robots, -1)
+    return np.asarray(~masked_limbs(command_table(actions, n_limbs), refractory[:, None]).any(axis=-1))
 
 
-def masked_limbs(commands: Floats, deaf: Mask) -> Mask:
-    """Limbs whose wire cannot follow its command, shape (..., n_limbs). deaf: Shape (..., n_limbs, 2)."""
-    return ((commands > 0.0) & deaf[..., 0]) | ((commands < 0.0) & deaf[..., 1])
+def masked_limbs(commands: Floats, refractory: Mask) -> Mask:
+    """Limbs whose wire cannot follow its command, shape (..., n_limbs). refractory: Shape (..., n_limbs, 2)."""
+    return ((commands > 0.0) & refractory[..., 0]) | ((commands < 0.0) & refractory[..., 1])

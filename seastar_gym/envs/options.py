@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.paths import FARTHEST, make_path
 from seastar_gym.envs.randomization import ACTION_DELAY, DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
@@ -51,14 +51,14 @@ class SwimOptions:
     error_bars: bool = False
     decision_period: float | None = None
     observe_actuators: bool = True
-    headings: Headings | None = None
+    headings: HeadingTargets | None = None
     device: str = "cpu"
     sight: Sight | None = None
     action_delay: Drawn = 0.0
 
     def __post_init__(self) -> None:
         parts = {
-            "scene": Scene, "reward": RewardWeights, "randomization": DomainRandomization, "headings": Headings,
+            "scene": Scene, "reward": RewardWeights, "randomization": DomainRandomization, "headings": HeadingTargets,
             "sight": Sight, "action_delay": object,
         }  # fmt: skip
         for name, kind in parts.items():
@@ -67,7 +67,7 @@ class SwimOptions:
         require_kind("scene", self.scene, Scene | None, "a Scene")
         require_kind("reward", self.reward, RewardWeights, "RewardWeights")
         require_kind("randomization", self.randomization, DomainRandomization | None, "a DomainRandomization or None")
-        require_kind("headings", self.headings, Headings | None, "Headings or None")
+        require_kind("headings", self.headings, HeadingTargets | None, "HeadingTargets or None")
         require_kind("sight", self.sight, Sight | None, "a Sight or None")
         object.__setattr__(self, "action_delay", as_float(self.action_delay))
         self._check_late()

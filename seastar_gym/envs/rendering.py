@@ -284,9 +284,9 @@ class Renderer:
             zip(limbs, widths, frame.command, strict=True), key=lambda drawn: abs(drawn[2])
         ):
             self._canvas.stroke(limb, _limb_colour(command), limb_width)
-        if frame.warmth is not None:
-            for limb, limb_width, warmth in zip(limbs, widths, frame.warmth, strict=True):
-                self._canvas.stroke(limb[: 1 + round(ROOT * (len(limb) - 1))], _warm_colour(warmth), limb_width)
+        if frame.wire_state is not None:
+            for limb, limb_width, wire_state in zip(limbs, widths, frame.wire_state, strict=True):
+                self._canvas.stroke(limb[: 1 + round(ROOT * (len(limb) - 1))], _warm_colour(wire_state), limb_width)
         self._canvas.dot(self.camera.to_pixels(frame.positions[0]), LIMB, radius=1.3 * width)
 
     def _paint_body(self, frame: Frame, width: float) -> None:
@@ -407,9 +407,9 @@ def _limb_colour(command: float) -> Colour:
     return HEATED_PLUS if command > 0.0 else HEATED_MINUS
 
 
-def _warm_colour(warmth: FloatArray) -> Colour:
-    """Colour of the warmer wire, the stronger the warmer; warmth: Of wires + and -, shape (2,)."""
-    plus, minus = warmth
+def _warm_colour(wire_state: FloatArray) -> Colour:
+    """Colour of the warmer wire, the stronger the warmer; wire_state: Of wires + and -, shape (2,)."""
+    plus, minus = wire_state
     return mixed(HEATED_PLUS if plus >= minus else HEATED_MINUS, LIMB, float(max(plus, minus)))
 
 

@@ -67,15 +67,15 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
 
     ## Headings
     With `headings`, a waypoint is reached when the hub is within its radius and the robot's heading is the asked one to
-    a tolerance, `Headings.tolerance`, by default 10 degrees. The heading is the direction of the body frame, that of
-    limb 1 at rest. It repeats after a whole turn: limb 1 is told from the others, as if it carried a camera.
+    a tolerance, `HeadingTargets.tolerance`, by default 10 degrees. The heading is the direction of the body frame, that
+    of limb 1 at rest. It repeats after a whole turn: limb 1 is told from the others, as if it carried a camera.
 
     ## Masks
-    Some wires cannot be heated now: those of `SmaWires(deaf=True)` until their limb is cold, those of a `ThermalSma`
-    with a `largest_temperature` while they are that hot. A command to such a wire does nothing and costs nothing. With
-    these actuators, `info` has `action_mask` (int8, 1 for actions that are followed as a whole) and `masked_limbs`
-    (int, commands of this decision that were not followed). `env.action_masks()` is the mask as booleans, the form of
-    MaskablePPO in sb3-contrib, with any actuator:
+    Some wires cannot be heated now: those of `SmaWires(refractory=True)` until their limb is cold, those of a
+    `ThermalSma` with a `largest_temperature` while they are that hot. A command to such a wire does nothing and costs
+    nothing. With these actuators, `info` has `action_mask` (int8, 1 for actions that are followed as a whole) and
+    `masked_limbs` (int, commands of this decision that were not followed). `env.action_masks()` is the mask as
+    booleans, the form of MaskablePPO in sb3-contrib, with any actuator:
 
     | `actions`            | shape          | meaning                                            |
     |----------------------|----------------|----------------------------------------------------|
@@ -231,8 +231,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         without a `scene`, the chapter's robot has `SmaWires`. A time in which limbs would not come to rest is refused
         for actuators without memory.
     observe_actuators: Whether observations have the memory of the actuators.
-    headings: Headings that are asked for at the waypoints, a `Headings`: along the legs, at random, or given angles.
-        None asks for none.
+    headings: Headings that are asked for at the waypoints, a `HeadingTargets`: along the legs, at random, or given
+        angles. None asks for none.
     device: Where robots swim: "cpu", or "cuda" for an NVIDIA GPU, to the same bits, see `Simulator`. It is for
         batches of thousands.
     sight: Camera through which robots are seen, a `Sight`. None means that all nodes are seen, without delay.

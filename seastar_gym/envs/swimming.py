@@ -6,8 +6,8 @@ is scored:
     _draw(robot, rng, asked)    draw what an episode of a robot is about
     _begin(robots)              the robots in a mask are at rest at the origin now
     _targets()                  two points of every robot's observation [m], such as waypoints
-    _score(hub, pulses)         terms of the reward, success and end of a decision
-    _goal_facts(hub)            entries of info that belong to the task
+    _reward_terms(hub, pulses)  terms of the reward, success and end of a decision
+    _task_info(hub)             entries of info that belong to the task
 """
 
 import functools
@@ -21,6 +21,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym import renamed
 from seastar_gym.accuracy.info import errors_in_info, read_certificate
 from seastar_gym.envs.commands import checked_decision_period, unless_strokes
 from seastar_gym.envs.lag import Lag, Piece
@@ -77,6 +78,7 @@ class Draws(Protocol):
         """Draw all numbers of a robot, in place."""
 
 
+@renamed.methods
 class Swimming(ABC):
     """Task of `n_robots` robots.
 
@@ -93,7 +95,7 @@ class Swimming(ABC):
     observes_commands = False
     """Whether the last command of every limb is observed, after the memory of its actuator."""
     entries: tuple[Entry, ...] = ()
-    """What the numbers of `_wanted` are, but for asked headings."""
+    """What the numbers of `_task_observation` are, but for asked headings."""
     shows_limbs = True
     """Whether the stations of the limbs and the hub's velocity are observed."""
 
@@ -152,11 +154,11 @@ class Swimming(ABC):
         """Two points of every robot's observation in the world frame [m], shape (n_robots, 4)."""
 
     @abstractmethod
-    def _score(self, hub: Floats, pulses: Floats) -> Score:
+    def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
         """Score of a decision that ended with the hubs at `hub` [m]. pulses: Heat, see `pulses_of`."""
 
     @abstractmethod
-    def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
+    def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
         """Entries of info that belong to the task; arrays over robots."""
 
     def waypoints_of(self, robot: int) -> Floats:
@@ -229,7 +231,7 @@ class Swimming(ABC):
         found[:, at.actuators] = self._remembered()
         if at.shows_limbs:
             found[:, at.stations_and_hub] = tracker.of_limbs(lengths_of(self.simulator))
-        found[:, at.further] = np.concatenate([self._wanted(), tracker.entries(self.simulator.time)], axis=1)
+        found[:, at.further] = np.concatenate([self._task_observation(), tracker.entries(self.simulator.time)], axis=1)
         away = self._targets().reshape(-1, 2, 2) - tracker.hub[:, None]
         found[:, at.waypoints] = self._in_body_frame(away / lengths_of(self.simulator)[:, None, None]).reshape(-1, 4)
         return found
@@ -255,7 +257,7 @@ class Swimming(ABC):
         found[:, at.stations_and_hub] = seen[:, : at.stations_and_hub.stop]
         found[:, at.waypoints] = seen[:, self._without_more.waypoints]
         found[:, at.actuators] = arrays.asarray(self._remembered())
-        found[:, at.further] = arrays.asarray(self._wanted())
+        found[:, at.further] = arrays.asarray(self._task_observation())
         return found
 
     def privileged_observations(self) -> NDArray[np.float32]:
@@ -299,7 +301,7 @@ class Swimming(ABC):
         """Memory of the actuators in the names of the commands, shape (n_robots, k), limb after limb."""
         return self.simulator.observe_actuators()
 
-    def _wanted(self) -> Floats:
+    def _task_observation(self) -> Floats:
         """Further entries of the observation, such as asked headings, shape (n_robots, k)."""
         return np.zeros((self.n_robots, 0))
 
@@ -320,17 +322,17 @@ class Swimming(ABC):
 
     def action_masks(self) -> Flags:
         """Actions that wires can follow now, shape (n_robots, k), see masks.py."""
-        return action_masks(self.options.actions, self._deaf_wires())
+        return action_masks(self.options.actions, self._refractory_wires())
 
-    def _deaf_wires(self) -> Flags:
+    def _refractory_wires(self) -> Flags:
         """Wires that cannot be heated now, by their names in commands, shape (n_robots, n_limbs, 2)."""
-        return self.simulator.deaf_wires()
+        return self.simulator.refractory_wires()
 
     def followed(self, commands: Floats) -> Floats:
         """Commands with zeros for limbs whose wire cannot follow its command now, shape (n_robots, n_limbs)."""
         if not self._can_be_masked:
             return commands
-        return np.where(masked_limbs(commands, self._deaf_wires()), 0.0, commands)
+        return np.where(masked_limbs(commands, self._refractory_wires()), 0.0, commands)
 
     def _wired(self, commands: Floats) -> Floats:
         """Commands as they reach the limbs, shape (n_robots, n_limbs)."""
@@ -377,10 +379,10 @@ class Swimming(ABC):
         steps = self.simulator.advance_pausing(piece.duration, self._wired(piece.commands), pauses)
         return (yield from pausing(steps, look))
 
-    def warmth(self) -> Floats | None:
+    def wire_state(self) -> Floats | None:
         """Contractions or temperatures of wires + and -, 0 to 1, shape (n_robots, n_limbs, 2); None without wires."""
         actuator = complete(self.scene.actuator)
-        if actuator.deaf_wires(actuator.rest) is None:
+        if actuator.refractory_wires(actuator.rest) is None:
             return None
         numbers = self.simulator.observe_actuators()
         return np.clip(numbers.reshape(self.n_robots, self.scene.robot.n_limbs, -1)[..., :2], 0.0, 1.0)
@@ -392,7 +394,7 @@ class Swimming(ABC):
         self.last_commands = followed
         if self._tracker is not None:
             self._tracker.look(self.simulator.time)
-        score = self._score(hub, pulses_of(report.heating_time, followed))
+        score = self._reward_terms(hub, pulses_of(report.heating_time, followed))
         info = {
             **self.facts(hub),
             "is_success": score.success,
@@ -434,7 +436,7 @@ class Swimming(ABC):
         return {
             "time": self.simulator.time,
             "hub_position": hub.copy(),
-            **self._goal_facts(hub),
+            **self._task_info(hub),
             **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
             **(self._errors() if self._tells_errors else {}),
             **({"error_estimate": self.simulator.error_estimate} if self.options.error_bars else {}),

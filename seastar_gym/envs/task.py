@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.headings import AskedHeadings
+from seastar_gym.envs.headings import EpisodeHeadings
 from seastar_gym.envs.options import Path, SwimOptions
 from seastar_gym.envs.paths import cross_track_error, make_path
 from seastar_gym.envs.reward import reward_terms
@@ -21,7 +21,7 @@ class SwimTask(Swimming):
     TERMS: tuple[str, ...] = ("reward_progress", "reward_waypoint", "reward_effort")
 
     def __init__(self, options: SwimOptions, n_robots: int, threads: int | None, *, effort: bool = False):
-        self._asked = None if options.headings is None else AskedHeadings(options.headings, n_robots)
+        self._asked = None if options.headings is None else EpisodeHeadings(options.headings, n_robots)
         if options.headings is not None:
             self.TERMS = (*self.TERMS, "reward_heading")
         super().__init__(options, n_robots, threads, draws=options.randomization, effort=effort)
@@ -86,12 +86,12 @@ class SwimTask(Swimming):
         targets[:, :2], targets[:, 2:] = self._waypoint(self.waypoint_index), self._waypoint(self.waypoint_index + 1)
         return targets
 
-    def _wanted(self) -> Floats:
+    def _task_observation(self) -> Floats:
         if self._asked is None:
-            return super()._wanted()
+            return super()._task_observation()
         return self._asked.seen(self.waypoint_index, self.seen_heading())
 
-    def _score(self, hub: Floats, pulses: Floats) -> Score:
+    def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
         reached = self._pass_waypoints(hub)
         before = self._way_to_go
         self._way_to_go = self._measure_way_to_go(hub)
@@ -129,7 +129,7 @@ class SwimTask(Swimming):
             self.waypoint_index += near
             reached += near
 
-    def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
+    def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
         current = self._waypoint(self.waypoint_index)
         leg = np.minimum(self.waypoint_index, self.n_waypoints - 1)
         start = np.where((leg == 0)[:, None], 0.0, self._waypoint(np.maximum(leg - 1, 0)))

@@ -9,7 +9,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, action_space, command_table
-from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.spec import PlainSpec
@@ -70,7 +70,7 @@ class TaskEnv(PlainSpec):
         return self._task.layout
 
     @property
-    def headings(self) -> Headings | None:
+    def headings(self) -> HeadingTargets | None:
         """Headings that are asked for at the waypoints, None if none are."""
         return self._task.options.headings
 

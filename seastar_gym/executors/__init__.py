@@ -10,7 +10,7 @@ from typing import Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 from seastar_gym.command import refused_by_disk
 
 Task = TypeVar("Task")
-"""What is run: plain data that can be sent to another process, such as a `Cell`."""
+"""What is run: plain data that can be sent to another process, such as a `Batch`."""
 
 Work = Callable[[Task], bytes]
 """What is done with a task: a function of a module, that returns a file."""

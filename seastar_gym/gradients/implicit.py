@@ -13,7 +13,7 @@ from seastar_gym.der.contact.contact import n_listed
 from seastar_gym.der.contact.coupled import add_contact_product, dot
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
-from seastar_gym.der.stepping.momentum import settle_momentum
+from seastar_gym.der.stepping.momentum import correct_momentum
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.dual_lanes import slope_of, with_slope
 from seastar_gym.simd.lanes import add_product, any_lane, load, select, splat, store, subtract_product
@@ -23,9 +23,9 @@ MOST_ITERATIONS = 200  # as in contact/coupled.py
 
 
 @kernel
-def settle_slopes(rods, work, scheme, k, stage, q_0, v_0, h, robots):
+def correct_slopes(rods, work, scheme, k, stage, q_0, v_0, h, robots):
     """Settle the momentum, see momentum.py, and then the slopes of the robots in the mask, after stage k of a step."""
-    settle_momentum(rods, work, scheme, k, stage, q_0, v_0, h, robots)
+    correct_momentum(rods, work, scheme, k, stage, q_0, v_0, h, robots)
     factorise(rods, work, stage, None)
     substitute_star(rods, work, work.step)
     for row in range(2 * rods.n_free):

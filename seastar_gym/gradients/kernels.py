@@ -12,7 +12,7 @@ from numba.core.compiler_lock import global_compiler_lock
 
 from seastar_gym.der.stepping.steps import solve_stages
 from seastar_gym.der.stepping.stroke import advance
-from seastar_gym.gradients.implicit import settle_slopes
+from seastar_gym.gradients.implicit import correct_slopes
 from seastar_gym.simd import compilation, dual_lanes
 from seastar_gym.simd.compilation import entry_point, kernel
 from seastar_gym.simd.modules import COMPILATION, LANES, KernelModules
@@ -26,7 +26,7 @@ class DualKernels(KernelModules):
 
     def __init__(self) -> None:
         super().__init__({LANES: dual_lanes, COMPILATION: compilation})
-        vars(self._module_of(solve_stages.__module__))["settle_momentum"] = self(settle_slopes)
+        vars(self._module_of(solve_stages.__module__))["correct_momentum"] = self(correct_slopes)
 
 
 @entry_point

@@ -113,7 +113,7 @@ class PlantTask(SwimTask):
         if self.logs is not None:
             self.logs.sighting(seen)
 
-    def _deaf_wires(self) -> Flags:
+    def _refractory_wires(self) -> Flags:
         return self.guard.resting()[None]
 
     def _swim(self, lag: Lag, commands: Floats, ends: list[float]) -> Generator[float, None, StrokeReport]:
@@ -205,7 +205,7 @@ class PlantSwim(SeastarSwimEnv):
 
     `info` has `late`, how late the last decision was [s], for which the episode's clock waits, and `plant_message`. The
     guard ends an episode with `truncated` and a sentence in `plant_message`: then all wires are stopped. Wires that
-    have to rest are masked, as deaf ones are.
+    have to rest are masked, as refractory ones are.
 
     ## Arguments besides those of `SeastarSwimEnv`
     plant: What is driven, see `seastar_gym.plant.plant`.

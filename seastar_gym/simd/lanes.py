@@ -190,6 +190,26 @@ class _AbsentModel(models.DataModel):
         return ir.Constant(NOTHING, None)
 
 
+class Bundle(types.containers.NamedTuple):
+    """A borrowed named tuple. It goes to another kernel as one value, where numba's own would go member by member, each
+    taken out and put in again: half of all that is compiled. Nor does anybody look in it for arrays to count."""
+
+
+@register_model(Bundle)
+class _BundleModel(models.TupleModel):
+    def get_argument_type(self):
+        return self.get_value_type()
+
+    def as_argument(self, builder, value):
+        return value
+
+    def from_argument(self, builder, value):
+        return value
+
+    def traverse(self, builder):
+        return []
+
+
 def _borrowed(field):
     """Type of a borrowed array or bundle of arrays; numbers stay what they are; None for anything else."""
     if isinstance(field, types.Array):
@@ -197,7 +217,7 @@ def _borrowed(field):
         return Rows(shared=field.ndim == 1) if is_rows else None
     if isinstance(field, types.BaseNamedTuple):
         fields = [_borrowed(f) for f in field]
-        return None if None in fields else types.BaseTuple.from_types(fields, field.instance_class)
+        return None if None in fields else Bundle(tuple(fields), field.instance_class)
     if isinstance(field, types.NoneType):
         return absent
     return field if isinstance(field, types.Number | types.Boolean) else None

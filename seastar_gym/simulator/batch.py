@@ -189,12 +189,12 @@ class Batch:
         self.status[:] = 0.0
         self.last_hub = self.hub_position()
 
-    def moved(self) -> dict[str, Any]:
-        """Copies of what an interval changes, for `put_back`."""
+    def save(self) -> dict[str, Any]:
+        """Copies of what an interval changes, for `restore`."""
         return {name: getattr(self, name).copy() for name in MOVED}
 
-    def put_back(self, moved: dict[str, Any]) -> None:
-        """Undo an interval, from the copies that `moved` made before it."""
+    def restore(self, moved: dict[str, Any]) -> None:
+        """Undo an interval, from the copies that `save` made before it."""
         for name, values in moved.items():
             getattr(self, name)[:] = values
 

@@ -55,8 +55,8 @@ class Clock:
         self.lost += (self.start - (total - added)) + (time - added)
         self.start[:] = total
 
-    def show(self, covered: Floats) -> None:
-        """Show the time covered since the interval began [s], shape (n_robots,)."""
+    def advance_to(self, covered: Floats) -> None:
+        """Advance to this time since the interval began [s], shape (n_robots,)."""
         self.within[:] = covered
 
     def end(self, failed: NDArray[np.bool_], covered: Floats) -> None:
@@ -70,7 +70,7 @@ class Clock:
         vars(clock).update({name: getattr(self, name).copy() for name in COUNTED}, duration=self.duration)
         return clock
 
-    def put(self, other: "Clock") -> None:
+    def restore(self, other: "Clock") -> None:
         """Show the time of another clock."""
         self.duration = other.duration
         for name in COUNTED:

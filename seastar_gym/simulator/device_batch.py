@@ -120,13 +120,13 @@ class DeviceBatch(Batch):
         rows = {"q": self._on_host["q"][0], "v": self._on_host["v"][0], "rows": np.zeros((n_rows, N_LANES))}
         return Program(_kernels(), _kernels()(kernel), rows | of_one, ())
 
-    def moved(self) -> dict[str, Any]:
+    def save(self) -> dict[str, Any]:
         rows = {name: self._rows(name).copy() for name in self._on_device}
         return {name: getattr(self, name).copy() for name in MOVED if name not in rows} | {"on device": rows}
 
-    def put_back(self, moved: dict[str, Any]) -> None:
+    def restore(self, moved: dict[str, Any]) -> None:
         rows = moved["on device"]
-        super().put_back({name: values for name, values in moved.items() if name != "on device"})
+        super().restore({name: values for name, values in moved.items() if name != "on device"})
         for name, values in rows.items():
             self._rows(name)[:] = values
         self._on_device |= set(rows)

@@ -117,9 +117,9 @@ class Drive:
         seen = self._actuator.observe(self.state)
         return seen.reshape(len(seen), -1)
 
-    def deaf_wires(self) -> NDArray[np.bool_]:
+    def refractory_wires(self) -> NDArray[np.bool_]:
         """Wires that cannot be heated now, shape (n_robots, n_limbs, 2)."""
-        known = self._actuator.deaf_wires(self.state)
+        known = self._actuator.refractory_wires(self.state)
         if known is not None:
             return known
         must_wait = not self._actuator.has_memory and bool(self.rotations().any())

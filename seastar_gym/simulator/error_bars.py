@@ -56,7 +56,7 @@ class Swimmers(Protocol):
     def close(self) -> None: ...
 
 
-class Before(NamedTuple):
+class Snapshot(NamedTuple):
     """Copies of what an interval changes, made before it."""
 
     twin: State
@@ -112,11 +112,11 @@ class ErrorBars:
         self.twin.reset()
         self._largest[:] = np.nan
 
-    def before(self) -> Before:
-        """Copies for `put_back`."""
-        return Before(self.twin.get_state(), self._largest.copy())
+    def save(self) -> Snapshot:
+        """Copies for `restore`."""
+        return Snapshot(self.twin.get_state(), self._largest.copy())
 
-    def put_back(self, before: Before) -> None:
+    def restore(self, before: Snapshot) -> None:
         """Undo an interval. Robots on which the solver failed before swim again in the twin, but have no estimate."""
         self.twin.set_state(before.twin)
         self._largest = before.largest

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym import renamed
 from seastar_gym.der.rods import Work
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
@@ -35,7 +36,7 @@ Floats = NDArray[np.float64]
 MAX_ROBOTS, MAX_THREADS = 100_000_000, 4096
 
 
-class Before(NamedTuple):
+class Snapshot(NamedTuple):
     """Copies of what an interval changes, made before it."""
 
     rows: dict[str, Any]
@@ -44,6 +45,7 @@ class Before(NamedTuple):
     bars: Any
 
 
+@renamed.methods
 class Simulator:
     """A batch of robots of one scene. They begin at rest, with the hub at the origin.
 
@@ -170,7 +172,7 @@ class Simulator:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(*state["arguments"])  # type: ignore[misc]
         self._batch.put_rows(state["rows"])
-        self._clock.put(state["clock"])
+        self._clock.restore(state["clock"])
         vars(self._drive).update(state["drive"])
         self._bars, self._growth = state["bars"], state["growth"]
 
@@ -232,13 +234,13 @@ class Simulator:
         """Actuators' state as numbers of order one, shape (n_robots, k), limb after limb; k = 0 without memory."""
         return self._drive.observe()
 
-    def deaf_wires(self) -> NDArray[np.bool_]:
+    def refractory_wires(self) -> NDArray[np.bool_]:
         """Wires that cannot be heated now, for + and - of every limb, shape (n_robots, n_limbs, 2).
 
         Commands to them are ignored. In the middle of a stroke of an actuator without memory it is all of them, and
-        commands are refused. An actuator of your own that has no `deaf_wires` has none.
+        commands are refused. An actuator of your own that has no `refractory_wires` has none.
         """
-        return self._drive.deaf_wires()
+        return self._drive.refractory_wires()
 
     @property
     def limb_strengths(self) -> Floats:
@@ -417,7 +419,7 @@ class Simulator:
             times = self._batch.times - self._batch.times[0]
             for begin, end in pairwise([0, *ends_of(times)]):
                 self._batch.advance(begin, end)
-                self._clock.show(self._batch.covered())
+                self._clock.advance_to(self._batch.covered())
                 self._drive.advance(end)
                 self._batch.show_rotations(end)
                 self._lock.pause()
@@ -432,28 +434,28 @@ class Simulator:
         checked = None if commands is None else checked_commands(commands, self.scene, self._drive.strengths)
         self._lock.require_intact()
         interval = self._lock.acquire()
-        bars = None if self._bars is None else self._bars.before()
-        before = Before(self._batch.moved(), self._clock.copy(), dict(vars(self._drive)), bars)
+        bars = None if self._bars is None else self._bars.save()
+        before = Snapshot(self._batch.save(), self._clock.copy(), dict(vars(self._drive)), bars)
         try:
             self._begin_interval(float(duration), checked)
             yield interval
             self._lock.release()
         except BaseException:
-            self._put_back(interval, before)
+            self._restore(interval, before)
             raise
 
-    def _put_back(self, interval: object, before: Before) -> None:
+    def _restore(self, interval: object, before: Snapshot) -> None:
         """Undo an interval, unless robots were put into another state since."""
         try:
             if self._lock.resume(interval):
-                self._batch.put_back(before.rows)
-                self._clock.put(before.clock)
+                self._batch.restore(before.rows)
+                self._clock.restore(before.clock)
                 vars(self._drive).update(before.drive)
                 if self._bars is not None:
-                    self._bars.put_back(before.bars)
+                    self._bars.restore(before.bars)
                 self._lock.release()
         except BaseException:  # interrupted once more: the robots are put back all the same
-            self._put_back(interval, before)
+            self._restore(interval, before)
             raise
 
     def _begin_interval(self, duration: float, commands: Floats | None) -> None:

@@ -1,8 +1,8 @@
-"""Sweeps: many designs, simulated cell by cell on processes, Ray or SLURM. `python -m seastar_gym.sweep --help`.
+"""Sweeps: many designs, simulated batch by batch on processes, Ray or SLURM. `python -m seastar_gym.sweep --help`.
 
 sweep = Sweep(Scene.preset("fast"), (Range("robot.limb_length", 0.05, 0.15), Choices("robot.n_limbs", (3, 5))), samples=1000)
-run(sweep.cells(), "runs/limbs", Processes(2))
-table = read_parts("runs/limbs").to_pandas()
+run(sweep.batches(), "runs/limbs", Processes(2))
+table = read_results("runs/limbs").to_pandas()
 """  # noqa: E501
 
 from seastar_gym.extras import require_extra

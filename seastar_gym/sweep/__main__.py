@@ -3,5 +3,5 @@
 from seastar_gym.command import run_command
 from seastar_gym.sweep.command import main
 
-if __name__ == "__main__":  # processes that run cells import this file, too
+if __name__ == "__main__":  # processes that run batches import this file, too
     run_command(main)

@@ -12,8 +12,8 @@ numerics.step, of a whole part (robot, fluid, actuator, numerics, contact), fide
     0.05:0.15           a range, 0.05:0.15:log in the logarithm, for --latin or --optuna
 
 Without ranges, the sweep is the grid of all combinations. Numbers that robots may have of their own are simulated side
-by side. Every cell, of some hundred designs, has one file of results, OUT/parts/*/*.parquet. The same command goes on
-with the cells that have none.
+by side. Every batch, of some hundred designs, has one file of results, OUT/parts/*/*.parquet. The same command goes on
+with the batches that have none.
 """
 
 import argparse
@@ -35,11 +35,11 @@ from seastar_gym.scene.checks import shown
 from seastar_gym.scene.scene_file import load_scene
 from seastar_gym.simulator.device_batch import DEVICES
 from seastar_gym.sweep.axes import Axis, Range
-from seastar_gym.sweep.cells import Cell
+from seastar_gym.sweep.batches import Batch
+from seastar_gym.sweep.controllers import Route
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.parts import part_of
-from seastar_gym.sweep.pilots import Course
-from seastar_gym.sweep.run import Tally, run
+from seastar_gym.sweep.result_files import result_file_of
+from seastar_gym.sweep.run import Progress, run
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS
 from seastar_gym.sweep.text import axis_of
 
@@ -69,23 +69,23 @@ def make_parser() -> argparse.ArgumentParser:
         help=f"Optuna: proposals without result for so long are put back {default}",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn {default}")
-    parser.add_argument("--robots", type=int, default=256, help=f"designs of a cell at most {default}")
+    parser.add_argument("--robots", type=int, default=256, help=f"designs of a batch at most {default}")
     parser.add_argument(
         "--device", choices=("cpu", *DEVICES), default="cpu",
         help=f"where robots swim, to the same bits: cuda is a GPU, with --robots 16384 --workers 1 {default}",
     )  # fmt: skip
-    add_options(parser, "cells", "processes")
-    parser.add_argument("--count", action="store_true", help="say how many designs and cells there are, and stop")
+    add_options(parser, "batches", "processes")
+    parser.add_argument("--count", action="store_true", help="say how many designs and batches there are, and stop")
     return parser
 
 
-def bar_of(total: int, bar: Any) -> Callable[[Tally], None]:
-    """Progress that shows cells, designs and strokes per second and the estimate of the rest.
+def bar_of(total: int, bar: Any) -> Callable[[Progress], None]:
+    """Progress that shows batches, designs and strokes per second and the estimate of the rest.
 
     Strokes of controllers, which end when they arrive, are not counted.
     """
 
-    def show(tally: Tally) -> None:
+    def show(tally: Progress) -> None:
         seconds = max(bar.format_dict["elapsed"], 1e-9)
         bar.total = total - tally.kept
         bar.set_postfix_str(
@@ -99,14 +99,14 @@ def bar_of(total: int, bar: Any) -> Callable[[Tally], None]:
     return show
 
 
-def as_text(tally: Tally, out: Path) -> str:
+def as_text(tally: Progress, out: Path) -> str:
     """What was done, in a sentence or two."""
-    text = f"New in {out}: {tally.designs:,} designs, cells: {tally.done}; there before, cells: {tally.kept}."
+    text = f"New in {out}: {tally.designs:,} designs, batches: {tally.done}; there before, batches: {tally.kept}."
     if tally.damaged:
         text += f" Damaged before, and simulated again: {', '.join(map(str, tally.damaged))}."
     if tally.problems:
         name, problem = next(iter(tally.problems.items()))
-        text += f" Without result, cells: {len(tally.problems)}, such as {name[:8]}: {problem}"
+        text += f" Without result, batches: {len(tally.problems)}, such as {name[:8]}: {problem}"
     return text
 
 
@@ -116,25 +116,25 @@ def sweep_of(options: argparse.Namespace, axes: tuple[Axis, ...]) -> Sweep:
     return Sweep(
         scene, axes, options.gait, options.settling, options.measured,
         1 if options.optuna and any(isinstance(axis, Range) for axis in axes) else options.latin,
-        options.seed, options.robots, Course(load_path(options.path), options.seconds, options.decision_period),
+        options.seed, options.robots, Route(load_path(options.path), options.seconds, options.decision_period),
     )  # fmt: skip
 
 
-def work_of(options: argparse.Namespace) -> Callable[[Cell], bytes]:
-    """What makes a part of a cell, on the device that the options name. ValueError if this machine is to have it."""
+def work_of(options: argparse.Namespace) -> Callable[[Batch], bytes]:
+    """What makes a part of a batch, on the device that the options name. ValueError if this machine is to have it."""
     if options.device != "cpu" and options.executor in ("here", "processes"):
         DEVICES[options.device].arrays()
-    return partial(part_of, device=options.device)
+    return partial(result_file_of, device=options.device)
 
 
 def run_sweep(sweep: Sweep, options: argparse.Namespace) -> int:
-    """Run the cells of a grid or a Latin hypercube; returns the exit code."""
-    print(f"{sweep.n_designs:,} designs in {sweep.n_cells:,} cells.")
+    """Run the batches of a grid or a Latin hypercube; returns the exit code."""
+    print(f"{sweep.n_designs:,} designs in {sweep.n_batches:,} batches.")
     if options.count:
         return 0
     work = work_of(options)
-    with tqdm(total=sweep.n_cells, unit="cell") as bar:
-        tally = run(sweep.cells(), options.out, executor_of(options), bar_of(sweep.n_cells, bar), work)
+    with tqdm(total=sweep.n_batches, unit="batch") as bar:
+        tally = run(sweep.batches(), options.out, executor_of(options), bar_of(sweep.n_batches, bar), work)
     print(as_text(tally, options.out))
     return 1 if tally.problems else 0
 
@@ -169,6 +169,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(bad_input, file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print(f"Interrupted: all finished cells are in {shown(str(options.out))}, and the same command goes on.",
+        print(f"Interrupted: all finished batches are in {shown(str(options.out))}, and the same command goes on.",
               file=sys.stderr)  # fmt: skip
         return INTERRUPTED

@@ -1,4 +1,4 @@
-"""`Sweep`: designs of a grid or a Latin hypercube, and their cells, one after the other."""
+"""`Sweep`: designs of a grid or a Latin hypercube, and their batches, one after the other."""
 
 import itertools
 import math
@@ -11,29 +11,32 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from seastar_gym import renamed
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_seed, shown
 from seastar_gym.scene.number import check_numbers, whole
 from seastar_gym.scene.per_robot import numbers_of, with_numbers
 from seastar_gym.sweep.axes import Axis, Choices, Range, require_known
-from seastar_gym.sweep.cells import Cell
-from seastar_gym.sweep.frames import Frame, Swim, frame_with, scene_with
-from seastar_gym.sweep.pilots import Course
+from seastar_gym.sweep.batches import Batch
+from seastar_gym.sweep.configurations import Configuration, Swim, configuration_with, scene_with
+from seastar_gym.sweep.controllers import Route
 
 Floats = NDArray[np.float64]
 
 CHECKED = 256
-"""Frames that are made before the first cell runs, so that bad choices are refused at once."""
+"""Frames that are made before the first batch runs, so that bad choices are refused at once."""
 MOST_NUMBERS = 20_000_000
 """Numbers of a Latin hypercube, which is drawn as a whole: 160 MB."""
 
 
+@renamed.methods
+@renamed.arguments
 @dataclass(frozen=True)
 class Sweep:
     """Designs of all combinations of choices; with ranges, `samples` of a Latin hypercube for every combination.
 
-    Numbers that may differ from robot to robot are simulated side by side, as many designs as `robots` in a cell. All
-    other choices make cells of their own. Cells are made one by one: memory does not grow with their number.
+    Numbers that may differ from robot to robot are simulated side by side, as many designs as `robots` in a batch. All
+    other choices make batches of their own. Batches are made one by one: memory does not grow with their number.
 
     scene: Scene for one robot that is varied.
     axes: What differs.
@@ -41,8 +44,8 @@ class Sweep:
     settling, measured: Intervals of the gait, such as strokes, before and during the measurement.
     samples: Designs of the Latin hypercube.
     seed: Of the Latin hypercube.
-    robots: Designs of a cell at most.
-    course: What controllers swim, if there is an axis of them. Gaits and their intervals are of no matter then.
+    robots: Designs of a batch at most.
+    route: What controllers swim, if there is an axis of them. Gaits and their intervals are of no matter then.
     """
 
     scene: Scene
@@ -53,7 +56,7 @@ class Sweep:
     samples: Annotated[int, whole(0, MOST_NUMBERS)] = 0
     seed: int = 0
     robots: Annotated[int, whole(1, 1_000_000)] = 256
-    course: Course = Course()
+    route: Route = Route()
 
     def __post_init__(self) -> None:
         if not isinstance(self.scene, Scene) or self.scene.n_robots is not None:
@@ -68,8 +71,8 @@ class Sweep:
         check_numbers(self)
         require_seed(self.seed)
         self._check_axes()
-        self._check_ends(next(self.frames()))
-        for _ in itertools.islice(self.frames(), CHECKED):
+        self._check_ends(next(self.configurations()))
+        for _ in itertools.islice(self.configurations(), CHECKED):
             pass
 
     def _check_axes(self) -> None:
@@ -83,7 +86,7 @@ class Sweep:
         elif self.samples:
             raise ValueError("A Latin hypercube needs a range to draw from, such as robot.limb_length=0.05:0.15.")
 
-    def _check_ends(self, frame: Frame) -> None:
+    def _check_ends(self, frame: Configuration) -> None:
         """Refuse numbers of robots of which neither the first nor the last ones can be modelled together."""
         ends = [
             {axis.name: axis.at(np.array(end)) for axis in self.ranges}
@@ -122,56 +125,56 @@ class Sweep:
         return {axis.name: np.array(axis.values, np.float64) for axis in self.of_robots}
 
     @cached_property
-    def of_frames(self) -> tuple[Choices, ...]:
-        """Choices of which every combination needs cells of its own."""
+    def of_configurations(self) -> tuple[Choices, ...]:
+        """Choices of which every combination needs batches of its own."""
         choices = [axis for axis in self.axes if isinstance(axis, Choices)]
         return tuple(axis for axis in choices if axis not in self.of_robots)
 
     @property
-    def n_frames(self) -> int:
-        """Number of combinations of choices that need cells of their own."""
-        return math.prod(len(axis.values) for axis in self.of_frames)
+    def n_configurations(self) -> int:
+        """Number of combinations of choices that need batches of their own."""
+        return math.prod(len(axis.values) for axis in self.of_configurations)
 
     @property
-    def designs_per_frame(self) -> int:
+    def designs_per_configuration(self) -> int:
         """Number of designs of each such combination."""
         return math.prod(len(axis.values) for axis in self.of_robots) * max(1, self.samples)
 
     @property
     def n_designs(self) -> int:
         """Number of designs."""
-        return self.n_frames * self.designs_per_frame
+        return self.n_configurations * self.designs_per_configuration
 
     @property
-    def n_cells(self) -> int:
-        """Number of cells."""
-        return self.n_frames * -(-self.designs_per_frame // self.robots)
+    def n_batches(self) -> int:
+        """Number of batches."""
+        return self.n_configurations * -(-self.designs_per_configuration // self.robots)
 
-    def frames(self) -> Iterator[Frame]:
-        """Frames of all combinations of choices. ValueError for one that cannot be modelled."""
-        for places in itertools.product(*(range(len(axis.values)) for axis in self.of_frames)):
-            yield self.frame(places)
+    def configurations(self) -> Iterator[Configuration]:
+        """Configurations of all combinations of choices. ValueError for one that cannot be modelled."""
+        for places in itertools.product(*(range(len(axis.values)) for axis in self.of_configurations)):
+            yield self.configuration(places)
 
-    def frame(self, places: tuple[int, ...]) -> Frame:
-        """Frame of one combination. places: Which value of every one of `of_frames`."""
+    def configuration(self, places: tuple[int, ...]) -> Configuration:
+        """Configuration of one combination. places: Which value of every one of `of_configurations`."""
         choices = {
             axis.name: (axis.values[place], axis.labels[place])
-            for axis, place in zip(self.of_frames, places, strict=True)
+            for axis, place in zip(self.of_configurations, places, strict=True)
         }
-        frame = frame_with(self.scene, self.gait, Swim(self.settling, self.measured), choices, self.course)
+        frame = configuration_with(self.scene, self.gait, Swim(self.settling, self.measured), choices, self.route)
         of_robots: tuple[Axis, ...] = (*self.ranges, *self.of_robots)
         missing = {axis.name for axis in of_robots} - set(numbers_of(frame.scene))
         if missing:
             raise ValueError(f"With {shown(dict(frame.labels))}, no number is called {', '.join(sorted(missing))}.")
         return frame
 
-    def cells(self) -> Iterator[Cell]:
-        """All cells, one after the other."""
-        for index, frame in enumerate(self.frames()):
+    def batches(self) -> Iterator[Batch]:
+        """All batches, one after the other."""
+        for index, frame in enumerate(self.configurations()):
             drawn = self._drawn(index)
-            for begin in range(0, self.designs_per_frame, self.robots):
-                places = np.arange(begin, min(begin + self.robots, self.designs_per_frame))
-                yield Cell(frame, self._numbers(places, drawn), len(places))
+            for begin in range(0, self.designs_per_configuration, self.robots):
+                places = np.arange(begin, min(begin + self.robots, self.designs_per_configuration))
+                yield Batch(frame, self._numbers(places, drawn), len(places))
 
     def _drawn(self, index: int) -> Floats:
         """Latin hypercube of a frame, shares of the ranges, shape (samples, n_ranges)."""

@@ -20,17 +20,17 @@ from sqlalchemy.exc import SQLAlchemyError
 from seastar_gym.executors import Executor, Outcome, Work, sentence_of
 from seastar_gym.scene.checks import require_choice, require_count, require_number
 from seastar_gym.sweep.axes import Range
-from seastar_gym.sweep.cells import Cell
+from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.parts import Parts, part_of
-from seastar_gym.sweep.run import Progress, Tally
+from seastar_gym.sweep.result_files import ResultFiles, result_file_of
+from seastar_gym.sweep.run import OnProgress, Progress
 from seastar_gym.sweep.swimming import units_of
 
 
 class Search(NamedTuple):
     """What is searched. objective: Column of results. is_largest_best: Whether it is to be large. seed: Of proposals.
 
-    stale_after: Time after which a proposal without result is put back [s]: longer than a cell waits and takes.
+    stale_after: Time after which a proposal without result is put back [s]: longer than a batch waits and takes.
     """
 
     objective: str = "speed"
@@ -44,7 +44,7 @@ def study_of(sweep: Sweep, search: Search, storage: str) -> optuna.Study:
 
     It is another study where anything that results depend on is other, such as the file of one of the controllers.
     """
-    first = next(sweep.frames())
+    first = next(sweep.configurations())
     require_choice("objective", search.objective, tuple(name for name in units_of(first) if name != "status"))
     require_number("stale_after", search.stale_after, "s")
     if not sweep.axes:
@@ -65,23 +65,23 @@ def study_of(sweep: Sweep, search: Search, storage: str) -> optuna.Study:
 
 def _texts(sweep: Sweep) -> Iterator[str]:
     """Texts of frames that have, between them, every value of every axis."""
-    counts = [len(axis.values) for axis in sweep.of_frames]
+    counts = [len(axis.values) for axis in sweep.of_configurations]
     for place in range(max(counts, default=1)):
-        yield sweep.frame(tuple(min(place, count - 1) for count in counts)).text
+        yield sweep.configuration(tuple(min(place, count - 1) for count in counts)).text
 
 
 def explore(
     sweep: Sweep, search: Search, storage: str, designs: int, folder: str | os.PathLike[str], executor: Executor,
-    progress: Progress | None = None, work: Work[Cell] = part_of,
+    progress: OnProgress | None = None, work: Work[Batch] = result_file_of,
 ) -> optuna.Study:  # fmt: skip
-    """Propose and simulate until a study has results of so many designs. Every cell has `sweep.robots` at most.
+    """Propose and simulate until a study has results of so many designs. Every batch has `sweep.robots` at most.
 
-    work: What makes a part of a cell.
+    work: What makes a part of a batch.
     """
     require_count("designs", designs, 1, 10_000_000)
     proposals = Proposals(sweep, study_of(sweep, search, storage), search, designs)
-    parts, tally = Parts(folder), Tally()
-    for outcome in executor.run(work, proposals.cells()):
+    parts, tally = ResultFiles(folder), Progress()
+    for outcome in executor.run(work, proposals.batches()):
         if outcome.part is None:
             tally.losses += 1
         else:
@@ -94,14 +94,14 @@ def explore(
 
 
 class Proposals:
-    """Proposals of a study as cells, and their results. designs: Results that the study is to have."""
+    """Proposals of a study as batches, and their results. designs: Results that the study is to have."""
 
     def __init__(self, sweep: Sweep, study: optuna.Study, search: Search, designs: int):
         self.study, self._sweep, self._search, self._designs = study, sweep, search, designs
         self._waiting: dict[str, list[optuna.Trial]] = {}
 
-    def cells(self) -> Iterator[Cell]:
-        """Cells of proposals, made as they are asked for, while results are missing."""
+    def batches(self) -> Iterator[Batch]:
+        """Batches of proposals, made as they are asked for, while results are missing."""
         while True:
             put_back_stale(self.study, self._search.stale_after, {trial.number for trial in self._ours()})
             missing = self._designs - _count(self.study, TrialState.COMPLETE) - len(self._ours())
@@ -112,20 +112,20 @@ class Proposals:
     def _ours(self) -> list[optuna.Trial]:
         return [trial for trials in self._waiting.values() for trial in trials]
 
-    def _asked(self, n: int) -> list[Cell]:
-        """Cells of n proposals, one for every frame among them."""
+    def _asked(self, n: int) -> list[Batch]:
+        """Batches of n proposals, one for every frame among them."""
         groups: dict[tuple[int, ...], list[tuple[optuna.Trial, dict[str, float]]]] = {}
         for _ in range(n):
             trial = self.study.ask()
             places, numbers = self._suggested(trial)
             groups.setdefault(places, []).append((trial, numbers))
-        cells = []
+        batches = []
         for places, group in groups.items():
             columns = {name: np.array([numbers[name] for _, numbers in group]) for name in group[0][1]}
-            cell = Cell(self._sweep.frame(places), columns, len(group))
-            self._waiting.setdefault(cell.name, []).extend(trial for trial, _ in group)
-            cells.append(cell)
-        return cells
+            batch = Batch(self._sweep.configuration(places), columns, len(group))
+            self._waiting.setdefault(batch.name, []).extend(trial for trial, _ in group)
+            batches.append(batch)
+        return batches
 
     def _suggested(self, trial: optuna.Trial) -> tuple[tuple[int, ...], dict[str, float]]:
         """Which values the frame has, and the numbers of the robot."""
@@ -133,12 +133,12 @@ class Proposals:
         numbers = {axis.name: trial.suggest_float(axis.name, axis.low, axis.high, log=axis.is_log) for axis in
                    sweep.ranges}  # fmt: skip
         places = {axis.name: axis.labels.index(trial.suggest_categorical(axis.name, axis.labels)) for axis in
-                  (*sweep.of_robots, *sweep.of_frames)}  # fmt: skip
+                  (*sweep.of_robots, *sweep.of_configurations)}  # fmt: skip
         numbers |= {axis.name: float(axis.values[places[axis.name]]) for axis in sweep.of_robots}
-        return tuple(places[axis.name] for axis in sweep.of_frames), numbers
+        return tuple(places[axis.name] for axis in sweep.of_configurations), numbers
 
-    def tell(self, outcome: Outcome[Cell]) -> None:
-        """Tell the study what came of a cell. Proposals of a lost one are put back."""
+    def tell(self, outcome: Outcome[Batch]) -> None:
+        """Tell the study what came of a batch. Proposals of a lost one are put back."""
         trials = self._waiting.pop(outcome.task.name)
         if outcome.part is None:
             for trial in trials:

@@ -1,31 +1,34 @@
-"""Runs the cells of a sweep that have no part yet, and writes their parts."""
+"""Runs the batches of a sweep that have no part yet, and writes their parts."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from seastar_gym import renamed
 from seastar_gym.command import refused_by_disk
 from seastar_gym.executors import Executor, Outcome, Work
 from seastar_gym.scene.checks import require_callable, require_file, require_kind, shown
-from seastar_gym.sweep.cells import Cell
-from seastar_gym.sweep.parts import Parts, part_of
+from seastar_gym.sweep.batches import Batch
+from seastar_gym.sweep.result_files import ResultFiles, result_file_of
+
+__getattr__ = renamed.names_of(__name__)
 
 ATTEMPTS = 3
-"""How often a cell is tried whose worker is lost."""
+"""How often a batch is tried whose worker is lost."""
 MOST_LOST = 1000
-"""Cells that wait for another attempt at most. With more, something is wrong with all of them."""
+"""Batches that wait for another attempt at most. With more, something is wrong with all of them."""
 UNWRITTEN = 10
 """Parts in a row that the disk refuses at most. With more it is full for good, and what is simulated would be lost."""
 
 
 @dataclass
-class Tally:
+class Progress:
     """Counts of a run.
 
-    kept: Cells that had parts before. damaged: Parts that were damaged before, whose cells are run again.
-    done: Cells and, in them, designs and intervals (such as strokes) that were run.
-    losses: Attempts that failed. problems: Why cells have no part after all attempts, by the name of the cell.
+    kept: Batches that had parts before. damaged: Parts that were damaged before, whose batches are run again.
+    done: Batches and, in them, designs and intervals (such as strokes) that were run.
+    losses: Attempts that failed. problems: Why batches have no part after all attempts, by the name of the batch.
     """
 
     kept: int = 0
@@ -36,34 +39,34 @@ class Tally:
     losses: int = 0
     problems: dict[str, str] = field(default_factory=dict)
 
-    def count(self, cell: Cell) -> None:
-        """Count a finished cell."""
+    def count(self, batch: Batch) -> None:
+        """Count a finished batch."""
         self.done += 1
-        self.designs += cell.n_robots
-        self.intervals += cell.n_robots * cell.frame.intervals
+        self.designs += batch.n_robots
+        self.intervals += batch.n_robots * batch.configuration.intervals
 
 
-Progress = Callable[[Tally], None]
-"""Called after every cell."""
+OnProgress = Callable[[Progress], None]
+"""Called after every batch."""
 
 
 def run(
-    cells: Iterable[Cell], folder: str | os.PathLike[str], executor: Executor, progress: Progress | None = None,
-    work: Work[Cell] = part_of,
-) -> Tally:  # fmt: skip
-    """Run the cells that have no part in the folder; those that were lost again at the end.
+    batches: Iterable[Batch], folder: str | os.PathLike[str], executor: Executor, progress: OnProgress | None = None,
+    work: Work[Batch] = result_file_of,
+) -> Progress:  # fmt: skip
+    """Run the batches that have no part in the folder; those that were lost again at the end.
 
-    An interrupt, such as Ctrl-C, leaves the parts of all finished cells. A part that the disk refuses costs its cell,
-    which is lost; OSError if the disk refuses UNWRITTEN in a row.
+    An interrupt, such as Ctrl-C, leaves the parts of all finished batches. A part that the disk refuses costs its
+    batch, which is lost; OSError if the disk refuses UNWRITTEN in a row.
 
-    work: What makes a part of a cell.
+    work: What makes a part of a batch.
     """
     require_file("folder", folder)
     require_kind("executor", executor, Executor, "an executor, such as Processes()")
     if progress is not None:
         require_callable("progress", progress)
-    parts, tally = Parts(folder), Tally()
-    waiting, lost = unfinished(cells, parts, tally), list[Outcome[Cell]]()
+    parts, tally = ResultFiles(folder), Progress()
+    waiting, lost = unfinished(batches, parts, tally), list[Outcome[Batch]]()
     for _ in range(ATTEMPTS):
         lost = _attempt(executor.run(work, waiting), parts, tally, progress)
         if not lost:
@@ -73,27 +76,27 @@ def run(
     return tally
 
 
-def unfinished(cells: Iterable[Cell], parts: Parts, tally: Tally) -> Iterator[Cell]:
-    """Cells without a sound part; others are counted."""
+def unfinished(batches: Iterable[Batch], parts: ResultFiles, tally: Progress) -> Iterator[Batch]:
+    """Batches without a sound part; others are counted."""
     try:
-        each = iter(cells)
+        each = iter(batches)
     except TypeError:
-        raise ValueError(f"cells must be cells, as Sweep.cells gives them, not {shown(cells)}.") from None
-    for cell in each:
-        require_kind("A cell", cell, Cell, "a Cell, as Sweep.cells gives it")
-        if parts.has(cell.name):
+        raise ValueError(f"batches must be batches, as Sweep.batches gives them, not {shown(batches)}.") from None
+    for batch in each:
+        require_kind("A batch", batch, Batch, "a Batch, as Sweep.batches gives it")
+        if parts.has(batch.name):
             tally.kept += 1
             continue
-        if parts.file(cell.name).exists():
-            tally.damaged.append(parts.file(cell.name))
-        yield cell
+        if parts.file(batch.name).exists():
+            tally.damaged.append(parts.file(batch.name))
+        yield batch
 
 
 def _attempt(
-    outcomes: Iterator[Outcome[Cell]], parts: Parts, tally: Tally, progress: Progress | None
-) -> list[Outcome[Cell]]:
+    outcomes: Iterator[Outcome[Batch]], parts: ResultFiles, tally: Progress, progress: OnProgress | None
+) -> list[Outcome[Batch]]:
     """Write the parts of outcomes; returns those without."""
-    lost = list[Outcome[Cell]]()
+    lost = list[Outcome[Batch]]()
     refused = 0
     for outcome in outcomes:
         try:
@@ -111,7 +114,7 @@ def _attempt(
     return lost
 
 
-def _count(outcome: Outcome[Cell], lost: list[Outcome[Cell]], tally: Tally) -> None:
+def _count(outcome: Outcome[Batch], lost: list[Outcome[Batch]], tally: Progress) -> None:
     """Count an outcome. ValueError if too many are lost."""
     if outcome.part is not None:
         tally.count(outcome.task)
@@ -119,4 +122,4 @@ def _count(outcome: Outcome[Cell], lost: list[Outcome[Cell]], tally: Tally) -> N
     lost.append(outcome)
     tally.losses += 1
     if len(lost) > MOST_LOST:
-        raise ValueError(f"More than {MOST_LOST} cells failed, the last one so: {outcome.problem}")
+        raise ValueError(f"More than {MOST_LOST} batches failed, the last one so: {outcome.problem}")

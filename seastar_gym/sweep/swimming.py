@@ -1,4 +1,4 @@
-"""How the designs of a cell swim, one number per design and column."""
+"""How the designs of a batch swim, one number per design and column."""
 
 from typing import Any
 
@@ -12,9 +12,9 @@ from seastar_gym.evaluation.rollout import TaskBatch, rollout
 from seastar_gym.scene import Scene
 from seastar_gym.scene.per_robot import with_numbers
 from seastar_gym.simulator import Simulator
-from seastar_gym.sweep.cells import Cell
-from seastar_gym.sweep.frames import Frame
-from seastar_gym.sweep.pilots import Pilot
+from seastar_gym.sweep.batches import Batch
+from seastar_gym.sweep.configurations import Configuration
+from seastar_gym.sweep.controllers import Controller
 
 Floats = NDArray[np.float64]
 
@@ -56,53 +56,53 @@ OF_EPISODES = (
 """Entries of info that the columns of controllers are made of."""
 
 
-def units_of(frame: Frame) -> dict[str, str]:
+def units_of(frame: Configuration) -> dict[str, str]:
     """Columns of results of a frame, and their units."""
-    return UNITS if frame.pilot is None else UNITS | OF_CONTROLLERS
+    return UNITS if frame.controller is None else UNITS | OF_CONTROLLERS
 
 
-def swim(cell: Cell, device: str = "cpu") -> dict[str, NDArray[Any]]:
-    """Columns of results of a cell's designs, shape (n_robots,) each. device: Where robots swim, see `Simulator`."""
-    sound = np.ones(cell.n_robots, bool)
+def swim(batch: Batch, device: str = "cpu") -> dict[str, NDArray[Any]]:
+    """Columns of results of a batch's designs, shape (n_robots,) each. device: Where robots swim, see `Simulator`."""
+    sound = np.ones(batch.n_robots, bool)
     try:
-        scene = scene_of(cell, sound)
+        scene = scene_of(batch, sound)
     except ValueError:
-        sound = np.array([_is_sound(cell, k) for k in range(cell.n_robots)])
-        scene = scene_of(cell, sound) if sound.any() else cell.frame.scene
-    found = measure(scene, cell, int(sound.sum()), device) if sound.any() else {}
+        sound = np.array([_is_sound(batch, k) for k in range(batch.n_robots)])
+        scene = scene_of(batch, sound) if sound.any() else batch.configuration.scene
+    found = measure(scene, batch, int(sound.sum()), device) if sound.any() else {}
     columns: dict[str, NDArray[Any]] = {}
-    for name in units_of(cell.frame):
-        columns[name] = np.full(cell.n_robots, np.nan)
+    for name in units_of(batch.configuration):
+        columns[name] = np.full(batch.n_robots, np.nan)
         columns[name][sound] = found.get(name, np.nan)
     columns["status"] = np.where(sound, columns["status"], REFUSED).astype(np.int64)
     return columns
 
 
-def scene_of(cell: Cell, chosen: NDArray[np.bool_] | int) -> Scene:
-    """Scene of some robots of a cell side by side, or of one."""
-    return with_numbers(cell.frame.scene, {name: values[chosen] for name, values in cell.numbers.items()})
+def scene_of(batch: Batch, chosen: NDArray[np.bool_] | int) -> Scene:
+    """Scene of some robots of a batch side by side, or of one."""
+    return with_numbers(batch.configuration.scene, {name: values[chosen] for name, values in batch.numbers.items()})
 
 
-def _is_sound(cell: Cell, robot: int) -> bool:
+def _is_sound(batch: Batch, robot: int) -> bool:
     try:
-        scene_of(cell, robot)
+        scene_of(batch, robot)
     except ValueError:
         return False
     return True
 
 
-def measure(scene: Scene, cell: Cell, n_robots: int, device: str = "cpu") -> dict[str, NDArray[Any]]:
+def measure(scene: Scene, batch: Batch, n_robots: int, device: str = "cpu") -> dict[str, NDArray[Any]]:
     """Columns of results of robots side by side, NaN where the solver failed."""
-    frame, pilot = cell.frame, cell.frame.pilot
-    if pilot is None:
+    frame, controller = batch.configuration, batch.configuration.controller
+    if controller is None:
         columns = repeat(scene, frame, n_robots, device)
     else:
-        columns = steer(scene, frame.scene, pilot, n_robots, device)
+        columns = steer(scene, frame.scene, controller, n_robots, device)
     status = columns.pop("status")
     return {**{name: np.where(status == 0.0, column, np.nan) for name, column in columns.items()}, "status": status}
 
 
-def repeat(scene: Scene, frame: Frame, n_robots: int, device: str) -> dict[str, NDArray[Any]]:
+def repeat(scene: Scene, frame: Configuration, n_robots: int, device: str) -> dict[str, NDArray[Any]]:
     """Columns of results of robots side by side that repeat a gait."""
     simulator, gait, swum = Simulator(scene, n_robots, 1, effort=True, device=device), frame.gait, frame.swim
     interval = scene.actuator.period if gait.interval is None else gait.interval
@@ -125,21 +125,22 @@ def repeat(scene: Scene, frame: Frame, n_robots: int, device: str) -> dict[str, 
     }  # fmt: skip
 
 
-def steer(scene: Scene, frame: Scene, pilot: Pilot, n_robots: int, device: str) -> dict[str, NDArray[Any]]:
+def steer(scene: Scene, frame: Scene, controller: Controller, n_robots: int, device: str) -> dict[str, NDArray[Any]]:
     """Columns of results of robots side by side that a controller steers, up to the last waypoint or the time limit.
 
     frame: Scene that the controller knows.
     """
-    n_limbs, policy, waypoints = scene.robot.n_limbs, pilot.policy(frame), np.array(pilot.waypoints)
+    n_limbs, policy, waypoints = scene.robot.n_limbs, controller.policy(frame), np.array(controller.waypoints)
     actions = actions_of(policy, n_limbs)
-    require_fit(policy, scene, actions, pilot.decision_period)
+    require_fit(policy, scene, actions, controller.decision_period)
     options = SwimOptions(
-        waypoints, actions, scene=scene, waypoint_radius=RADIUS, decision_period=pilot.decision_period, device=device
-    )
+        waypoints, actions, scene=scene, waypoint_radius=RADIUS, decision_period=controller.decision_period,
+        device=device,
+    )  # fmt: skip
     task = SwimTask(options, n_robots, 1, effort=True)
     headings: list[Floats] = []
     swum = rollout(
-        TaskBatch(task), policy, seeds=0, until=pilot.decisions, record=OF_EPISODES,
+        TaskBatch(task), policy, seeds=0, until=controller.decisions, record=OF_EPISODES,
         on_step=lambda info: headings.append(task.heading()),
     )  # fmt: skip
     begin, end = headings[0], np.array(headings)[swum.decisions, np.arange(n_robots)]

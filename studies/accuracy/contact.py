@@ -25,7 +25,7 @@ from seastar_gym.simulator import Simulator
 from studies.accuracy.settings import MS
 from studies.accuracy.work_precision import cost, draw_sequences, finite
 from studies.frame import InDocs, Results, Study
-from studies.kept import rounded
+from studies.results_file import rounded
 from studies.style import PERCENT
 
 Floats = NDArray[np.float64]

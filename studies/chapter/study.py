@@ -18,7 +18,7 @@ from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import SmaPulse
 from studies.chapter import pictures
 from studies.chapter.cost import measure_cost
-from studies.chapter.kept import kept, pair_commands, pairs_table, pentagon_commands, strokes_table, swims_of
+from studies.chapter.results import as_results, pair_commands, pairs_table, pentagon_commands, strokes_table, swims_of
 from studies.chapter.statements import (
     PAIRS,
     Statement,
@@ -71,7 +71,7 @@ def make_figures(out: Path, quick: bool = False, progress: bool = True) -> tuple
     costs = [measure_cost(robot, steps, seconds, bar.update) for robot in (THE_CHAPTERS, CONTINUUM.robot)]
     pictures.draw_cost(costs, out / "fig_13_9.png")
     bar.close()
-    return statements + cost_statements(costs), kept(straight, pentagon, pairs)
+    return statements + cost_statements(costs), as_results(straight, pentagon, pairs)
 
 
 @dataclass(frozen=True)

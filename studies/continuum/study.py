@@ -24,7 +24,7 @@ from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
 from studies.continuum.scenes import NAMES, scene
 from studies.frame import InDocs, Results, Study
-from studies.kept import rounded
+from studies.results_file import rounded
 from studies.style import DPI, INK, PERCENT, as_percent, subplots
 
 Floats = NDArray[np.float64]

@@ -16,8 +16,8 @@ from tqdm import tqdm
 from seastar_gym.accuracy import Certificate
 from seastar_gym.accuracy.measure import SAMPLES, certify
 from seastar_gym.scene import Scene, SmaPulse
-from seastar_gym.sweep.cells import Cell
-from seastar_gym.sweep.frames import Swim, frame_with
+from seastar_gym.sweep.batches import Batch
+from seastar_gym.sweep.configurations import Swim, configuration_with
 from seastar_gym.sweep.swimming import swim
 from studies.designs.space import MEASURED, SETTLING, Body
 from studies.frame import Results, Study, require_known
@@ -76,7 +76,7 @@ def told(certificate: Certificate) -> Table:
             if (each.nodes_per_limb, each.step, each.scheme) == (nodes, step, "implicit-midpoint")
         )  # fmt: skip
         scene = certificate.at(setting)
-        columns = swim(Cell(frame_with(scene, "straight", Swim(SETTLING, MEASURED), {}), {}, 1))
+        columns = swim(Batch(configuration_with(scene, "straight", Swim(SETTLING, MEASURED), {}), {}, 1))
         found[f"{nodes} nodes, {1e3 * step:g} ms"] = {
             "repeated_percent": round(100 * setting.error((CLASS,)), 3),
             "typical_percent": round(100 * setting.typical_error((CLASS,)), 3),

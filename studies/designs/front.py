@@ -13,13 +13,13 @@ import numpy as np
 
 from seastar_gym.executors.processes import Processes
 from seastar_gym.scene import Contact, Scene, SmaPulse
-from seastar_gym.sweep.cells import Cell
-from seastar_gym.sweep.frames import Swim, frame_with
+from seastar_gym.sweep.batches import Batch
+from seastar_gym.sweep.configurations import Swim, configuration_with
 from seastar_gym.sweep.swimming import swim
 from studies.designs.search import BODIES, CHILDREN, GENERATIONS, SPEEDS, Limit, Row, fastest, grown, search, thriftiest
 from studies.designs.space import MEASURED, SETTLING, Body
 from studies.frame import Results, Study
-from studies.kept import rounded
+from studies.results_file import rounded
 from studies.style import DPI, INK, MM, subplots
 
 Table = dict[str, Any]
@@ -45,7 +45,7 @@ def scene_of(row: Row) -> Scene:
 
 def swum(scene: Scene, fidelity: str = "reference") -> dict[str, float]:
     """Columns of a robot's results at a fidelity."""
-    cell = Cell(frame_with(scene, "straight", SWIM, {"fidelity": (fidelity, fidelity)}), {}, 1)
+    cell = Batch(configuration_with(scene, "straight", SWIM, {"fidelity": (fidelity, fidelity)}), {}, 1)
     return {name: float(column[0]) for name, column in swim(cell).items()}
 
 

@@ -17,9 +17,9 @@ from scipy.stats import qmc
 
 from seastar_gym.executors import Executor
 from seastar_gym.scene import Scene
-from seastar_gym.sweep.cells import Cell
-from seastar_gym.sweep.frames import Swim, frame_with
-from seastar_gym.sweep.parts import Parts, read_part
+from seastar_gym.sweep.batches import Batch
+from seastar_gym.sweep.configurations import Swim, configuration_with
+from seastar_gym.sweep.result_files import ResultFiles, read_result_file
 from seastar_gym.sweep.run import run
 from studies.designs.space import ANGLES, LENGTHS, LIMBS, MEASURED, MODULI, RADII, SETTLING, TAPERS, Body
 
@@ -125,13 +125,13 @@ def simulated(numbers: list[dict[str, Floats]], folder: Path, executor: Executor
     """Results of robots that count, numbers of every body's; what is in the folder is not simulated again."""
     scene, swim = Scene.preset("fast"), Swim(SETTLING, MEASURED)
     cells = [
-        Cell(frame_with(scene, "straight", swim, {"robot": (body.robot(), body.label)}), each, CHILDREN)
+        Batch(configuration_with(scene, "straight", swim, {"robot": (body.robot(), body.label)}), each, CHILDREN)
         for body, each in zip(BODIES, numbers, strict=True)
     ]
     tally = run(cells, folder, executor)
     if tally.problems:
         raise ValueError(f"{len(tally.problems)} cells have no results: run the command again.")
-    tables = [read_part(Parts(folder).file(cell.name)).to_pandas() for cell in cells]
+    tables = [read_result_file(ResultFiles(folder).file(cell.name)).to_pandas() for cell in cells]
     return counting(pandas.concat([table.assign(**body._asdict()) for body, table in zip(BODIES, tables, strict=True)]))
 
 

@@ -19,8 +19,8 @@ from seastar_gym.executors.processes import Processes
 from seastar_gym.scene import Scene, SmaPulse
 from seastar_gym.sweep.axes import Choices
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.parts import Parts, read_parts
-from seastar_gym.sweep.run import Tally, run
+from seastar_gym.sweep.result_files import ResultFiles, read_results
+from seastar_gym.sweep.run import Progress, run
 from studies.designs.pictures import draw, robots, summary
 from studies.designs.search import counting
 from studies.designs.space import (
@@ -46,15 +46,15 @@ MEASURES = {"mm_per_s": ("speed", MM), "mJ_per_stroke": ("work", 1e3 / MEASURED)
 
 def results(sweep: Sweep, folder: Path, executor: Executor) -> Any:
     """Results of a sweep as a pandas.DataFrame; what is missing in the folder is simulated."""
-    with tqdm(total=sweep.n_cells, unit="cell") as bar:
+    with tqdm(total=sweep.n_batches, unit="batch") as bar:
 
-        def progress(tally: Tally) -> None:
+        def progress(tally: Progress) -> None:
             bar.update(tally.done + tally.kept - bar.n)
 
-        tally = run(sweep.cells(), folder, executor, progress)
+        tally = run(sweep.batches(), folder, executor, progress)
     if tally.problems:
         raise ValueError(f"{len(tally.problems)} cells have no results: run the command again.")
-    table = read_parts(folder).to_pandas()
+    table = read_results(folder).to_pandas()
     if "robot" in table and table.robot.isin(BODIES).all():
         for name in Body._fields:
             table[name] = [getattr(BODIES[label], name) for label in table.robot]
@@ -75,11 +75,11 @@ def scene_of(row: Any) -> Scene:
 def at_all_fidelities(scene: Scene, folder: Path) -> Table:
     """MEASURES of a robot at CHECKS, and its work per metre at the last [J/m]."""
     sweep = Sweep(scene, (Choices("fidelity", CHECKS),), settling=SETTLING, measured=MEASURED)
-    run(sweep.cells(), folder, Here())
-    names = [cell.name for cell in sweep.cells()]
+    run(sweep.batches(), folder, Here())
+    names = [cell.name for cell in sweep.batches()]
     import pyarrow.parquet
 
-    rows = [pyarrow.parquet.read_table(Parts(folder).file(name)).to_pylist()[0] for name in names]
+    rows = [pyarrow.parquet.read_table(ResultFiles(folder).file(name)).to_pylist()[0] for name in names]
     found: Table = {
         measure: {fidelity: round(factor * row[name], 5) for fidelity, row in zip(CHECKS, rows, strict=True)}
         for measure, (name, factor) in MEASURES.items()

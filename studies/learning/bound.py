@@ -24,7 +24,7 @@ from scipy.spatial import ConvexHull
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.greedy import Displacements, measure_gaits
 from seastar_gym.controllers.planner import Branching
-from seastar_gym.controllers.roster import HELP, load_agents
+from seastar_gym.controllers.registry import HELP, load_agents
 from seastar_gym.envs.commands import Actions, command_table
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.paths import LINE_LENGTH, make_path

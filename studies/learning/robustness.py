@@ -17,7 +17,7 @@ import numpy as np
 
 from agents.tasks.learning import ENOUGH, imitate
 from seastar_gym.controllers.contract import Policy
-from seastar_gym.controllers.learned import LearnedPolicy, in_the_box, load
+from seastar_gym.controllers.learned import LearnedPolicy, bundled_file, load
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.sight import Sight
@@ -123,9 +123,9 @@ def examine(name: str, condition: Condition) -> dict[str, Any] | None:
     if (period is None and condition.action_delay) or (name == CAMERA and not condition.moves):
         return None
     if name == CAMERA:
-        return swum(load(in_the_box(period, task="sim-to-real")), condition, period, "pose")
+        return swum(load(bundled_file(period, task="sim-to-real")), condition, period, "pose")
     layout = Layout.of(robot_of(condition, period))
-    return swum(Seeing(load(in_the_box(period)), condition, layout), condition, period, "nodes")
+    return swum(Seeing(load(bundled_file(period)), condition, layout), condition, period, "nodes")
 
 
 def examine_seed(seed: int) -> dict[str, Any]:

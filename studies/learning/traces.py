@@ -1,4 +1,4 @@
-"""Ways of the policy in the box and of the chapter's script round the pentagon.
+"""Ways of the bundled policy and of the chapter's script round the pentagon.
 
 Writes `pentagon.json` and `pentagon.png`.
 """
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from seastar_gym.controllers.roster import load_agents
+from seastar_gym.controllers.registry import load_agents
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.swim import Swim

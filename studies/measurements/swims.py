@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import Policy, actions_of
-from seastar_gym.controllers.learned import LearnedPolicy, in_the_box, load
+from seastar_gym.controllers.learned import LearnedPolicy, pretrained
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.swim import Swim, swim
@@ -55,8 +55,8 @@ def distances(actuator: Actuator) -> Floats:
 
 
 def policies(period: float) -> dict[str, Policy]:
-    """The policy of strokes in the box, trained with the ramp, and the chapter's gait, for strokes so long [s]."""
-    trained = load(in_the_box(None))
+    """The bundled policy of strokes, trained with the ramp, and the chapter's gait, for strokes so long [s]."""
+    trained = pretrained("strokes")
     ramp = replace(trained.scene, actuator=SmaPulse(heating_time=0.1 * period, cooling_time=0.9 * period))
     learned = LearnedPolicy(trained.description._replace(scene=ramp), trained.weights)
     return {"learned": learned, "pentagon": scripted("pentagon")}

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from seastar_gym.controllers.contract import Policy
-from seastar_gym.controllers.learned import in_the_box, load
+from seastar_gym.controllers.learned import bundled_file, load
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.films import Picture, shrunk, write_gif
@@ -64,7 +64,7 @@ def run(options: Options, _: Results) -> None:
     parts = round(2 * options.decision_period / BETWEEN)
     if not np.isclose(parts * BETWEEN, 2 * options.decision_period) or parts == 0:
         raise ValueError(f"decisions must take a whole number of {BETWEEN / 2:g} s, not {options.decision_period:g} s.")
-    policy = load(in_the_box(options.decision_period))
+    policy = load(bundled_file(options.decision_period))
     gait = scripted("pentagon", policy.actions)
     # As `seastar swim` shows it, and at the same fidelity as the other.
     timed = {"fidelity": "balanced", "decision_period": policy.decision_period}

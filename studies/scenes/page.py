@@ -1,6 +1,6 @@
 """A page that swims: one HTML file that works from disk, the first thing that the guide shows.
 
-Records two swims of the policies in the box round the pentagon, and 22 strokes of the simulator for a planner in the
+Records two swims of the bundled policies round the pentagon, and 22 strokes of the simulator for a planner in the
 page, which follows paths that its reader draws: from each of the two straight gaits, and from rest, two strokes in
 each of ten directions. Symmetry turns them to all headings.
 """
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.learned import in_the_box, load
+from seastar_gym.controllers.learned import bundled_file, load
 from seastar_gym.envs.rendering import limb_nodes
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.evaluation.playback import RecordingEnv
@@ -42,7 +42,7 @@ SETTLING = 8
 RADIUS = 0.01
 """Radius of waypoints [m]."""
 SWIMS = ((0.2, "learned, five decisions a second"), (None, "learned, a stroke of the chapter each second"))
-"""Time between decisions [s] of a policy in the box, and what the page calls its swim."""
+"""Time between decisions [s] of a bundled policy, and what the page calls its swim."""
 
 
 def packed(values: Floats) -> str:
@@ -108,8 +108,8 @@ def in_frame(positions: Floats, origin: Floats, heading: Floats) -> Floats:
 
 
 def recorded(decision_period: float | None, name: str, most: int | None = None) -> dict[str, Any]:
-    """A swim of a policy in the box round the pentagon; `most` limits its decisions."""
-    policy = load(in_the_box(decision_period))
+    """A swim of a bundled policy round the pentagon; `most` limits its decisions."""
+    policy = load(bundled_file(decision_period))
     env = RecordingEnv(
         frames_per_stroke=round(FRAMES_PER_SECOND * policy.decision_period),
         actions=policy.actions, scene=policy.scene, decision_period=decision_period, waypoint_radius=RADIUS,

@@ -15,7 +15,7 @@ import numpy as np
 
 import seastar_gym  # noqa: F401, registers the ids
 from studies.frame import Results, Study
-from studies.kept import rounded
+from studies.results_file import rounded
 
 DECISIONS = 256
 """Decisions of a round, at least."""

@@ -23,8 +23,8 @@ from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import Simulator
 from studies.frame import InDocs, Results, Study
-from studies.kept import rounded
 from studies.provenance import provenance
+from studies.results_file import rounded
 from studies.speed import terms
 from studies.speed.peak import fused_products
 from studies.speed.process import FIRST_STROKE, TIMED, process_seconds, step_of_one

@@ -23,9 +23,9 @@ from seastar_gym.executors.processes import Processes
 from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.axes import Range
-from seastar_gym.sweep.cells import Cell
+from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.parts import Parts, part_of
+from seastar_gym.sweep.result_files import ResultFiles, result_file_of
 from seastar_gym.sweep.run import run
 from studies.frame import Results, Study
 
@@ -34,21 +34,21 @@ require_extra("Sweeps", "sweep", "pyarrow")
 LENGTHS = Range("robot.limb_length", 0.05, 0.15)
 
 
-def nothing(cell: Cell) -> bytes:
+def nothing(cell: Batch) -> bytes:
     """A part without a simulation."""
     return cell.name.encode()
 
 
-def sweep_of(n_cells: int, robots: int, measured: int) -> Sweep:
+def sweep_of(n_batches: int, robots: int, measured: int) -> Sweep:
     """Sweep of so many cells of so many robots, of as many strokes."""
-    axes = (LENGTHS.spaced(n_cells * robots),)
+    axes = (LENGTHS.spaced(n_batches * robots),)
     return Sweep(Scene.preset("fast"), axes, settling=0, measured=measured, robots=robots)
 
 
-def timed(cell: Cell) -> bytes:
+def timed(cell: Batch) -> bytes:
     """The processor time that a cell takes [s], as text."""
     begin = time.process_time()
-    part_of(cell)
+    result_file_of(cell)
     return str(time.process_time() - begin).encode()
 
 
@@ -56,15 +56,15 @@ def overhead(sweep: Sweep, executor: Executor, warm: int = 2) -> float:
     """Processor time of this process for a cell that simulates nothing [s]. warm: Cells that do not count."""
     ends: list[float] = []
     with tempfile.TemporaryDirectory() as folder:
-        run(sweep.cells(), folder, executor, lambda tally: ends.append(time.process_time()), nothing)
+        run(sweep.batches(), folder, executor, lambda tally: ends.append(time.process_time()), nothing)
     return (ends[-1] - ends[warm - 1]) / (len(ends) - warm)
 
 
 def seconds_per_cell(sweep: Sweep, executor: Executor) -> float:
     """Processor time of a worker for a cell [s], the median: first cells of workers, which load the code, are few."""
     with tempfile.TemporaryDirectory() as folder:
-        run(sweep.cells(), folder, executor, work=timed)
-        parts = Parts(folder)
+        run(sweep.batches(), folder, executor, work=timed)
+        parts = ResultFiles(folder)
         return statistics.median(float(parts.file(name).read_text()) for name in parts.names())
 
 
@@ -74,14 +74,14 @@ def disk_wait(part: bytes, n: int = 50) -> float:
     with tempfile.TemporaryDirectory() as folder:
         for k in range(n):
             clock, work = time.perf_counter(), time.process_time()
-            Parts(folder).write(f"{k:040x}", part)
+            ResultFiles(folder).write(f"{k:040x}", part)
             waits.append(time.perf_counter() - clock - (time.process_time() - work))
     return statistics.median(waits)
 
 
-def measure(n_cells: int, robots: int, strokes: int, workers: tuple[int, ...]) -> dict[str, Any]:
-    """All figures. n_cells, robots, strokes: Of the sweep that is simulated, by each worker."""
-    empty = sweep_of(20 * n_cells, 64, 1)
+def measure(n_batches: int, robots: int, strokes: int, workers: tuple[int, ...]) -> dict[str, Any]:
+    """All figures. n_batches, robots, strokes: Of the sweep that is simulated, by each worker."""
+    empty = sweep_of(20 * n_batches, 64, 1)
     executors: dict[str, Callable[[], Executor]] = {"in this process": Here, "on processes": lambda: Processes(1)}
     if find_spec("ray") is not None:
         from seastar_gym.executors.on_ray import RayTasks
@@ -90,9 +90,9 @@ def measure(n_cells: int, robots: int, strokes: int, workers: tuple[int, ...]) -
     found: dict[str, Any] = {
         f"overhead of a cell {name} [ms]": 1e3 * overhead(empty, make()) for name, make in executors.items()
     }
-    found["wait for the disk per cell [ms]"] = 1e3 * disk_wait(part_of(next(sweep_of(1, robots, 1).cells())))
+    found["wait for the disk per cell [ms]"] = 1e3 * disk_wait(result_file_of(next(sweep_of(1, robots, 1).batches())))
     for n in workers:
-        seconds = seconds_per_cell(sweep_of(n_cells * n, robots, strokes), Processes(n))
+        seconds = seconds_per_cell(sweep_of(n_batches * n, robots, strokes), Processes(n))
         found[f"strokes per second, processes: {n}"] = n * robots * strokes / seconds
     return found
 

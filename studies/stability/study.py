@@ -25,7 +25,7 @@ from tqdm import tqdm
 from seastar_gym.scene.numerics import SchemeName
 from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
 from studies.frame import Results, Study
-from studies.kept import rounded
+from studies.results_file import rounded
 from studies.stability.cases import QUICK_STEPS, STEPS, SWEEPS, Sweep, format_value, quick_sweeps
 from studies.stability.cells import Cell, commands_of, converged_displacements, run_cell, stroke_duration
 from studies.stability.pictures import draw as draw_cells

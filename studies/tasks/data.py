@@ -2,7 +2,7 @@
 
     python -m studies.tasks.data --episodes 100
 
-The learned policy is the one in the box. A dataset that is there is not made again, so the command goes on where it
+The learned policy is the bundled one. A dataset that is there is not made again, so the command goes on where it
 stopped. Read them with MINARI_DATASETS_PATH=OUT, under the names TASK/random-v0, TASK/greedy-v0 and TASK/learned-v0.
 """
 

@@ -18,7 +18,7 @@ from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.planner import Budget, Planner
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.controllers.turning import TurnThenSwim
-from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.rollout import Episodes
@@ -33,7 +33,7 @@ AGENTS = ("rest", "planner", RULE, "PPO")
 """Who swims it."""
 LIMIT = 300.0
 """Time limit [s]."""
-HEADINGS = Headings("random")
+HEADINGS = HeadingTargets("random")
 PERIOD, PERIOD_OF_RULE = 0.5, 0.2
 """Times between decisions [s]: that of the environment, and that of the rule, whose turning wave needs it."""
 AHEAD = Budget(depth=1, beam=1, coasting=0.5)
@@ -64,7 +64,7 @@ def _planner(batch: Any) -> Policy:
 
 
 def _turn_then_swim(batch: Any) -> Policy:
-    swims, wave = learned.load(learned.in_the_box(PERIOD_OF_RULE)), turning_wave(PERIOD_OF_RULE)
+    swims, wave = learned.load(learned.bundled_file(PERIOD_OF_RULE)), turning_wave(PERIOD_OF_RULE)
     return OneByOne(TurnThenSwim(wave, swims, swims.actions, batch.scene, HEADINGS, PERIOD_OF_RULE))
 
 

@@ -97,7 +97,7 @@ def _draw_row(axes: Any, row: Row) -> None:
     names = [agent for agent, _ in row.in_order]
     for place, (agent, seeds) in enumerate(row.in_order):
         mean, (low, high) = row.mean(agent), crossed_interval(seeds)
-        colour = CYCLE[0] if agent.startswith(("PPO", "Rec", "in the box")) else FAINT
+        colour = CYCLE[0] if agent.startswith(("PPO", "Rec", "bundled")) else FAINT
         axes.plot([low, high], [place, place], color=colour, lw=2.5, solid_capstyle="butt")
         axes.plot(mean, place, "o", color=colour, ms=5)
     axes.set_yticks(range(len(names)), names)

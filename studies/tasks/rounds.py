@@ -18,7 +18,7 @@ class MostPerMetre(Greedy):
 
     def __init__(self, robots: Robots):
         super().__init__(robots)
-        self.about: Prizes = robots.inner.challenge
+        self.config: Prizes = robots.inner.challenge
         self._speed = SPEED_IN_STROKES if robots.in_strokes else SPEED_IN_TIME
 
     def prizes(self, observations: Floats32) -> tuple[Floats, Floats, Floats]:
@@ -26,12 +26,12 @@ class MostPerMetre(Greedy):
         own = self.robots.own(observations)
         seen = own[:, :-1].reshape(self.robots.n, -1, 3)
         places = self.robots.scene.robot.limb_length * seen[..., :2]
-        return places, seen[..., 2], self._speed * self.about.seconds * own[:, -1]
+        return places, seen[..., 2], self._speed * self.config.seconds * own[:, -1]
 
     def chosen(self, observations: Floats32) -> Floats:
         """Places of the chosen prizes in the body frames [m], shape (n, 2)."""
         places, worth, way = self.prizes(observations)
-        to = np.maximum(length(places) - self.about.radius, 1e-4)
+        to = np.maximum(length(places) - self.config.radius, 1e-4)
         value = np.where((worth > 0.0) & (to <= way[:, None]), worth / to, worth * 1e-6 / to)
         return places[np.arange(self.robots.n), np.argmax(value, axis=1)]
 
@@ -67,7 +67,7 @@ class BestRound(MostPerMetre):
         first, second = self._round(observations)
 
         def cost(hub: Floats, _: int) -> Floats:
-            return RewardWeights().way_to_next(hub, first[:, None], second[:, None], self.about.radius)
+            return RewardWeights().way_to_next(hub, first[:, None], second[:, None], self.config.radius)
 
         return self._ahead.best(self.robots.states(observations), cost).astype(np.int64)
 
@@ -80,7 +80,7 @@ class BestRound(MostPerMetre):
             there, left = places[robot, is_left], worth[robot, is_left]
             if len(left) == 0:
                 continue
-            first, between = (np.maximum(0.0, to - self.about.radius) for to in (length(there), distances(there)))
+            first, between = (np.maximum(0.0, to - self.config.radius) for to in (length(there), distances(there)))
             order = best_round(first, between, left, float(ways[robot])).order or [0]
             chosen[robot] = there[(order * 2)[:2]]
         return chosen[:, 0], chosen[:, 1]

@@ -11,7 +11,7 @@ from seastar_gym.evaluation.measures import measure_of_challenge
 
 MORE_IS_BETTER = tuple(name for name, each in CHALLENGES.items() if measure_of_challenge(each).better == "more")
 ORDER = ("rest", "greedy", "planner", "adaptive", "prior", "informed", "turn, then swim", "PPO", "PPO, memory",
-         "PPO, told the way", "PPO, memory, coasting", "RecurrentPPO", "in the box")  # fmt: skip
+         "PPO, told the way", "PPO, memory, coasting", "RecurrentPPO", "bundled")  # fmt: skip
 """Agents from top to bottom."""
 HEADROOM, LEFT = 0.2, 1.0 / 3.0
 """A task is kept where the bound is so much better than greedy, and PPO leaves so much of that."""

@@ -34,9 +34,9 @@ from studies.tasks.verdicts import verdicts
 
 IDS: dict[str, str] = {id: about[0] for id, about in TASKS.items()} | {heading.ID: "heading"}
 """Name of the challenge of every id."""
-IN_THE_BOX = "in the box"
+BUNDLED = "bundled"
 """Agent that swims the policy that the package brings for a task."""
-AGENTS = (*CONTROLLERS, heading.RULE, *ALL_LEARNERS, IN_THE_BOX)
+AGENTS = (*CONTROLLERS, heading.RULE, *ALL_LEARNERS, BUNDLED)
 DEFAULT_LEARNERS = ("PPO", "PPO, memory", "PPO, told the way", "PPO, memory, coasting")
 
 
@@ -46,7 +46,7 @@ class Options:
 
     ids: tuple[str, ...] = tuple(IDS)
     """Environments."""
-    agents: tuple[str, ...] = (*CONTROLLERS, heading.RULE, *DEFAULT_LEARNERS, IN_THE_BOX)
+    agents: tuple[str, ...] = (*CONTROLLERS, heading.RULE, *DEFAULT_LEARNERS, BUNDLED)
     """Agents; "RecurrentPPO" needs sb3-contrib."""
     seeds: tuple[int, ...] = (0, 1)
     """Seeds of the trainings; agents that do not learn swim once."""
@@ -72,7 +72,7 @@ def has_cell(id: str, agent: str) -> bool:
         return id == heading.ID and agent in heading.AGENTS
     if agent in CONTROLLERS:
         return is_swum(agent, CHALLENGES[IDS[id]])
-    if agent == IN_THE_BOX:
+    if agent == BUNDLED:
         return True
     learner, challenge = ALL_LEARNERS[agent], IDS[id]
     if learner.coasting:
@@ -87,7 +87,7 @@ def swum(id: str, agent: str, seed: int, options: Options) -> Episodes:
         return heading.swum(agent, seed, options.decisions, options.episodes, fidelity, threads)
     if agent in CONTROLLERS:
         return swim(id, lambda batch: make_controller(agent, batch), options.episodes, fidelity, threads)
-    if agent == IN_THE_BOX:
+    if agent == BUNDLED:
         policy = load(file_of(id))
         return swim(id, lambda batch: policy, options.episodes, fidelity, threads)
     model = train(id, agent, seed, options.decisions, fidelity, threads)

@@ -1,4 +1,4 @@
-"""What the results of the tasks say, in words: which are kept, and where the policies in the box are ahead."""
+"""What the results of the tasks say, in words: which are kept, and where the bundled policies are ahead."""
 
 import textwrap
 from collections.abc import Sequence
@@ -7,13 +7,13 @@ from studies.tasks.rows import LEFT, Row
 
 RULES = ("rest", "greedy", "planner", "adaptive")
 """Agents that neither learn nor are told what is hidden."""
-BOX, MEMORY, TOLD = "in the box", "PPO, memory", "informed"
+BUNDLED, MEMORY, TOLD = "bundled", "PPO, memory", "informed"
 
 
 def verdicts(rows: Sequence[Row]) -> str:
     """Paragraphs of the page in Markdown; those for which agents have not swum yet are left out."""
     judged = [row for row in rows if {"greedy", "informed", "PPO"} <= row.agents.keys()]
-    boxed = [row for row in rows if {BOX, MEMORY, *RULES[:3]} <= row.agents.keys()]
+    boxed = [row for row in rows if {BUNDLED, MEMORY, *RULES[:3]} <= row.agents.keys()]
     paragraphs = [_kept(judged)] * bool(judged) + [_in_the_box(boxed)] * bool(boxed)
     text = "".join(f"{textwrap.fill(each, 120, break_on_hyphens=False)}\n\n" for each in paragraphs)
     return f"{_summary(judged)}\n\n{text}" if judged else text
@@ -23,7 +23,7 @@ def _summary(rows: Sequence[Row]) -> str:
     lines = ["| task | bound | better than greedy | gap left by PPO | gap left by the bundled policy | kept |"]
     lines.append("|---|---|---:|---:|---:|---|")
     for row in rows:
-        left = (f"{100.0 * row.left_by(agent):.0f} %" if agent in row.agents else "" for agent in ("PPO", BOX))
+        left = (f"{100.0 * row.left_by(agent):.0f} %" if agent in row.agents else "" for agent in ("PPO", BUNDLED))
         lines.append(
             f"| {_name(row)} | {row.bound} | {row.better} | {' | '.join(left)} | {'yes' if row.is_kept else 'no'} |"
         )
@@ -45,9 +45,9 @@ def _why_not(row: Row) -> str:
 
 
 def _in_the_box(rows: Sequence[Row]) -> str:
-    trained = sum(row.is_ahead(BOX, MEMORY) for row in rows)
-    ahead = [row for row in rows if row.is_ahead(BOX, *RULES)]
-    also = [row for row in ahead if row.is_ahead(BOX, TOLD)]
+    trained = sum(row.is_ahead(BUNDLED, MEMORY) for row in rows)
+    ahead = [row for row in rows if row.is_ahead(BUNDLED, *RULES)]
+    also = [row for row in ahead if row.is_ahead(BUNDLED, TOLD)]
     return (
         f"Six times the training is worth more than a frame stack alone on {trained} of {len(rows)} tasks. Bundled "
         f"policies beat every rule that is not told what is hidden on {_names(ahead)}, and also the one that is told "

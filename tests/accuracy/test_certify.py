@@ -462,7 +462,7 @@ def test_what_no_setting_can_have_is_refused(certificate, change, words):
         replace(setting, **change)
     failed = replace(setting, space_error=math.inf, energy_growth=math.inf, speed=math.nan, typical={})
     assert math.isnan(failed.typical_error(setting.errors)) and math.isnan(failed.error(()))
-    assert math.isnan(failed.error(("of yesterday",))) and not failed.endures
+    assert math.isnan(failed.error(("of yesterday",))) and not failed.is_energy_stable
     adapted = replace(setting, scheme="implicit-midpoint", step=0.02, path_tolerance=0.01, nodes_per_limb=5)
     assert str(adapted) == '"implicit-midpoint" at 20 ms adapted to 1 % with 5 nodes per limb'
 

@@ -77,8 +77,8 @@ def test_a_millionth_of_the_largest_early_energy_is_noise(monkeypatch):
 
 
 def test_a_setting_endures_up_to_a_growth_by_half():
-    assert replace(SETTING, energy_growth=1.5).endures
-    assert not replace(SETTING, energy_growth=np.nextafter(1.5, 2.0)).endures
+    assert replace(SETTING, energy_growth=1.5).is_energy_stable
+    assert not replace(SETTING, energy_growth=np.nextafter(1.5, 2.0)).is_energy_stable
 
 
 def test_the_energy_of_a_swim_that_fails_grows_without_bound(monkeypatch):

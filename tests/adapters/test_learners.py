@@ -73,8 +73,8 @@ def test_hindsight_changes_goals_and_learns():
 
 
 def test_a_masked_learner_never_asks_for_what_wires_cannot_follow():
-    """Deaf wires that are warm: a command to them would be refused, and counts in info."""
-    scene = replace(Scene.preset("fast"), actuator=SmaWires(deaf=True))
+    """Refractory wires that are warm: a command to them would be refused, and counts in info."""
+    scene = replace(Scene.preset("fast"), actuator=SmaWires(refractory=True))
     env = BatchVecEnv(
         gym.make_vec(
             "SeastarSwim-v0", 4, vectorization_mode="vector_entry_point", actions="joint", autoreset_mode="SameStep",

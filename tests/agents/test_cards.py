@@ -1,4 +1,4 @@
-"""Model cards say what the policies in the box are and how they swim, and are those of the weights beside them."""
+"""Model cards say what the bundled policies are and how they swim, and are those of the weights beside them."""
 
 import hashlib
 import re
@@ -7,9 +7,9 @@ import shutil
 import pytest
 
 from agents.cards import CHEAP, FIDELITIES, HELD_OUT_PATHS, card, main, measure
-from seastar_gym.controllers.learned import SHIPPED, load
+from seastar_gym.controllers.learned import BUNDLED, load
 
-POLICIES = sorted(SHIPPED.parent.glob("*.safetensors"))
+POLICIES = sorted(BUNDLED.parent.glob("*.safetensors"))
 
 
 def row(text, fidelity):
@@ -35,8 +35,8 @@ def test_every_policy_in_the_box_has_its_card(file):
 def test_a_card_tells_what_is_measured_now(monkeypatch):
     """The shipped card of the policy for strokes, at the cheapest fidelity."""
     monkeypatch.setattr("agents.cards.FIDELITIES", ("fast",))
-    policy, text = load(), SHIPPED.with_suffix(".md").read_text(encoding="utf-8")
-    now = card(policy, SHIPPED, "", measure(policy, threads=1))
+    policy, text = load(), BUNDLED.with_suffix(".md").read_text(encoding="utf-8")
+    now = card(policy, BUNDLED, "", measure(policy, threads=1))
     assert row(now, "fast") == row(text, "fast")
 
 
@@ -44,7 +44,7 @@ def test_the_command_writes_cards_and_says_what_is_wrong(tmp_path, monkeypatch, 
     monkeypatch.setattr("agents.cards.FIDELITIES", ("fast",))
     monkeypatch.setattr("agents.cards.HELD_OUT_PATHS", 1)
     for suffix in (".safetensors", ".json"):
-        shutil.copy(SHIPPED.with_suffix(suffix), tmp_path / f"mine{suffix}")
+        shutil.copy(BUNDLED.with_suffix(suffix), tmp_path / f"mine{suffix}")
     file = tmp_path / "mine.safetensors"
     assert main(["--policies", str(file)]) == 0
     text = file.with_suffix(".md").read_text(encoding="utf-8")

@@ -8,8 +8,8 @@ from gymnasium.vector import AutoresetMode
 from agents.distillation import Teacher, distil
 from agents.tasks.learning import imitate
 from refusals import assert_refused
-from seastar_gym.controllers.learned import in_the_box, load
-from seastar_gym.envs.symmetry import VectorMemory
+from seastar_gym.controllers.learned import pretrained
+from seastar_gym.envs.symmetry import VectorFrameStack
 from seastar_gym.evaluation.tasks import make_batch
 
 ID = "SeastarSwimSimToReal-v0"
@@ -17,23 +17,23 @@ ID = "SeastarSwimSimToReal-v0"
 
 def batch(n=16, id=ID, past=8):
     arguments = {"split": "train", "fidelity": "fast", "threads": 1, "autoreset_mode": AutoresetMode.SAME_STEP}
-    return VectorMemory(make_batch(id, n, **arguments), past)
+    return VectorFrameStack(make_batch(id, n, **arguments), past)
 
 
 @pytest.fixture(scope="module")
 def teacher():
-    return load(in_the_box(0.2))
+    return pretrained("timed-0.2s")
 
 
 def test_advice_is_the_teachers_own_action_whatever_the_student_turns(teacher):
     robots = batch()
     robots.reset(seed=0)
-    guide = Teacher(teacher, robots.recollection.symmetry)
+    guide = Teacher(teacher, robots.frame_stack.symmetry)
     for _ in range(8):
         state = robots.unwrapped.privileged_observations()
         theirs, _ = teacher.predict(state, deterministic=True)  # in the world
         advice = np.argmax(guide.logits(state, robots.elements), axis=1)  # as the student sees it
-        np.testing.assert_array_equal(robots.recollection.symmetry.restore(advice, robots.elements), theirs)
+        np.testing.assert_array_equal(robots.frame_stack.symmetry.restore(advice, robots.elements), theirs)
         robots.step(advice)
     assert len(set(robots.elements.tolist())) > 4
 
@@ -48,7 +48,7 @@ def test_a_student_learns_and_the_same_seed_learns_the_same(teacher):
     assert about.past == 8 and about.task == "sim-to-real" and not about.shows_limbs and about.hidden == (64,)
     robots = batch(64)
     observations, _ = robots.reset(seed=7)
-    symmetry, agreed = robots.recollection.symmetry, []
+    symmetry, agreed = robots.frame_stack.symmetry, []
     guide = Teacher(teacher, symmetry)
     for _ in range(20):
         chosen = first.logits(observations)[:, 0].argmax(axis=1)
@@ -63,8 +63,8 @@ def test_who_cannot_teach_is_refused(teacher):
     with assert_refused("A teacher is a policy with symmetry, without memory"):
         distil(pose, batch(), 100, 0)
     with assert_refused("The teacher does not see what this batch's robots would show"):
-        distil(load(in_the_box(None)), batch(), 100, 0)
-    with assert_refused("batch must be a VectorMemory"):
+        distil(pretrained("strokes"), batch(), 100, 0)
+    with assert_refused("batch must be a VectorFrameStack"):
         distil(teacher, batch().env, 100, 0)
     with assert_refused("decisions must be a whole number"):
         distil(teacher, batch(), 0, 0)

@@ -21,8 +21,8 @@ from agents.learner_file import resume, save
 from agents.ppo import make_model, make_training_env, policy_of
 from seastar_gym import Numerics, Scene, Seastar, Water
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.controllers import learner_zip
-from seastar_gym.controllers.learner_zip import load
+from seastar_gym.controllers import checkpoint
+from seastar_gym.controllers.checkpoint import load
 from symmetries import assert_equivariant
 
 FAST = Numerics.preset("fast")
@@ -146,7 +146,7 @@ def test_loading_unpickles_nothing(file, tmp_path):
     """Stable-Baselines3's pickles are not even looked at, neither to swim nor to learn on."""
     without = tmp_path / "without.zip"
     with zipfile.ZipFile(file) as old, zipfile.ZipFile(without, "w") as new:
-        for name in (learner_zip.DESCRIPTION, learner_zip.LEARNER, learner_file.FACTS):
+        for name in (checkpoint.DESCRIPTION, checkpoint.LEARNER, learner_file.FACTS):
             new.writestr(name, old.read(name))
         for name in set(old.namelist()) - set(new.namelist()):
             new.writestr(name, pickle.dumps(Bomb(tmp_path / "exploded")))
@@ -196,7 +196,7 @@ def test_saving_replaces_the_file_in_one_go(learner, file, monkeypatch):
 
 def test_the_description_says_what_the_policy_expects(learner, file):
     with zipfile.ZipFile(file) as archive:
-        facts = json.loads(archive.read(learner_zip.DESCRIPTION))
+        facts = json.loads(archive.read(checkpoint.DESCRIPTION))
     assert facts["observation_layout"] == 2
     assert (facts["actions"], facts["symmetry"], facts["hidden"]) == (Hyperparameters().actions, True, [16, 8])
     assert facts["scene"]["numerics"]["scheme"] == FAST.scheme
@@ -210,15 +210,15 @@ def rewritten(file, **changes):
     """The file with other facts in its description, or without one of its entries (None)."""
     with zipfile.ZipFile(file) as archive:
         entries = {name: archive.read(name) for name in archive.namelist()}
-    facts = json.loads(entries[learner_zip.DESCRIPTION])
+    facts = json.loads(entries[checkpoint.DESCRIPTION])
     for name, value in changes.items():
         entry = name.replace("__", ".")
         if entry in entries:
             del entries[entry]
         else:
             facts[name] = value
-    if learner_zip.DESCRIPTION in entries:
-        entries[learner_zip.DESCRIPTION] = json.dumps(facts).encode()
+    if checkpoint.DESCRIPTION in entries:
+        entries[checkpoint.DESCRIPTION] = json.dumps(facts).encode()
     with zipfile.ZipFile(file, "w") as archive:
         for name, data in entries.items():
             archive.writestr(name, data)
@@ -247,7 +247,7 @@ def test_a_cut_file_is_said_to_be_damaged(file, keep):
 def test_a_flipped_bit_is_found(file):
     data = bytearray(file.read_bytes())
     with zipfile.ZipFile(file) as archive:
-        data[archive.getinfo(learner_zip.LEARNER).header_offset + 5000] ^= 1
+        data[archive.getinfo(checkpoint.LEARNER).header_offset + 5000] ^= 1
     file.write_bytes(bytes(data))
     with pytest.raises(ValueError, match=r"is damaged.*Bad CRC-32"):
         load(file)
@@ -280,9 +280,9 @@ def with_learner(file, change):
     """The file after a change of its learner's facts and tensors, in place."""
     with zipfile.ZipFile(file) as archive:
         entries = {name: archive.read(name) for name in archive.namelist()}
-    facts, tensors = json.loads(entries[learner_file.FACTS]), safetensors.torch.load(entries[learner_zip.LEARNER])
+    facts, tensors = json.loads(entries[learner_file.FACTS]), safetensors.torch.load(entries[checkpoint.LEARNER])
     change(facts, tensors)
-    entries |= {learner_file.FACTS: json.dumps(facts).encode(), learner_zip.LEARNER: safetensors.torch.save(tensors)}
+    entries |= {learner_file.FACTS: json.dumps(facts).encode(), checkpoint.LEARNER: safetensors.torch.save(tensors)}
     with zipfile.ZipFile(file, "w") as archive:
         for name, data in entries.items():
             archive.writestr(name, data)

@@ -16,8 +16,8 @@ from agents.tasks.learning import LEARNERS, hyperparameters, make_learning_env
 from refusals import assert_refused
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.learned import TASKS, load, save
-from seastar_gym.controllers.roster import load_agent, task_of
-from seastar_gym.envs.symmetry import VectorMemory
+from seastar_gym.controllers.registry import load_agent, task_of
+from seastar_gym.envs.symmetry import VectorFrameStack
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.evaluation.tasks import make_batch, require_seen, swim_episodes
@@ -46,7 +46,7 @@ def test_a_policy_on_disk_remembers_as_its_learner_does(id, tmp_path):
         make_batch(id, 5, split="test", fidelity="fast", threads=1, max_episode_steps=4, autoreset_mode="SameStep")
         for _ in range(2)
     )
-    wrapped = VectorMemory(inner, 8)
+    wrapped = VectorFrameStack(inner, 8)
     (observations, _), (shown, _) = plain.reset(seed=3), wrapped.reset(seed=3)
     state, begins = None, np.ones(5, bool)
     for _ in range(10):
@@ -138,7 +138,7 @@ def test_the_command_trains_compares_seeds_and_writes_a_card(monkeypatch, tmp_pa
     assert capsys.readouterr().out.count("mean return") == 2
     with pytest.raises(SystemExit):
         main(["--ids", "SeastarSwim-v0"])
-    assert "has no policy in the box" in capsys.readouterr().err
+    assert "has no bundled policy" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("id", IDS)

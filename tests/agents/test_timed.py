@@ -14,7 +14,7 @@ from agents.trials import main as trials_main
 from refusals import assert_refused
 from seastar_gym import Limited, Numerics, Scene, Simulator, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.controllers import learner_zip
+from seastar_gym.controllers import checkpoint
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.greedy import GreedyPolicy, displacement_map
 from seastar_gym.controllers.learned import LearnedPolicy, load, save
@@ -27,7 +27,7 @@ from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.results import as_text
 from seastar_gym.evaluation.swim import swim
-from seastar_gym.gaits import in_time, lagged_gait, straight_gait, thrifty_gait, turning_wave
+from seastar_gym.gaits import lagged_gait, straight_gait, thrifty_gait, timed, turning_wave
 from symmetries import assert_equivariant
 
 PERIODS = (0.5, 0.2, 0.1)
@@ -64,7 +64,7 @@ def test_the_second_pair_lags(period, late):
 
 @pytest.mark.parametrize("period", [1.0, 0.5, 0.1])
 def test_strokes_begin_every_second(period):
-    gait = in_time(np.array([PLUS_MINUS, -PLUS_MINUS]), period)
+    gait = timed(np.array([PLUS_MINUS, -PLUS_MINUS]), period)
     every = round(1 / period)
     assert gait.shape == (2 * every, 5) and np.count_nonzero(gait.any(axis=1)) == 2
     np.testing.assert_array_equal(gait[every], -PLUS_MINUS)
@@ -72,7 +72,7 @@ def test_strokes_begin_every_second(period):
 
 def test_lagged_pairs_swim_farther_and_thrifty_ones_with_less_heat():
     """7.4 and 7.6 mm/s at "balanced" (lag 0.6 s, and 0.5 s with 0.6 of the heat) against 3.3 mm/s of one pair."""
-    together, _ = speed_and_turn(in_time(straight_gait(), 0.5), 0.5)
+    together, _ = speed_and_turn(timed(straight_gait(), 0.5), 0.5)
     lagged, turn = speed_and_turn(lagged_gait(0.1), 0.1)
     thrifty, _ = speed_and_turn(thrifty_gait(0.5), 0.5)
     assert lagged > 2.0 * together and thrifty > 2.0 * together
@@ -203,7 +203,7 @@ def test_a_timed_policy_survives_the_disk_with_its_decision_period(tmp_path):
     save(policy_of(model), tmp_path / "policy.safetensors")
     again = learner_file.resume(tmp_path / "model.zip", model.get_env())
     assert again.gamma == model.gamma
-    for policy in (load(tmp_path / "policy.safetensors"), learner_zip.load(tmp_path / "model.zip")):
+    for policy in (load(tmp_path / "policy.safetensors"), checkpoint.load(tmp_path / "model.zip")):
         assert policy.decision_period == 0.5 and isinstance(policy.scene.actuator, SmaWires)
         env = gym.make(
             "SeastarSwim-v0", actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period
@@ -236,7 +236,7 @@ def test_a_timed_policy_behind_the_symmetry_is_equivariant():
 
 def test_masks_are_handed_out_robot_by_robot():
     """As sb3-contrib's MaskablePPO asks for them."""
-    scene = Scene(actuator=SmaWires(deaf=True), numerics=FAST)
+    scene = Scene(actuator=SmaWires(refractory=True), numerics=FAST)
     env = SeastarSwimVectorEnv(
         3, actions="pairs", scene=scene, decision_period=0.2, autoreset_mode=AutoresetMode.SAME_STEP, threads=1
     )

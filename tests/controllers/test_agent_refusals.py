@@ -8,13 +8,13 @@ import pytest
 from gymnasium.spaces import Box, Discrete
 
 from refusals import assert_refused
-from seastar_gym import Headings, Numerics, RewardWeights, Scene, Seastar
-from seastar_gym.controllers import foreign, learned, learner_zip
+from seastar_gym import HeadingTargets, Numerics, RewardWeights, Scene, Seastar
+from seastar_gym.controllers import checkpoint, learned, third_party
 from seastar_gym.controllers.contract import actions_of, as_floating, observed, require_fit, require_policy, starts
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.planner import TIMED_BUDGETS, Budget, Planner, Targets, budget_for
-from seastar_gym.controllers.roster import load_agent, load_agents
+from seastar_gym.controllers.registry import load_agent, load_agents
 from seastar_gym.controllers.scripted import RandomPolicy, scripted
 
 FAST = Scene(numerics=Numerics.preset("fast"))
@@ -60,7 +60,7 @@ REFUSED = {
     "several robots": (lambda: GreedyPolicy(TWO), "scene must be that of one robot."),
     "no radius": (lambda: Planner(FAST, 0.0), "waypoint_radius"),
     "no reward": (lambda: Planner(FAST, reward=3), "reward must be RewardWeights"),
-    "no headings": (lambda: Planner(FAST, headings=3), "headings must be Headings"),
+    "no headings": (lambda: Planner(FAST, headings=3), "headings must be HeadingTargets"),
     "no budget": (lambda: Planner(FAST, budget=3), "budget must be a Budget"),
     "no threads": (lambda: Planner(FAST, threads=0), "threads"),
     "no depth": (lambda: Budget(0, 1), "depth must be a whole number from 1 to 1000"),
@@ -109,7 +109,7 @@ def test_a_search_is_allowed_the_budget_of_the_next_longer_decision():
     assert cost == sorted(cost)
 
 
-@pytest.mark.parametrize("headings", [None, Headings(tolerance=0.2)])
+@pytest.mark.parametrize("headings", [None, HeadingTargets(tolerance=0.2)])
 def test_a_planner_of_strokes_and_one_in_time_know_their_scene(headings):
     strokes, timed = Planner(headings=headings), Planner(decision_period=0.5, headings=headings)
     assert strokes.scene == Scene.preset("fast") and timed.scene.actuator.has_memory
@@ -145,9 +145,9 @@ def test_a_file_that_is_no_zip_is_no_model(content, tmp_path):
     file = tmp_path / "model.zip"
     if content is not None:
         file.write_bytes(content)
-    assert not foreign.is_model(file)
+    assert not third_party.is_model(file)
     with pytest.raises((ValueError, FileNotFoundError), match=r"model\.zip.*\.$"):
-        learner_zip.load(file)
+        checkpoint.load(file)
 
 
 def test_a_zip_is_a_model_of_others_if_it_has_their_entries_and_not_ours(tmp_path):
@@ -156,7 +156,7 @@ def test_a_zip_is_a_model_of_others_if_it_has_their_entries_and_not_ours(tmp_pat
         with zipfile.ZipFile(file, "w") as archive:
             for name in known:
                 archive.writestr(name, "")
-        assert foreign.is_model(file) == expected
+        assert third_party.is_model(file) == expected
 
 
 def test_a_network_of_a_training_is_a_policy(tmp_path):
@@ -171,7 +171,7 @@ def test_a_network_of_a_training_is_a_policy(tmp_path):
     with zipfile.ZipFile(tmp_path / "model.zip", "w") as archive:
         archive.writestr("policy.json", description.to_json())
         archive.writestr("learner.safetensors", learned.safetensors.numpy.save(arrays | {"other": np.zeros(3)}))
-    policy = learner_zip.load(tmp_path / "model.zip")
+    policy = checkpoint.load(tmp_path / "model.zip")
     assert policy.description == description
     assert all((policy.weights[name] == array).all() for name, array in weights.items())
 

@@ -33,7 +33,7 @@ CARRIED = 3e-7
 """Error of turned and mirrored numbers over the largest."""
 ROUNDING = 1.5e-6
 """Error of logits over the largest: sums of some hundred numbers, each rounded to 6e-8, in another order."""
-TASKS = {"learned": "SeastarSwim-v0", "seastar-0.2s": "SeastarSwim-v0", "fail-blind": "SeastarFailBlind-v0",
+TASKS = {"learned": "SeastarSwim-v0", "timed-0.2s": "SeastarSwim-v0", "fail-blind": "SeastarFailBlind-v0",
          "miswired-0.5s": "SeastarMiswiredTimed-v0", "fast-prizes-0.5s": "SeastarPrizesTimed-v0"}  # fmt: skip
 """Policies of every kind, with memory and without, with limbs and without, and ids of what they swim."""
 QUICK = ("learned", "miswired-0.5s")
@@ -64,7 +64,7 @@ OWN = {
     "two-long-limbs-adjacent": Description("pairs", True, Scene(four(0.12, 0.12, 0.1, 0.1)), (16,), past=1),
     "limbs-all-unlike": Description("limbs", True, Scene(four(0.12, 0.1, 0.11, 0.09)), (16,)),
 }
-"""Policies of kinds that are not in the box: without symmetry, with half a turn and a mirror, with a mirror that is not
+"""Policies of kinds that are not bundled: without symmetry, with half a turn and a mirror, with a mirror that is not
 along limb 1, with nothing, and of a network without hidden layers."""
 
 
@@ -157,8 +157,8 @@ def environment(name: str, policy: LearnedPolicy, n: int = ROBOTS):
 
 def input_of(policy: LearnedPolicy, observations: np.ndarray, past: np.ndarray | None) -> np.ndarray:
     """What the network of Python sees, shape (n, inputs)."""
-    if policy.recollection is not None:
-        return policy.recollection.shown(observations, past)[0]
+    if policy.frame_stack is not None:
+        return policy.frame_stack.stacked(observations, past)[0]
     return observations if policy.reduction is None else policy.reduction.reduce(observations)[0]
 
 
@@ -211,7 +211,7 @@ def test_c_decides_as_numpy_does_in_swims(name, tmp_path):
     observations, _ = env.reset(seed=0)
     for _ in range(N_SWUM // ROBOTS):
         past = None
-        if policy.recollection is not None:
+        if policy.frame_stack is not None:
             at_first = np.repeat(observations[:, None], policy.description.past, axis=1)
             past = at_first if state is None else np.where(begun[:, None, None], at_first, state[0])
         chosen, state = policy.predict(observations, state, begun, deterministic=True)
@@ -234,7 +234,7 @@ def test_c_decides_as_numpy_does_for_random_observations(name, tmp_path):
     policy = policy_of(name)
     compiled, past, state = Compiled(policy, tmp_path), None, None
     observations, robots = random_observations(policy, N_DRAWN), compiled.robots(N_DRAWN)
-    if policy.recollection is not None:
+    if policy.frame_stack is not None:
         shape = N_DRAWN, policy.description.past, observations.shape[1]
         past = np.random.default_rng(1).normal(size=shape).astype(np.float32)
         state = (past,)
@@ -247,7 +247,7 @@ def test_c_decides_as_numpy_does_for_random_observations(name, tmp_path):
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", ["learned", "seastar-0.2s", "miswired-0.5s"])
+@pytest.mark.parametrize("name", ["learned", "timed-0.2s", "miswired-0.5s"])
 def test_c_sees_what_the_environment_shows(name, tmp_path):
     """From positions and velocities, to float32's rounding; from a short history, to the error of differences."""
     policy, layout = policy_of(name), policy_of(name).description.layout
@@ -346,7 +346,7 @@ def test_fewer_points_may_be_tracked(tmp_path):
 def test_the_program_of_the_page_runs(tmp_path):
     (program,) = re.findall(r"```c\n(.*?)```", (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8"), re.S)
     (tmp_path / "main.c").write_text(program)
-    (tmp_path / "policy.c").write_text(to_c(policy_of("seastar-0.2s"), "seastar-0.2s", 3))
+    (tmp_path / "policy.c").write_text(to_c(policy_of("timed-0.2s"), "timed-0.2s", 3))
     flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
     subprocess.run(["cc", *flags, str(tmp_path / "main.c"), "-o", str(tmp_path / "main"), "-lm"], check=True)
     done = subprocess.run([str(tmp_path / "main")], check=True, capture_output=True, text=True)
@@ -355,7 +355,7 @@ def test_the_program_of_the_page_runs(tmp_path):
 
 
 def test_the_code_allocates_nothing_and_keeps_nothing():
-    text = to_c(policy_of("seastar-0.2s"), "*/ int x; /*\nname")
+    text = to_c(policy_of("timed-0.2s"), "*/ int x; /*\nname")
     assert "alloc(" not in text and "*/ int x" not in text
     kept = [line for line in text.splitlines() if line.startswith("static") and "(" not in line]
     assert kept and all(line.startswith("static const") for line in kept)
@@ -396,7 +396,7 @@ def test_onnx_decides_as_numpy_does(name):
     for seed in range(10):
         observations, past, state = random_observations(policy, 1000, seed), None, None
         given = {"observation": observations}
-        if policy.recollection is not None:
+        if policy.frame_stack is not None:
             shape = len(observations), policy.description.past, observations.shape[1]
             past = np.random.default_rng(seed).normal(size=shape).astype(np.float32)
             given["past"], state = past, (past,)
@@ -425,8 +425,8 @@ def test_the_command_writes_a_file(tmp_path, monkeypatch, capsys):
     assert main(["export", "learned", "--to", "c", "--points", "3"]) == 0
     assert capsys.readouterr().out.startswith("learned.c: ")
     assert "#define SEASTAR_POINTS 11\n" in (tmp_path / "learned.c").read_text()
-    assert main(["export", "seastar-0.2s", "--to", "c"]) == 0
-    assert "Policy seastar-0.2s" in Path("seastar-0.2s.c").read_text(encoding="utf-8")
+    assert main(["export", "timed-0.2s", "--to", "c"]) == 0
+    assert "Policy timed-0.2s" in Path("timed-0.2s.c").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

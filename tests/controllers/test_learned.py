@@ -28,7 +28,7 @@ from seastar_gym import (
     Water,
 )
 from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, load, save
+from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, load, save
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -297,7 +297,7 @@ N_DAMAGED = 200
 def test_damaged_files_of_the_policy_in_the_box_load_or_are_refused_in_a_sentence(suffix, tmp_path):
     """Bytes flipped, cut out, doubled or cut off, with a fixed seed."""
     rng, file = np.random.default_rng(0), tmp_path / "policy.safetensors"
-    shipped = {one: SHIPPED.with_suffix(one).read_bytes() for one in (".json", ".safetensors")}
+    shipped = {one: BUNDLED.with_suffix(one).read_bytes() for one in (".json", ".safetensors")}
     refused = 0
     for _ in range(N_DAMAGED):
         for one, data in shipped.items():
@@ -352,7 +352,7 @@ def test_a_policy_with_memory_sees_the_past_in_the_limbs_of_the_present():
     state, past = None, np.stack([first, first], axis=1)
     for present, later in ((first, [first, first]), (second, [second, first]), (third, [third, second])):
         action, state = policy.predict(present, state, deterministic=True)
-        shown, elements = TASK.recollection.shown(present, past)
+        shown, elements = TASK.frame_stack.stacked(present, past)
         chosen = policy.logits(shown).argmax(axis=-1)[..., 0]
         np.testing.assert_array_equal(action, TASK.reduction.restore(chosen, elements))
         past = np.stack(later, axis=1)
@@ -374,7 +374,7 @@ def test_a_description_of_a_task_survives_its_text_and_shapes_the_network():
     assert TASK.observation_size == size and TASK.input_size == size + 2 * (10 + size - 180)
     assert TASK.shapes()["0.weight"] == (8, TASK.input_size) and TASK.distributions == (1, 243)
     bare = Description("limbs", False, Scene(), ())
-    assert (bare.reduction, bare.recollection, bare.input_size) == (None, None, 186)
+    assert (bare.reduction, bare.frame_stack, bare.input_size) == (None, None, 186)
     assert bare.shapes() == {"0.weight": (15, 186), "0.bias": (15,)}
 
 
@@ -452,19 +452,19 @@ def test_another_scene_is_told_but_other_numerics_are_not(policy):
     assert "fluid.density 1000.0 (here None)" in policy.differences(Scene(fluid=None))
 
 
-# The policy in the box
+# The bundled policy
 
 
 def test_the_policy_in_the_box_says_how_it_was_made():
     shipped = load()
-    facts = json.loads(SHIPPED.with_suffix(".json").read_text(encoding="utf-8"))
+    facts = json.loads(BUNDLED.with_suffix(".json").read_text(encoding="utf-8"))
     assert Scene.from_dict(facts["scene"]) == shipped.scene
     trained_at = Scene.preset("balanced")  # before it was given numerical damping
     assert shipped.scene == replace(trained_at, numerics=replace(trained_at.numerics, damping=0.0))
     assert shipped.training["strokes"] > 0 and isinstance(shipped.training["seed"], int)
     assert shipped.training["commands"][0].startswith("python train.py")
     assert {"seastar_gym", "numpy", "torch", "stable_baselines3"} <= set(shipped.training["versions"])
-    assert SHIPPED.stat().st_size < 1_000_000
+    assert BUNDLED.stat().st_size < 1_000_000
 
 
 def test_the_policy_in_the_box_beats_the_script_round_the_pentagon():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seastar_gym import Body, Headings, Numerics, RewardWeights, Scene, Seastar, Simulator, ThermalSma
+from seastar_gym import Body, HeadingTargets, Numerics, RewardWeights, Scene, Seastar, Simulator, ThermalSma
 from seastar_gym.controllers.greedy import waypoints_of
 from seastar_gym.controllers.planner import Budget, Planner, Targets, gait_planner, state_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -116,7 +116,7 @@ def test_what_is_left_to_turn_lengthens_the_way_at_its_price_in_the_reward():
         places = np.array([[near, 0.0]]), np.array([[0.1, 0.0]])
         (straight,), _, _ = Planner(FAST)._judge(nodes, passed, Targets(*places))
         asked = Targets(*places, np.array([turn]), np.array([0.8]))
-        way, now, _ = Planner(FAST, headings=Headings(tolerance=0.2))._judge(nodes, passed, asked)
+        way, now, _ = Planner(FAST, headings=HeadingTargets(tolerance=0.2))._judge(nodes, passed, asked)
         assert now.item() == passes
         expected = 0.1 + price * 0.8 if passes else straight[0] + price * (turn + (0.8 - turn))
         assert way.item() == pytest.approx(expected, rel=1e-9)
@@ -137,7 +137,7 @@ def test_a_waypoint_that_is_not_the_last_is_passed_and_not_arrived_at():
 def test_the_planner_turns_to_either_side_and_keeps_a_heading_that_is_met():
     ends = []
     for asked in (0.6, -0.6, 0.0):
-        headings = Headings(asked)
+        headings = HeadingTargets(asked)
         env = SeastarSwimEnv([[0.005, 0.0]], "pairs", "fast", decision_period=0.5, headings=headings)
         planner = Planner(decision_period=0.5, headings=headings, budget=Budget(2, 4, 0.5), threads=1)
         done = swim("planner", planner, env, max_strokes=30)

@@ -9,7 +9,7 @@ from stable_baselines3.common.monitor import Monitor
 from seastar_gym import Numerics, Scene, Simulator
 from seastar_gym.controllers.scripted import GAITS, OpenLoopPolicy, RandomPolicy, scripted, to_actions
 from seastar_gym.envs.commands import action_space, to_commands
-from seastar_gym.gaits import in_time, pair_gait, pentagon_gait, straight_gait, turning_wave
+from seastar_gym.gaits import pair_gait, pentagon_gait, straight_gait, timed, turning_wave
 
 MODES = ["limbs", "joint", "pairs"]
 OBSERVATION = np.zeros(186, np.float32)
@@ -194,7 +194,7 @@ def test_continuous_actions_are_shares_for_one_robot_or_many():
 
 def test_gaits_that_turn_are_for_five_limbs_and_decide_as_often_as_asked():
     np.testing.assert_array_equal(GAITS["wave"](5, 0.2), turning_wave(0.2))
-    np.testing.assert_array_equal(GAITS["pentagon"](5, 0.5), in_time(pentagon_gait(), 0.5))
+    np.testing.assert_array_equal(GAITS["pentagon"](5, 0.5), timed(pentagon_gait(), 0.5))
     for name in ("pentagon", "wave", "lagged-pentagon"):
         with pytest.raises(ValueError, match=r"are for five limbs, not 4\.$"):
             GAITS[name](4, 0.5)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from seastar_gym import Headings, Scene
+from seastar_gym import HeadingTargets, Scene
 from seastar_gym.controllers.turning import TurnThenSwim
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.layout import HEADINGS, Layout
@@ -40,7 +40,7 @@ def seen(left: float) -> np.ndarray:
 
 
 def agent(swimmer: Swimmer | None = None) -> TurnThenSwim:
-    return TurnThenSwim(CLOCKWISE, swimmer or Swimmer(), "pairs", Scene(), Headings(tolerance=0.2), 0.5)
+    return TurnThenSwim(CLOCKWISE, swimmer or Swimmer(), "pairs", Scene(), HeadingTargets(tolerance=0.2), 0.5)
 
 
 def commands_of(policy: TurnThenSwim, lefts: list[float]) -> list[list[float]]:
@@ -84,7 +84,7 @@ class Resting:
 
 @pytest.mark.parametrize("asked", [0.5, -0.5])
 def test_a_robot_turns_to_the_side_that_is_asked_for_and_then_swims(asked):
-    scene, headings = make_scene(None, "fast", 0.2), Headings(asked)
+    scene, headings = make_scene(None, "fast", 0.2), HeadingTargets(asked)
     policy = TurnThenSwim(turning_wave(0.2), Resting(), "pairs", scene, headings, 0.2)
     env = SeastarSwimEnv([[0.3, 0.0]], "joint", "fast", decision_period=0.2, headings=headings)
     done = swim("turn", policy, env, max_strokes=40)

@@ -14,7 +14,7 @@ pytest.importorskip("torch")
 
 from refusals import assert_refused  # noqa: E402
 from seastar_gym.cli.main import main  # noqa: E402
-from seastar_gym.controllers import in_the_box, load  # noqa: E402
+from seastar_gym.controllers import pretrained  # noqa: E402
 from seastar_gym.data.dataset import record, write  # noqa: E402
 
 ROOT = Path(__file__).parents[2]
@@ -101,9 +101,9 @@ def test_no_episodes_are_no_dataset(folder):
 
 @pytest.fixture(scope="module")
 def timed(folder):
-    """A dataset of the policy in the box for decisions every 0.5 s."""
+    """A dataset of the bundled policy for decisions every 0.5 s."""
     how = {"actions": "pairs", "fidelity": "fast"}
-    episodes = record("SeastarSwimTimed-v0", load(in_the_box(0.5)), 2, **how)
+    episodes = record("SeastarSwimTimed-v0", pretrained("timed-0.5s"), 2, **how)
     return write(episodes, "SeastarSwimTimed/learned-v0", "SeastarSwimTimed-v0", "learned", **how)
 
 

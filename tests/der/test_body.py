@@ -12,7 +12,7 @@ from seastar_gym.der.body.body import freeze_body, place_roots
 from seastar_gym.der.geometry import rotation
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.momentum import settle_momentum
+from seastar_gym.der.stepping.momentum import correct_momentum
 from seastar_gym.der.stepping.newton import minimise, take_step
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import Stage
@@ -202,7 +202,7 @@ def settled(rods, rigid, tableau, start, gamma, h):
     freeze_fluid.plain(rods, work)
     work.hub_direction[:] = np.stack([np.cos(rigid.directions), np.sin(rigid.directions)], axis=1).reshape(-1, 1)
     minimise.plain(rods, work, stage, EVERYONE, Lanes(1e-13), Lanes(60.0))
-    settle_momentum.plain(rods, work, tableau, 0, stage, q_hat, v_hat, Lanes(h), EVERYONE)
+    correct_momentum.plain(rods, work, tableau, 0, stage, q_hat, v_hat, Lanes(h), EVERYONE)
     return unknowns(rods, work.q)
 
 

@@ -9,10 +9,10 @@ from bodied_oracle import Apart, Touching, turned
 from fuzz.frames import mirrored_body, swapped
 from seastar_gym import Attachment, Body, Contact, Scene, Seastar, SmaPulse, Water
 from seastar_gym.der.body.body import begin_body, place_roots
+from seastar_gym.der.contact.broad_phase import freeze_contact
 from seastar_gym.der.contact.contact import add_contact, n_listed
 from seastar_gym.der.contact.coupled import solve_coupled
-from seastar_gym.der.contact.crossing import those_uncrossed
-from seastar_gym.der.contact.near_pairs import freeze_contact
+from seastar_gym.der.contact.crossing import without_new_crossings
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.newton import move_along
@@ -262,5 +262,5 @@ def test_steps_whose_ends_are_in_the_body_are_seen_in_their_own_robot(name):
         for rows in (work.q, q_0):
             place_roots.plain(rods, rows)
         stage = Stage(q_0, q_0, Lanes(1.0), Lanes(1.0), False)
-        found = plain(those_uncrossed.plain(rods, work, stage, q_0, EVERYONE))
+        found = plain(without_new_crossings.plain(rods, work, stage, q_0, EVERYONE))
         assert found.all() == good and found.any() == good

@@ -5,6 +5,7 @@ import pytest
 
 from hubs import TEN
 from seastar_gym import Scene
+from seastar_gym.der.contact.broad_phase import freeze_contact, share_of_edge
 from seastar_gym.der.contact.contact import (
     SLOT_ROWS,
     STIFFNESS,
@@ -15,10 +16,9 @@ from seastar_gym.der.contact.contact import (
     gap,
     members,
     n_listed,
-    those_apart,
+    not_touching,
 )
 from seastar_gym.der.contact.crossing import edges_cross
-from seastar_gym.der.contact.near_pairs import freeze_contact, share_of_edge
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
@@ -114,7 +114,7 @@ def test_robots_apart_have_no_forces_whoever_touches_beside_them():
     found = energy(touching)
     assert not found[:2].any() and np.all(found[2:] > 0.0)
     assert not touching.work.contact.force[:, :2].any()
-    np.testing.assert_array_equal(plain(those_apart.plain(touching.work, EVERYONE)), np.arange(N_LANES) < 2)
+    np.testing.assert_array_equal(plain(not_touching.plain(touching.work, EVERYONE)), np.arange(N_LANES) < 2)
 
 
 def test_where_the_stage_is_asked_and_where_the_state_ends_is_the_same_energy_without_looking_ahead():
@@ -137,4 +137,4 @@ def test_without_contact_nothing_is_added():
     assert add_contact.plain(NO_RODS, NO_WORK, None, None, 3.0) == 3.0
     assert add_contact_energy.plain(NO_RODS, NO_WORK, None, 3.0) == 3.0
     assert plain(contact_force.plain(NO_WORK, 1)) == (0.0, 0.0)
-    assert those_apart.plain(NO_WORK, EVERYONE) is EVERYONE
+    assert not_touching.plain(NO_WORK, EVERYONE) is EVERYONE

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from seastar_gym import Contact, Scene, Seastar, SmaPulse
-from seastar_gym.der.contact.crossing import edges_cross, on_their_sides, those_uncrossed
+from seastar_gym.der.contact.crossing import edges_cross, on_their_sides, without_new_crossings
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.model.rods import make_rods
@@ -34,7 +34,7 @@ def found(q_1: np.ndarray, q_0: np.ndarray, ahead: bool = False, robots=None, mi
     work.contact.missed[:] = 1.0 * np.asarray(missed)
     stage = Stage(work.q_hat, work.v_hat, Lanes(1e-3), Lanes(1e3), ahead)
     asked = Mask(np.ones(N_LANES, bool) if robots is None else robots)
-    return plain(those_uncrossed.plain(RODS, work, stage, rows(q_0), asked))
+    return plain(without_new_crossings.plain(RODS, work, stage, rows(q_0), asked))
 
 
 @pytest.mark.parametrize("ahead", [False, True])
@@ -56,7 +56,7 @@ def test_robots_whose_pairs_were_not_all_listed_are_left_out():
 
 def test_without_contact_nobody_is_left_out():
     everyone = Mask(np.ones(N_LANES, bool))
-    assert those_uncrossed.plain(NO_RODS, None, None, None, everyone) is everyone
+    assert without_new_crossings.plain(NO_RODS, None, None, None, everyone) is everyone
 
 
 def test_limbs_are_on_their_sides_of_a_line_across_the_difference_of_their_roots():

@@ -18,9 +18,9 @@ from seastar_gym.der.stepping.guard import (
     add_work_of_loads,
     allowed_energy,
     hold_to_energy,
-    put_back,
+    restore,
     rigid_motion,
-    set_aside,
+    save,
     through_poles,
 )
 from seastar_gym.der.stepping.schemes import SCHEMES
@@ -91,12 +91,12 @@ def worked(rods, work, q, v, frame, result):
 def jump(rods, work, scheme, q, v, q_1, robots, result):
     """Put (q, v) aside, move to q_1, look for poles, and put the robots back that came through one."""
     rows, memory, tableau, q_rows, v_rows = borrow(rods), borrow(work), borrow(scheme), borrow(q), borrow(v)
-    set_aside(rows, memory, tableau, q_rows, v_rows)
+    save(rows, memory, tableau, q_rows, v_rows)
     for row in range(q.shape[0]):
         store(q_rows, row, load(borrow(q_1), row))
         store(v_rows, row, splat(0.0))
     through = through_poles(rows, memory, q_rows, load(borrow(robots), 0) > 0.0)
-    put_back(rows, memory, tableau, q_rows, v_rows, through)
+    restore(rows, memory, tableau, q_rows, v_rows, through)
     store(borrow(result), 0, select(through, splat(1.0), 0.0))
 
 

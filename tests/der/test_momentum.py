@@ -8,7 +8,7 @@ from hubs import HUBS, TEN
 from seastar_gym import Scene, SmaPulse
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.momentum import LOST, move_as_a_whole, settle_momentum
+from seastar_gym.der.stepping.momentum import LOST, correct_momentum, move_as_a_whole
 from seastar_gym.der.stepping.newton import take_step
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import Stage
@@ -80,7 +80,7 @@ def settled(fluid: bool, gamma: float = GAMMA):
     work.q[:], work.q_hat[:], work.v_hat[:] = rows(stages.q), rows(stages.q_hat), rows(stages.v_hat)
     stage = Stage(work.q_hat, work.v_hat, Lanes(gamma), Lanes(1.0 / gamma), False)
     robots = Mask(np.arange(N_LANES) < N_LANES - 1)
-    settle_momentum.plain(rods, work, SCHEMES["implicit-euler"], 0, stage, work.q_hat, work.v_hat, gamma, robots)
+    correct_momentum.plain(rods, work, SCHEMES["implicit-euler"], 0, stage, work.q_hat, work.v_hat, gamma, robots)
     return star, stages, nodes(work.q)
 
 
@@ -96,11 +96,11 @@ def test_in_vacuum_one_step_balances_the_momentum_and_bends_no_limb():
 
 
 def test_in_a_fluid_steps_that_leave_digits_enough_stay_what_they_are():
-    rate = float(make_rods(Scene(TEN)).scales.unsettled_rate[0])
+    rate = float(make_rods(Scene(TEN)).scales.stiffness_ratio[0])
     assert rate * GAMMA**2 < LOST
     _, stages, q = settled(fluid=True)
     np.testing.assert_array_equal(q, stages.q)
-    gamma = 1.1 * np.sqrt(LOST / float(make_rods(Scene(robot_and_star(5, 4)[0])).scales.unsettled_rate[0]))
+    gamma = 1.1 * np.sqrt(LOST / float(make_rods(Scene(robot_and_star(5, 4)[0])).scales.stiffness_ratio[0]))
     star, stages, q = settled(fluid=True, gamma=gamma)
     for lane in range(N_LANES - 1):
         before, after = (
@@ -124,7 +124,7 @@ def test_what_contact_pushed_when_it_was_last_asked_moves_no_robot_as_a_whole():
 def test_where_momentum_begins_to_be_settled_in_a_fluid_rounding_is_some_1e_10_of_a_newton_step():
     """Measured with limbs of three edges and in vacuum, where nothing else is left of the momentum."""
     robot, star = robot_and_star(5, 4, fluid=False)
-    rods, rate = rods_of(robot, fluid=False), float(rods_of(robot).scales.unsettled_rate[0])
+    rods, rate = rods_of(robot, fluid=False), float(rods_of(robot).scales.stiffness_ratio[0])
     gamma = np.sqrt(LOST / rate)
     stages, work = RandomStages(star, gamma, bend=1e-3, stretch=1e-6, speed=1e-3), make_work(rods, 1)
     work.q[:], work.q_hat[:] = rows(stages.q), rows(stages.q_hat)

@@ -8,8 +8,8 @@ import pytest
 import oracle
 from seastar_gym.der.geometry import larger
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.foresight import foreseeable_length
 from seastar_gym.der.stepping.newton import minimise, move_node, step_scale
+from seastar_gym.der.stepping.skip_last import quadratic_length
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
@@ -30,7 +30,7 @@ def minimised(active=EVERYONE, tolerance=1e-13, limit=60.0, speed=0.05, bend=0.0
     converged, phi, iterations, regularised, backtracks = plain(found)
     return SimpleNamespace(
         stages=stages, q=nodes(work.q), converged=converged, phi=phi, iterations=iterations, regularised=regularised,
-        backtracks=backtracks, length=plain(foreseeable_length.plain(RODS, stage)),
+        backtracks=backtracks, length=plain(quadratic_length.plain(RODS, stage)),
     )  # fmt: skip
 
 

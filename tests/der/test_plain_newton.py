@@ -5,10 +5,10 @@ import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator
 from seastar_gym.der.potential import factorise
-from seastar_gym.der.stepping.foresight import EASY, LATE, foreseeable_length
 from seastar_gym.der.stepping.newton import take_step
 from seastar_gym.der.stepping.report import NEWTON_ITERATIONS, REPORT_ROWS
 from seastar_gym.der.stepping.schemes import SCHEMES
+from seastar_gym.der.stepping.skip_last import EASY, LATE, quadratic_length
 from seastar_gym.der.stepping.stages import begin_stage, end_stage, end_step
 from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import set_natural_hub_angles
@@ -26,13 +26,13 @@ def newton(rods, work, stage, tolerance, iteration_limit):
     """Plain Newton (13.11): full steps until one is below the tolerance; returns the iterations."""
     one, zero = splat(1.0), splat(0.0)
     iterations, running = zero, zero < one
-    quadratic_length = foreseeable_length(rods, stage)
+    length = quadratic_length(rods, stage)
     while any_lane(running):
         factorise(rods, work, stage, None)
         move = take_step(rods, work, running, None, zero)
         iterations += select(running, one, zero)
         late = select(iterations < EASY, one, LATE)
-        foreseen = (iterations <= EASY) & (late * move * move <= tolerance * quadratic_length)
+        foreseen = (iterations <= EASY) & (late * move * move <= tolerance * length)
         running = running & ~((move <= tolerance) | foreseen) & (iterations < iteration_limit)
     return iterations
 

@@ -14,7 +14,7 @@ from declared import assert_declared_as_recorded
 from seastar_gym import (
     TASKS,
     FailBlind,
-    Headings,
+HeadingTargets,
     Limited,
     Miswired,
     Numerics,
@@ -113,7 +113,7 @@ def test_the_reward_has_the_terms_and_weights_of_the_table():
 
 def test_info_has_the_names_and_types_of_the_table():
     numerics = Numerics("implicit-midpoint", 5e-3, 1e-5)
-    env = SeastarSwimEnv(scene=Scene(numerics=numerics), error_bars=True, headings=Headings())
+    env = SeastarSwimEnv(scene=Scene(numerics=numerics), error_bars=True, headings=HeadingTargets())
     for info in (env.reset(seed=0)[1], env.step([0, 1, 0, 0, 2])[4]):
         documented = {row["name"]: row["type"] for row in table("Info")}
         assert set(info) == set(documented)
@@ -247,7 +247,7 @@ def test_ids_are_declared_as_recorded():
     assert gym.spec("SeastarSwimContinuous-v0").kwargs == {"actions": "continuous"}
     heading = gym.spec("SeastarSwimHeading-v0").kwargs
     assert heading["decision_period"] == 0.5 and heading["actions"] == "pairs"
-    assert from_dict(heading["headings"], Headings) == Headings()
+    assert from_dict(heading["headings"], HeadingTargets) == HeadingTargets()
     for id, (task, actions, period, limit, threshold) in TASKS.items():
         spec = gym.spec(id)
         assert spec.max_episode_steps == round(limit / period) and spec.reward_threshold == threshold

@@ -8,7 +8,7 @@ from refusals import assert_refused
 from seastar_gym import DomainRandomization, Uniform
 from seastar_gym.envs.commands import action_space, choices, command_table, to_commands
 from seastar_gym.envs.goal import GoalForm
-from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.paths import FARTHEST, make_path, register_path
@@ -96,8 +96,8 @@ REFUSED = {
     "no action mode": (lambda: action_space("Limbs", 5), "actions must be one of", "'limbs', 'joint', 'pairs'"),
     "too large a share": (lambda: to_commands("continuous", 1, [[1.001]], 1), "is numbers from -1 to 1"),
     "an action of shares": (lambda: to_commands("pairs", 5, [1.0], 1), "are whole numbers of shape (1,)"),
-    "a heading beyond": (lambda: Headings(1.1e6), "Headings.asked must be"),
-    "half a turn and more": (lambda: Headings(tolerance=3.2), "Headings.tolerance must be at most pi"),
+    "a heading beyond": (lambda: HeadingTargets(1.1e6), "HeadingTargets.target must be"),
+    "half a turn and more": (lambda: HeadingTargets(tolerance=3.2), "HeadingTargets.tolerance must be at most pi"),
     "an aim beyond": (lambda: RewardWeights(aim=1.01), "RewardWeights.aim must be from 0 to 1"),
     "a goal too far": (lambda: ObstTrap(distance=(0.45, 0.61)), "ObstTrap.distance must lie from 0.45 to 0.6"),
     "frames without end": (lambda: SeastarSwimEnv(frames_per_stroke=1_000_001), "frames_per_stroke"),
@@ -122,7 +122,7 @@ def test_what_is_just_allowed_is_taken():
     assert to_commands("continuous", 2, [[1.0, -1.0]], 1).tolist() == [[1.0, -1.0]]
     assert to_commands("pairs", 5, [20, 0], 2)[:, 4].tolist() == [1.0, 0.0]
     assert Uniform(1.0, 1.0).draw(np.random.default_rng(0)) == 1.0 and Normal(2.0, 0.0).bounds == (2.0, 2.0)
-    assert Headings((1e6, -1e6)).asked == (1e6, -1e6) and Headings(tolerance=np.pi).tolerance == np.pi
+    assert HeadingTargets((1e6, -1e6)).target == (1e6, -1e6) and HeadingTargets(tolerance=np.pi).tolerance == np.pi
     assert RewardWeights(aim=1.0).aim == 1.0 and ObstTrap(distance=(0.45, 0.6)).distance == (0.45, 0.6)
     assert Symmetry(5, ((0, -1),), Layout(5, 1)).mirror == ((0, -1),)
     assert LIMBS.restore(np.ones((2, 5), int), [0, 9]).shape == (2, 5)
@@ -132,5 +132,5 @@ def test_what_is_just_allowed_is_taken():
     one = SeastarSwimVectorEnv(1, 1, fidelity="fast")
     one.reset(seed=0)
     assert one.step(np.zeros((1, 5), int))[3].tolist() == [True]
-    assert Headings((0.1, 0.2)).of_path(np.ones((2, 2)), np.random.default_rng(0)).tolist() == [0.1, 0.2]
+    assert HeadingTargets((0.1, 0.2)).of_path(np.ones((2, 2)), np.random.default_rng(0)).tolist() == [0.1, 0.2]
     assert DomainRandomization({"limb_strengths": Uniform(0.0, 1.0)}).distributions

@@ -9,7 +9,7 @@ from gymnasium.vector import AutoresetMode
 
 from episodes import both, swim_together
 from refusals import assert_refused
-from seastar_gym import Headings, RewardWeights, Scene, Seastar, SmaWires, SymmetryReduction
+from seastar_gym import HeadingTargets, RewardWeights, Scene, Seastar, SmaWires, SymmetryReduction
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.headings import wrapped
 from seastar_gym.envs.layout import HEADINGS, Layout
@@ -27,8 +27,8 @@ CORNERS = [[0.05, 0.0], [0.05, 0.05], [0.0, 0.0]]
 def turning(asked, **arguments):
     """Environment whose only waypoint is already near, so that the heading alone is left; decisions of 0.2 s."""
     return SeastarSwimEnv(
-        [[0.005, 0.0]], "continuous", "fast", waypoint_radius=0.05, decision_period=0.2, headings=Headings(asked, 0.1),
-        **arguments,
+        [[0.005, 0.0]], "continuous", "fast", waypoint_radius=0.05, decision_period=0.2,
+        headings=HeadingTargets(asked, 0.1), **arguments,
     )  # fmt: skip
 
 
@@ -69,7 +69,7 @@ def test_the_heading_is_that_of_the_body_frame():
 
 
 def test_turns_are_seen():
-    env = SeastarSwimEnv(CORNERS, "pairs", "fast", decision_period=0.5, headings=Headings((0.3, -3.0, 2.0)))
+    env = SeastarSwimEnv(CORNERS, "pairs", "fast", decision_period=0.5, headings=HeadingTargets((0.3, -3.0, 2.0)))
     observation, info = env.reset(seed=0)
     expected = [math.cos(0.3), math.sin(0.3), math.cos(-3.0), math.sin(-3.0)]
     np.testing.assert_allclose(observation[AT.headings], expected, atol=1e-6)
@@ -90,7 +90,7 @@ def test_on_the_last_leg_the_next_heading_is_the_current_one():
 def test_the_reward_is_the_decrease_of_what_is_left_to_turn():
     weights = RewardWeights(heading=3.0)
     env = SeastarSwimEnv(
-        CORNERS, "pairs", "fast", decision_period=0.5, headings=Headings((0.3, -3.0, 2.0)), reward=weights
+        CORNERS, "pairs", "fast", decision_period=0.5, headings=HeadingTargets((0.3, -3.0, 2.0)), reward=weights
     )
     _, info = env.reset(seed=0)
     assert info["reward_heading"] == 0.0
@@ -108,7 +108,7 @@ def test_the_reward_is_the_decrease_of_what_is_left_to_turn():
 def test_a_reached_waypoint_leaves_the_turns_after_it():
     """Passing on costs or earns no more than the tolerance."""
     env = SeastarSwimEnv(
-        [[0.001, 0.0], [0.3, 0.0]], "pairs", "fast", decision_period=0.5, headings=Headings((0.1, 1.1), 0.2)
+        [[0.001, 0.0], [0.3, 0.0]], "pairs", "fast", decision_period=0.5, headings=HeadingTargets((0.1, 1.1), 0.2)
     )
     env.reset(seed=0)
     info = env.step(0)[4]
@@ -117,10 +117,10 @@ def test_a_reached_waypoint_leaves_the_turns_after_it():
 
 
 def test_headings_are_along_the_legs_or_drawn():
-    env = SeastarSwimEnv(CORNERS, fidelity="fast", headings=Headings())
+    env = SeastarSwimEnv(CORNERS, fidelity="fast", headings=HeadingTargets())
     env.reset(seed=0)
     np.testing.assert_allclose(env._task.headings_of(0), [0.0, np.pi / 2, -0.75 * np.pi])
-    env = SeastarSwimEnv(CORNERS, fidelity="fast", headings=Headings("random"))
+    env = SeastarSwimEnv(CORNERS, fidelity="fast", headings=HeadingTargets("random"))
     drawn = []
     for _ in range(2):
         env.reset(seed=5)
@@ -151,13 +151,13 @@ def test_nothing_changes_without_headings():
 def test_the_batch_has_the_bits_of_single_environments(mode, asked):
     arguments = {
         "path": "random", "random_heading": True, "max_episode_steps": 3,
-        "headings": Headings(asked, 1.0), "waypoint_radius": 0.15,
+        "headings": HeadingTargets(asked, 1.0), "waypoint_radius": 0.15,
     }  # fmt: skip
     swim_together(*both(ID, 3, mode, **arguments), 7)
 
 
 def test_numbers_stay_finite():
-    env = gym.make(ID, fidelity="fast", headings=Headings("random"), path="random")
+    env = gym.make(ID, fidelity="fast", headings=HeadingTargets("random"), path="random")
     env.reset(seed=0)
     env.action_space.seed(0)
     for _ in range(20):
@@ -175,7 +175,7 @@ def test_a_carried_robot_is_asked_for_the_carried_turns():
 
     def swum(element):
         asked = np.array([0.1, -1.0, 3.0]) * (-1.0 if element % 2 else 1.0)
-        more = {"decision_period": 0.5, "headings": Headings(tuple(asked))}
+        more = {"decision_period": 0.5, "headings": HeadingTargets(tuple(asked))}
         return reduced_swim(scene, None, matrix(element, 5), actions, **more)
 
     rewards, seen = swum(0)
@@ -200,7 +200,7 @@ def test_only_a_mirror_changes_a_turn():
 
 
 def test_strokes_without_memory_are_carried_with_headings():
-    env = SymmetryReduction(SeastarSwimEnv(fidelity="fast", headings=Headings(1.0)))
+    env = SymmetryReduction(SeastarSwimEnv(fidelity="fast", headings=HeadingTargets(1.0)))
     observation, _ = env.reset(seed=0)
     assert observation.shape == (190,)
     np.testing.assert_allclose(observation[182:186], [math.cos(1.0), math.sin(1.0)] * 2, atol=1e-6)
@@ -217,7 +217,7 @@ def test_observations_with_other_numbers_are_refused():
 def test_pictures_show_the_asked_heading_and_limb_1():
     pytest.importorskip("pygame")
     pictures = []
-    for headings in (Headings(np.pi / 2), Headings(-np.pi / 2), None):
+    for headings in (HeadingTargets(np.pi / 2), HeadingTargets(-np.pi / 2), None):
         env = SeastarSwimEnv([[0.3, 0.0]], fidelity="fast", render_mode="rgb_array", headings=headings)
         env.reset(seed=0)
         pictures.append(env.render())
@@ -234,7 +234,8 @@ def is_orange(colour):
 
 def test_a_batch_draws_every_robots_headings():
     pytest.importorskip("pygame")
-    batch = SeastarSwimVectorEnv(2, fidelity="fast", headings=Headings("random"), render_mode="rgb_array", path="line")
+    headings = HeadingTargets("random")
+    batch = SeastarSwimVectorEnv(2, fidelity="fast", headings=headings, render_mode="rgb_array", path="line")
     batch.reset(seed=0)
     one, other = batch.render()
     assert (one != other).any()
@@ -247,35 +248,35 @@ def test_a_batch_draws_every_robots_headings():
     "asked", ["across", "", None, True, math.nan, math.inf, 1e7, (), (0.1, math.nan), [0.1], ("along",), (True,)]
 )
 def test_what_is_no_heading_is_refused(asked):
-    with assert_refused("Headings.asked", "along"):
-        Headings(asked)
+    with assert_refused("HeadingTargets.target", "along"):
+        HeadingTargets(asked)
 
 
 def test_arrays_are_refused():
-    with assert_refused("Headings.asked"):
-        Headings(np.array([0.1, 0.2]))
+    with assert_refused("HeadingTargets.target"):
+        HeadingTargets(np.array([0.1, 0.2]))
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -0.1, math.nan, math.inf, 4.0, True, "0.1", None])
 def test_what_is_no_tolerance_is_refused(tolerance):
-    with assert_refused("Headings.tolerance"):
-        Headings(0.0, tolerance)
+    with assert_refused("HeadingTargets.tolerance"):
+        HeadingTargets(0.0, tolerance)
 
 
 @pytest.mark.parametrize("make", [SeastarSwimEnv, SeastarSwimVectorEnv])
 def test_environments_refuse_headings_that_do_not_fit(make):
-    for headings in (0.5, "along", True, {"kind": "Headings"}):
-        with assert_refused("eadings"):
+    for headings in (0.5, "along", True, {"kind": "HeadingTargets"}):
+        with assert_refused("eading"):
             make(headings=headings)
     with assert_refused("2 angles", "5 waypoint"):
-        make(headings=Headings((0.1, 0.2)))
+        make(headings=HeadingTargets((0.1, 0.2)))
     with assert_refused("leg to waypoint 2"):
-        make(path=[[0.1, 0.0], [0.1, 0.0], [0.2, 0.0]], headings=Headings())
+        make(path=[[0.1, 0.0], [0.1, 0.0], [0.2, 0.0]], headings=HeadingTargets())
 
 
 @pytest.mark.parametrize("make", [SeastarSwimEnv, SeastarSwimVectorEnv])
 def test_a_path_with_other_waypoints_is_refused_at_reset_and_changes_nothing(make):
-    env = make(path=CORNERS, headings=Headings((0.1, 0.2, 0.3)), fidelity="fast")
+    env = make(path=CORNERS, headings=HeadingTargets((0.1, 0.2, 0.3)), fidelity="fast")
     first, _ = env.reset(seed=0)
     with assert_refused("3 angles", "5 waypoint"):
         env.reset(options={"path": "pentagon"})

@@ -5,8 +5,8 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from refusals import assert_refused
-from seastar_gym.envs.headings import Headings
-from seastar_gym.envs.symmetry import VectorMemory, VectorSymmetryReduction
+from seastar_gym.envs.headings import HeadingTargets
+from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 
@@ -23,7 +23,7 @@ def test_memory_shows_the_reduced_observation_and_the_past_in_the_same_limbs(tas
     def new():
         return batch(task, actions="joint", decision_period=period)
 
-    memory, reduced = VectorMemory(new(), 2), VectorSymmetryReduction(new())
+    memory, reduced = VectorFrameStack(new(), 2), VectorSymmetryReduction(new())
     (shown, _), (ours, _) = memory.reset(seed=1), reduced.reset(seed=1)
     assert shown.shape == memory.observation_space.shape
     rng, size, past = np.random.default_rng(0), ours.shape[1], [memory._latest, memory._latest]
@@ -31,39 +31,39 @@ def test_memory_shows_the_reduced_observation_and_the_past_in_the_same_limbs(tas
         np.testing.assert_array_equal(shown[:, :size], ours)
         past, actions = [memory._latest, past[0]], rng.integers(0, 243, 6)
         shown, ours = memory.step(actions)[0], reduced.step(actions)[0]
-        seen = memory.recollection
+        seen = memory.frame_stack
         for before, told in zip(past, np.moveaxis(shown[:, size:].reshape(6, 2, -1), 1, 0), strict=True):
             carried = seen.symmetry.carry(before, memory._elements)
-            np.testing.assert_array_equal(told, carried[:, seen.told])
+            np.testing.assert_array_equal(told, carried[:, seen.features])
 
 
 def test_memory_ends_with_the_episode_and_the_last_observation_still_has_it():
     inner = SeastarTaskVectorEnv(2, 2, "prey", fidelity="fast", threads=1, autoreset_mode=AutoresetMode.SAME_STEP)
-    memory = VectorMemory(inner, 3)
+    memory = VectorFrameStack(inner, 3)
     memory.reset(seed=0)
     memory.step(np.array([3, 4]))
     shown, _, _, truncated, info = memory.step(np.array([5, 6]))
     assert truncated.all() and info["final_obs"][0].shape == shown[0].shape
-    now = shown[:, :186][:, memory.recollection.told]
+    now = shown[:, :186][:, memory.frame_stack.features]
     np.testing.assert_array_equal(shown[:, 186:].reshape(2, 3, -1), np.repeat(now[:, None], 3, axis=1))
     last = info["final_obs"][1]
-    assert not np.array_equal(last[186:].reshape(3, -1)[0], last[:186][memory.recollection.told])
+    assert not np.array_equal(last[186:].reshape(3, -1)[0], last[:186][memory.frame_stack.features])
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
 def test_no_memory_goes_from_one_episode_into_the_next(mode):
     """Robots whose episodes end at different times: the past of a new one is its first observation."""
-    memory = VectorMemory(batch("prey", 3, autoreset_mode=mode), 2)
+    memory = VectorFrameStack(batch("prey", 3, autoreset_mode=mode), 2)
     memory.unwrapped.max_episode_steps = 3
     memory.reset(seed=0)
-    seen, size = memory.recollection, memory.recollection.layout.size
+    seen, size = memory.frame_stack, memory.frame_stack.layout.size
     began, ended = 0, np.zeros(3, bool)
     for step in range(9):
         shown, _, terminated, truncated, _ = memory.step(np.full(3, step % 21))
         over = terminated | truncated
         begun = over if mode == AutoresetMode.SAME_STEP else ended
         for robot in np.flatnonzero(begun):
-            now, past = shown[robot, :size][seen.told], shown[robot, size:].reshape(2, -1)
+            now, past = shown[robot, :size][seen.features], shown[robot, size:].reshape(2, -1)
             np.testing.assert_array_equal(past, np.stack([now, now]))
             began += 1
         ended = over
@@ -71,14 +71,14 @@ def test_no_memory_goes_from_one_episode_into_the_next(mode):
 
 
 def test_a_reset_of_some_robots_leaves_the_others_memory():
-    memory = VectorMemory(batch("prey", 2, autoreset_mode=AutoresetMode.DISABLED), 2)
+    memory = VectorFrameStack(batch("prey", 2, autoreset_mode=AutoresetMode.DISABLED), 2)
     memory.reset(seed=0)
     for action in (3, 4, 5):
         shown = memory.step(np.array([action, action]))[0]
     again, _ = memory.reset(seed=1, options={"reset_mask": np.array([True, False])})
     np.testing.assert_array_equal(again[1], shown[1])
-    now = again[0, : memory.recollection.layout.size][memory.recollection.told]
-    np.testing.assert_array_equal(again[0, memory.recollection.layout.size :].reshape(2, -1), np.stack([now, now]))
+    now = again[0, : memory.frame_stack.layout.size][memory.frame_stack.features]
+    np.testing.assert_array_equal(again[0, memory.frame_stack.layout.size :].reshape(2, -1), np.stack([now, now]))
 
 
 def test_masks_are_those_of_the_robots_that_are_shown():
@@ -87,7 +87,7 @@ def test_masks_are_those_of_the_robots_that_are_shown():
     def new():
         return SeastarSwimVectorEnv(4, 50, fidelity="fast", actions="pairs", decision_period=0.2, threads=1)
 
-    memory, reduced = VectorMemory(new(), 1), VectorSymmetryReduction(new())
+    memory, reduced = VectorFrameStack(new(), 1), VectorSymmetryReduction(new())
     (_, info), (_, others) = memory.reset(seed=0), reduced.reset(seed=0)
     rng = np.random.default_rng(0)
     for _ in range(5):
@@ -99,6 +99,6 @@ def test_masks_are_those_of_the_robots_that_are_shown():
 
 def test_what_cannot_be_remembered_is_refused():
     with assert_refused("past must be"):
-        VectorMemory(batch("prey"), 0)
+        VectorFrameStack(batch("prey"), 0)
     with assert_refused("Asked headings have no place"):
-        VectorMemory(SeastarSwimVectorEnv(1, 50, fidelity="fast", headings=Headings(), threads=1), 2)
+        VectorFrameStack(SeastarSwimVectorEnv(1, 50, fidelity="fast", headings=HeadingTargets(), threads=1), 2)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import seastar_gym
-from seastar_gym import DomainRandomization, Headings, LogUniform, Normal, Uniform
+from seastar_gym import DomainRandomization, HeadingTargets, LogUniform, Normal, Uniform
 from seastar_gym.accuracy.info import NAMES
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
@@ -28,8 +28,8 @@ OPTIONS = {
         "randomization": DomainRandomization(DISTRIBUTIONS),
         "path": "triangle",
     },
-    "headings along": {"headings": Headings(tolerance=3.0), "path": "pentagon"},
-    "headings drawn": {"headings": Headings("random", 0.5), "path": "line"},
+    "headings along": {"headings": HeadingTargets(tolerance=3.0), "path": "pentagon"},
+    "headings drawn": {"headings": HeadingTargets("random", 0.5), "path": "line"},
     "aim": {"waypoint_radius": 0.03, "path": [[0.05, 0.0], [0.05, 0.02], [0.2, 0.0]]},
 }
 """Options of `SeastarSwim-v0`, beside ids with their own."""

@@ -208,7 +208,7 @@ def test_everything_looks_as_it_did_when_somebody_looked_at_it():
     roots = 0.02 * np.exp(0.4j * np.pi * np.arange(5)) + 0.1
     frame = frame_of((0.1, 0.0), (1, -1, 0.5, 0, -0.2), [(0.0, 0.0), (0.06, 0.03), (0.1, 0.0)], 1, 3.25)
     frame = replace(
-        frame, scenery=scenery, warmth=np.linspace(0.0, 1.0, 10).reshape(5, 2),
+        frame, scenery=scenery, wire_state=np.linspace(0.0, 1.0, 10).reshape(5, 2),
         roots=np.column_stack([roots.real, roots.imag]), outline=np.column_stack([roots.real, roots.imag]),
     )  # fmt: skip
     picture = renderer.draw(frame).astype(float)

@@ -13,7 +13,7 @@ from episodes import assert_same, assert_same_steps, swum
 from refusals import assert_refused
 from seastar_gym import (
     DomainRandomization,
-    Headings,
+HeadingTargets,
     Limited,
     Normal,
     Numerics,
@@ -47,8 +47,8 @@ ARGUMENTS = {
     "device": {"device": "scalar", "scene": SCENE},
     "decisions": {"decision_period": 0.2, "observe_actuators": False, "fidelity": "fast"},
     "continuous": {"actions": "continuous", "decision_period": np.float64(0.3), "fidelity": "fast"},
-    "headings": {"headings": Headings((0.1, 1 / 3, 0.0, 1.0, 2.0)), "fidelity": "fast"},
-    "one heading": {"headings": Headings(0.1, 1 / 3), "fidelity": "fast"},
+    "headings": {"headings": HeadingTargets((0.1, 1 / 3, 0.0, 1.0, 2.0)), "fidelity": "fast"},
+    "one heading": {"headings": HeadingTargets(0.1, 1 / 3), "fidelity": "fast"},
     "sight": {
         "sight": Sight(1e2 / 3, Uniform(0.1, 1 / 3), dropout=0.1, sees=np.int64(3)), "decision_period": 0.5,
         "fidelity": "fast", "action_delay": Uniform(0.0, 1 / 3),
@@ -56,7 +56,7 @@ ARGUMENTS = {
     "a delay": {"sight": Sight(), "action_delay": np.float64(1.0), "fidelity": "fast"},
     "plain": {
         "sight": to_dict(Sight(delay=Uniform(0.1, 1 / 3))),
-        "headings": to_dict(Headings("random")),
+        "headings": to_dict(HeadingTargets("random")),
         "scene": SCENE.to_dict(),
         "reward": to_dict(RewardWeights(1.0)),
         "randomization": to_dict(DomainRandomization({"fluid.density": Uniform(900.0, 1000.0)})),

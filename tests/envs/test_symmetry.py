@@ -345,7 +345,7 @@ def test_a_random_policy_in_the_wrapper_swims_the_carried_way(n_limbs, nodes_per
 
 MEMORIES = {
     "wires": SmaWires(period=0.5),
-    "deaf": SmaWires(cooling_time=0.6, period=0.3, deaf=True),
+    "refractory": SmaWires(cooling_time=0.6, period=0.3, refractory=True),
     "thermal": ThermalSma(heating_time=0.1, cooling_time=0.4, largest_temperature=60.0),
     "limited": Limited(SmaPulse(), largest_rate=0.4),
     "measured limb": SmaLimb(period=0.5),
@@ -500,7 +500,7 @@ SYMMETRIC = {
     "every term": EVERYTHING,
     "held hub": Scene(STAR, held_nodes=(0,)),
     "wires": Scene(STAR, actuator=SmaWires(0.4)),
-    "deaf wires": Scene(STAR, actuator=SmaWires(0.4, deaf=True, period=0.5)),
+    "refractory wires": Scene(STAR, actuator=SmaWires(0.4, refractory=True, period=0.5)),
     "thermal": Scene(STAR, actuator=ThermalSma(0.4, cooling_time=0.4)),
     "limited": Scene(STAR, actuator=Limited(SmaPulse(0.4), 0.35, 1.0)),
 }
@@ -609,7 +609,7 @@ def test_actuators_that_remember_are_refused_unless_they_say_what_a_mirror_does(
 
 REMEMBERING = {
     "wires": SmaWires(),
-    "deaf wires": SmaWires(deaf=True),
+    "refractory wires": SmaWires(refractory=True),
     "thermal": ThermalSma(),
     "hot": ThermalSma(largest_temperature=60.0),
     "limited": Limited(SmaPulse(), 0.5, 2.0),
@@ -630,7 +630,7 @@ def test_a_carried_robot_swims_the_carried_way(name):
         state = simulator.get_state()
         other.set_state(carried_state(state, scene))
         commands = np.repeat(rng.uniform(-1, 1, (1, 5)), 10, axis=0)
-        np.testing.assert_array_equal(other.deaf_wires(), carried_wires(simulator.deaf_wires(), elements))
+        np.testing.assert_array_equal(other.refractory_wires(), carried_wires(simulator.refractory_wires(), elements))
         report = simulator.advance(duration, commands)
         its_report = other.advance(duration, symmetry.transform_commands(commands, elements))
         np.testing.assert_allclose(its_report.heating_time, report.heating_time, rtol=0.0, atol=1e-9)
@@ -668,15 +668,15 @@ def carried_wires(wires, elements):
 @pytest.mark.parametrize("mode", MODES)
 def test_masks_are_carried_with_the_actions(mode):
     """A mask of the carried robot is true for the carried actions of which that of the robot is true."""
-    deaf, elements = np.random.default_rng(2).random((10, 5, 2)) < 0.3, np.arange(10)
-    masks = symmetry_for(5, mode=mode).carry_masks(action_masks(mode, deaf), elements)
-    np.testing.assert_array_equal(masks, action_masks(mode, carried_wires(deaf, elements)))
+    refractory, elements = np.random.default_rng(2).random((10, 5, 2)) < 0.3, np.arange(10)
+    masks = symmetry_for(5, mode=mode).carry_masks(action_masks(mode, refractory), elements)
+    np.testing.assert_array_equal(masks, action_masks(mode, carried_wires(refractory, elements)))
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_the_wrappers_have_the_masks_of_the_reduced_robot(mode):
     """A reduced action that the mask forbids is one that would not be followed."""
-    scene = Scene(STAR, actuator=SmaWires(0.4, deaf=True), numerics=FAST)
+    scene = Scene(STAR, actuator=SmaWires(0.4, refractory=True), numerics=FAST)
     arguments = {"actions": mode, "scene": scene, "decision_period": 0.2, "path": [[-0.05, -0.02], [0.1, 0.1]]}
     env = SymmetryReduction(SeastarSwimEnv(**arguments))
     batch = VectorSymmetryReduction(SeastarSwimVectorEnv(2, **arguments))

@@ -19,14 +19,15 @@ from seastar_gym.scene.numerics import MAX_STEPS, SHORTEST
 
 FAST = Numerics.preset("fast")
 MODES = ("limbs", "joint", "pairs", "continuous")
-DEAF = Scene(actuator=SmaWires(deaf=True), numerics=FAST)
+REFRACTORY = Scene(actuator=SmaWires(refractory=True), numerics=FAST)
+STIFF = Scene(Seastar(youngs_modulus=2e6), actuator=SmaWires(), numerics=FAST)
 HOT = Scene(actuator=ThermalSma(largest_temperature=240.0 - 220.0 * np.exp(-0.05 / 0.42)), numerics=FAST)
 """Wires reach the largest temperature after 0.05 s."""
 STRAIGHT = np.array([0, 1, 0, 0, 2])
 
 
 @pytest.mark.parametrize("actions", MODES)
-@pytest.mark.parametrize("scene", [DEAF, HOT])
+@pytest.mark.parametrize("scene", [REFRACTORY, HOT])
 def test_a_batch_with_masks_has_the_bits_of_single_environments(actions, scene):
     arguments = {"scene": scene, "actions": actions, "decision_period": 0.2, "max_episode_steps": 4}
     for mode in (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP):
@@ -118,7 +119,7 @@ def test_decisions_beyond_the_measured_times_are_promised_nothing():
     assert not set(NAMES) & set(SeastarSwimEnv(fidelity="fast", decision_period=0.05).reset(seed=0)[1])
 
 
-@pytest.mark.parametrize("scene", [DEAF, HOT, Scene(Seastar(youngs_modulus=2e6), actuator=SmaWires(), numerics=FAST)])
+@pytest.mark.parametrize("scene", [REFRACTORY, HOT, STIFF])
 def test_other_robots_and_wires_are_promised_nothing_in_time(scene):
     assert not set(NAMES) & set(SeastarSwimEnv(scene=scene, decision_period=0.2).reset(seed=0)[1])
 
@@ -234,28 +235,28 @@ def test_continuous_commands_are_a_fresh_array():
 @pytest.mark.parametrize("actions", MODES)
 def test_a_mask_is_true_for_actions_that_are_followed_as_a_whole(actions):
     rng = np.random.default_rng(0)
-    deaf = rng.random((4, 5, 2)) < 0.3
-    masks = action_masks(actions, deaf)
+    refractory = rng.random((4, 5, 2)) < 0.3
+    masks = action_masks(actions, refractory)
     if actions == "continuous":
-        np.testing.assert_array_equal(masks, ~deaf.reshape(4, 10))
+        np.testing.assert_array_equal(masks, ~refractory.reshape(4, 10))
     elif actions == "limbs":
-        np.testing.assert_array_equal(masks.reshape(4, 5, 3)[..., 1:], ~deaf)
+        np.testing.assert_array_equal(masks.reshape(4, 5, 3)[..., 1:], ~refractory)
         assert masks.reshape(4, 5, 3)[..., 0].all()
     else:
         for number in range(masks.shape[1]):
             commands = to_commands(actions, 5, np.full(4, number), 4)
-            followed = ~((commands > 0) & deaf[..., 0] | (commands < 0) & deaf[..., 1]).any(axis=1)
+            followed = ~((commands > 0) & refractory[..., 0] | (commands < 0) & refractory[..., 1]).any(axis=1)
             np.testing.assert_array_equal(masks[:, number], followed)
 
 
-@pytest.mark.parametrize("scene", [DEAF, HOT])
+@pytest.mark.parametrize("scene", [REFRACTORY, HOT])
 def test_a_masked_command_does_nothing_costs_nothing_and_is_counted(scene):
     """After 0.05 s, wires of the last pulse are still heated, or as hot as they may be."""
     env, other = (SeastarSwimEnv(scene=scene, decision_period=0.05) for _ in range(2))
     for one in (env, other):
         assert one.reset(seed=0)[1]["action_mask"].all()
         info = one.step(STRAIGHT)[4]
-    masked = np.array([1, 1, 1, 1, 0, 0 if scene is DEAF else 1])
+    masked = np.array([1, 1, 1, 1, 0, 0 if scene is REFRACTORY else 1])
     np.testing.assert_array_equal(info["action_mask"][:6], masked)
     np.testing.assert_array_equal(env.action_masks(), info["action_mask"].astype(bool))
     assert info["masked_limbs"] == 0 and info["action_mask"].dtype == np.int8
@@ -275,7 +276,7 @@ def test_environments_whose_wires_always_follow_have_no_masks_in_info():
 
 def test_a_masked_policy_never_loses_a_command():
     """The mask of info is that of Gymnasium's `sample`."""
-    env = SeastarSwimEnv(actions="pairs", scene=DEAF, decision_period=0.2)
+    env = SeastarSwimEnv(actions="pairs", scene=REFRACTORY, decision_period=0.2)
     _, info = env.reset(seed=0)
     env.action_space.seed(0)
     for _ in range(20):
@@ -305,8 +306,8 @@ def test_pictures_show_commands_and_warm_wires():
         pictures = env.render()
         assert len(pictures) == n and pictures[0].shape == (720, 960, 3)
     frame = warm._frame()
-    assert frame.warmth.shape == (5, 2) and frame.warmth.max() == pytest.approx(5 / 9)
-    assert cold._frame().warmth is None
+    assert frame.wire_state.shape == (5, 2) and frame.wire_state.max() == pytest.approx(5 / 9)
+    assert cold._frame().wire_state is None
     still = warm._get_renderer()
-    without = still.draw(type(frame)(**{**vars(frame), "warmth": None}))
+    without = still.draw(type(frame)(**{**vars(frame), "wire_state": None}))
     assert (still.draw(frame) != without).any()

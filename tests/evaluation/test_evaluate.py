@@ -15,7 +15,7 @@ from agents.evaluate import main
 from seastar_gym import Scene, Seastar
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, save
-from seastar_gym.controllers.roster import load_agents
+from seastar_gym.controllers.registry import load_agents
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.paths import PENTAGON_SIDE, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -343,7 +343,7 @@ def test_models_go_by_the_names_of_their_files(monkeypatch, tmp_path):
     (tmp_path / "runs").mkdir()
     for file in files:
         Path(file).touch()
-    monkeypatch.setattr("seastar_gym.controllers.learner_zip.load", lambda file: file)
+    monkeypatch.setattr("seastar_gym.controllers.checkpoint.load", lambda file: file)
     monkeypatch.setattr("seastar_gym.controllers.learned.load", lambda file: file)
     assert load_agents(files) == {"best": "best.zip", "last": "runs/last.safetensors", "runs/best": "runs/best.zip"}
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from every_part import ACTUATORS, PARTS
-from seastar_gym import Headings, Normal, RewardWeights, Scene, Seastar, Sight, Simulator, Uniform
+from seastar_gym import HeadingTargets, Normal, RewardWeights, Scene, Seastar, Sight, Simulator, Uniform
 from seastar_gym.envs.randomization import LogUniform
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.envs import CHALLENGES
@@ -31,7 +31,7 @@ def parts_of(value):
 
 SCENES = [*(Scene(**parts) for parts in PARTS.values()), *(Scene(actuator=each) for each in ACTUATORS.values())]
 OTHERS = [
-    Headings(0.5), Headings((0.5, 1.0)), Uniform(0.5, 1.0), LogUniform(0.5, 1.0), Normal(0.5, 1.0),
+    HeadingTargets(0.5), HeadingTargets((0.5, 1.0)), Uniform(0.5, 1.0), LogUniform(0.5, 1.0), Normal(0.5, 1.0),
     RewardWeights(), Sight(delay=Uniform(0.5, 1.0)), Sight(), *CHALLENGES.values(),
 ]  # fmt: skip
 FOUND = {repr(part): part for part in parts_of((*SCENES, *OTHERS))}

@@ -19,7 +19,7 @@ from seastar_gym import (
     Contact,
     DomainRandomization,
     GridCurrent,
-    Headings,
+HeadingTargets,
     Limb,
     Limited,
     LogUniform,
@@ -112,8 +112,8 @@ def test_every_part_of_the_package_is_in_the_table():
     assert all(hasattr(seastar_gym, name) for name in seastar_gym.__all__)  # parts are registered where they are loaded
     scenes = [Scene(actuator=actuator) for actuator in ACTUATORS.values()] + [Scene(**part) for part in PARTS.values()]
     seen = {kind for scene in scenes for kind in KINDS if f'"kind": "{kind}"' in json.dumps(scene.to_dict())}
-    of_environments = {"RewardWeights", "Headings", "DomainRandomization", "Uniform", "LogUniform", "Normal", "Sight"}
-    of_environments |= {"Miswired", "Prey", "Station", "FailBlind", "ObstTrap", "Prizes", "SimToReal"}
+    of_environments = {"RewardWeights", "HeadingTargets", "DomainRandomization", "Uniform", "LogUniform", "Normal"}
+    of_environments |= {"Sight", "Miswired", "Prey", "Station", "FailBlind", "ObstTrap", "Prizes", "SimToReal"}
     assert {name for name, kind in KINDS.items() if kind.__module__.startswith("seastar_gym")} == seen | of_environments
 
 
@@ -228,9 +228,9 @@ def test_numbers_of_numpy_become_pythons_and_do_not_compute_to_their_own_precisi
     "part",
     [
         RewardWeights(199.9, 0.0, 1 / 3),
-        Headings((0.1, 1 / 3), 0.2),
+        HeadingTargets((0.1, 1 / 3), 0.2),
         Sight(100 / 3, Uniform(0.1, 1 / 3), sees=3),
-        Headings("random"),
+        HeadingTargets("random"),
         DomainRandomization({"robot.density": Uniform(900, 1100.1), "actuator.peak_angle": Uniform(0, 0.5)}),
         DomainRandomization({"fluid.density": LogUniform(1.0, 1 / 0.3), "actuator.peak_angle": Normal(0.5, 0.01)}),
     ],

@@ -218,7 +218,7 @@ def test_torch_takes_observations_as_they_are(device):
 
 def test_designs_of_a_sweep_swim_alike(device):
     sweep = Sweep(SMALL, (Choices("robot.youngs_modulus", (0.8e6, 1.0e6, 1.2e6)),), settling=1, measured=1)
-    (cell,) = sweep.cells()
+    (cell,) = sweep.batches()
     ours, theirs = swim(cell), swim(cell, device)
     assert ours.keys() == theirs.keys() and not ours["status"].any()
     for name, column in ours.items():

@@ -32,7 +32,7 @@ TIGHT = replace(FAST, numerics=Numerics("implicit-midpoint", 0.01, newton_tolera
 CURVE = MeasuredCurve((0.0, 0.13, 0.4, 1.0), (0.0, 0.5, -0.2, 0.0))
 MEMORY = {
     "wires": SmaWires(),
-    "deaf": SmaWires(deaf=True, cooling_time=0.3),
+    "refractory": SmaWires(refractory=True, cooling_time=0.3),
     "thermal": ThermalSma(),
     "hot": ThermalSma(0.6, 0.1, 0.1, largest_temperature=60.0),
     "limited": Limited(SmaPulse(), largest_rate=2.0),
@@ -223,24 +223,24 @@ def test_an_actuator_that_says_nothing_of_heat_has_unknown_energy_and_no_deaf_wi
     assert np.isnan(report.energy).all() and np.isnan(report.heating_time).all() and not report.status.any()
     simulator.advance(0.2, LEFT_RIGHT)
     simulator.advance(0.4)
-    assert not simulator.deaf_wires().any()
+    assert not simulator.refractory_wires().any()
 
 
 def test_wires_that_cannot_be_heated_now_are_told():
-    deaf, hot = (Simulator(scene_with(MEMORY[name])) for name in ("deaf", "hot"))
-    deaf.advance(0.2, LEFT_RIGHT)
+    refractory, hot = (Simulator(scene_with(MEMORY[name])) for name in ("refractory", "hot"))
+    refractory.advance(0.2, LEFT_RIGHT)
     expected = np.zeros((1, 5, 2), bool)
     expected[0, [1, 4]] = True
-    np.testing.assert_array_equal(deaf.deaf_wires(), expected)
-    assert deaf.advance(0.1, np.ones((1, 5))).heating_time[0] == pytest.approx(0.3)
-    deaf.advance(0.4)
-    assert not deaf.deaf_wires().any()
+    np.testing.assert_array_equal(refractory.refractory_wires(), expected)
+    assert refractory.advance(0.1, np.ones((1, 5))).heating_time[0] == pytest.approx(0.3)
+    refractory.advance(0.4)
+    assert not refractory.refractory_wires().any()
     hot.advance(0.42 * np.log(220.0 / 180.0), LEFT_RIGHT)  # from 20 to 60 deg C
-    np.testing.assert_array_equal(np.argwhere(hot.deaf_wires()[0]), [[1, 0], [4, 1]])
+    np.testing.assert_array_equal(np.argwhere(hot.refractory_wires()[0]), [[1, 0], [4, 1]])
     pulse = Simulator(FAST)
-    assert not pulse.deaf_wires().any()
+    assert not pulse.refractory_wires().any()
     pulse.advance(0.3, LEFT_RIGHT)
-    assert pulse.deaf_wires().all()
+    assert pulse.refractory_wires().all()
 
 
 # --- states ----------------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse
 from seastar_gym.gaits import STRAIGHT, pentagon_gait
-from studies.chapter import cost, kept, pictures, statements, swims
+from studies.chapter import cost, pictures, results, statements, swims
 from studies.chapter.study import STUDY, make_figures
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -133,18 +133,18 @@ def test_the_committed_limit_of_the_pairs_is_that_of_37_nodes_too():
     assert 0.005 < np.abs(few / limit - 1.0).max() < 0.008
     again = swims.Setting("37 nodes", Seastar(nodes_per_limb=37), Numerics("implicit-midpoint", 1e-3))
     found = swims.swim(again, np.tile(PAIRS, (10, 1, 1)), 1)
-    np.testing.assert_allclose(next(iter(kept.distances([found]).values())), limit, rtol=2e-3)
+    np.testing.assert_allclose(next(iter(results.distances([found]).values())), limit, rtol=2e-3)
 
 
 def test_kept_strokes_are_the_first_and_the_last(straight):
-    motion = kept.motions([straight])[straight.label]
+    motion = results.motions([straight])[straight.label]
     assert set(motion) == {"first", "2th"}
     for name, start in (("first", 0), ("2th", 10)):
         x = 1e3 * straight.hub()[start : start + 11, 0]
         heated, after, back, turn = motion[name]
         assert heated == pytest.approx(x[1] - x[0], rel=1e-3) and back == pytest.approx(x.max() - x[-1], rel=1e-3)
         assert heated + after - back == pytest.approx(x[-1] - x[0], rel=1e-2) and 0.1 < turn < 1.0
-    table = kept.strokes_table({"straight_mm": {straight.label: motion}})
+    table = results.strokes_table({"straight_mm": {straight.label: motion}})
     assert len(table.splitlines()) == 4 and f"| {motion['first'][0]:.1f} |" in table
 
 

@@ -15,7 +15,7 @@ import pandas
 
 from seastar_gym.executors.here import Here
 from seastar_gym.scene import Seastar
-from seastar_gym.sweep.parts import read_parts
+from seastar_gym.sweep.result_files import read_results
 from seastar_gym.sweep.run import run
 from studies.designs.pictures import COLOURS, draw, summary
 from studies.designs.space import BODIES, SPREADS, Body, all_designs, inner_half, masses, spread
@@ -26,7 +26,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 def test_there_are_more_than_a_hundred_thousand_designs():
     sweep = all_designs()
-    assert sweep.n_designs == 102_480 and sweep.n_cells == 240 and len(BODIES) == 120
+    assert sweep.n_designs == 102_480 and sweep.n_batches == 240 and len(BODIES) == 120
 
 
 @pytest.mark.parametrize("taper", SPREADS)
@@ -45,16 +45,16 @@ def test_a_tapered_body_keeps_its_mean_radius():
 
 
 def test_a_row_of_results_is_a_scene_again(tmp_path):
-    cell = next(all_designs(2).cells())
+    cell = next(all_designs(2).batches())
     run([cell], tmp_path, Here())
-    row = read_parts(tmp_path).to_pandas().iloc[0]
+    row = read_results(tmp_path).to_pandas().iloc[0]
     scene = scene_of(row)
     assert scene.robot.n_limbs == 3 and scene.robot.limb_length == row["robot.limb_length"]
     assert scene.actuator.peak_angle == row["actuator.peak_angle"]
 
 
 def test_density_is_simulated_side_by_side():
-    assert masses().n_cells == len(SPREADS) and masses().designs_per_frame == 21
+    assert masses().n_batches == len(SPREADS) and masses().designs_per_configuration == 21
 
 
 def test_the_page_tells_what_was_measured():

@@ -132,7 +132,7 @@ def test_the_list_has_every_study_with_a_line(capsys):
     printed = capsys.readouterr().out
     for name, line in declared().items():
         assert f"    {name} " in printed and line and line in printed
-    assert {"tasks", "designs.certificates", "scenes.gallery", "learning.in_time", "accuracy"} <= set(declared())
+    assert {"tasks", "designs.certificates", "scenes.gallery", "learning.timed", "accuracy"} <= set(declared())
 
 
 @pytest.mark.parametrize("name", declared())

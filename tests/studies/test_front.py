@@ -13,8 +13,8 @@ if find_spec("pyarrow") is None or find_spec("pandas") is None:
 import pandas
 
 from seastar_gym.scene import Scene
-from seastar_gym.sweep.cells import Cell
-from seastar_gym.sweep.frames import Swim, frame_with
+from seastar_gym.sweep.batches import Batch
+from seastar_gym.sweep.configurations import Swim, configuration_with
 from seastar_gym.sweep.swimming import swim
 from studies.designs import search
 from studies.designs.front import AT_WORK, CHAPTER, FASTEST, OWN, THRIFTIEST, draw, radii, scene_of
@@ -37,8 +37,8 @@ def swum(size):
     row = grown(ROW, size)
     body = Body(5, row["radius"], 0.25)
     numbers = {name: np.array([row[name]]) for name in search.CHANGED}
-    frame = frame_with(Scene.preset("fast"), "straight", Swim(1, 1), {"robot": (body.robot(), body.label)})
-    return swim(Cell(frame, numbers, 1))
+    frame = configuration_with(Scene.preset("fast"), "straight", Swim(1, 1), {"robot": (body.robot(), body.label)})
+    return swim(Batch(frame, numbers, 1))
 
 
 def test_a_robot_of_another_size_swims_and_costs_what_the_powers_say():

@@ -13,7 +13,7 @@ from studies.speed.sweeps import cluster, disk_wait, overhead, reckon, seconds_p
 
 def test_overhead_and_simulation_are_processor_times_of_a_cell():
     sweep = sweep_of(5, 2, 1)
-    assert sweep.n_cells == 5
+    assert sweep.n_batches == 5
     empty, swum = overhead(sweep, Here()), seconds_per_cell(sweep, Here())
     assert 0.0 < empty < 0.1 and swum > 0.0
     assert disk_wait(b"part", 3) < 10.0

@@ -321,7 +321,7 @@ def test_a_table_has_every_agent_and_the_verdict():
     assert "| greedy | 400 | 400 to 400 | 4 |  |" in text
     assert text.endswith("Bound: informed, 50 % better than greedy. Gap left by PPO: 50 %. By this, kept.")
     missing = "rest; planner; adaptive; prior; turn, then swim; PPO, memory; PPO, told the way; PPO, memory, coasting"
-    assert f"Not swum yet: {missing}; in the box." in text
+    assert f"Not swum yet: {missing}; bundled." in text
     assert "Bound" not in table(row("prey", greedy=1.0, PPO=3.0))  # a learner alone is no bound
     assert table(row("prizes", greedy=10.0, informed=14.0)).endswith("Bound: informed, 40 % better than greedy.")
     for nearly_nothing in (0.0, 0.5):
@@ -330,7 +330,7 @@ def test_a_table_has_every_agent_and_the_verdict():
 
 
 def test_the_words_of_the_page_follow_from_the_numbers():
-    learned = {"PPO": 300.0, "PPO_memory": 350.0, "in the box": 190.0}
+    learned = {"PPO": 300.0, "PPO_memory": 350.0, "bundled": 190.0}
     rules = {"rest": 400.0, "greedy": 400.0, "planner": 250.0, "adaptive": 200.0}
     first = row("miswired", informed=180.0, **rules, **learned)._replace(id="SeastarMiswired-v0")
     second = row("miswired", informed=195.0, **rules, **learned | {"PPO": 211.0})._replace(id="SeastarShortTimed-v0")
@@ -338,7 +338,7 @@ def test_the_words_of_the_page_follow_from_the_numbers():
     judged, kept, boxed = (" ".join(each.split()) for each in verdicts([first, second, small]).strip().split("\n\n"))
     assert "| `Miswired` | informed | 55 % | 55 % | 5 % | yes |" in judged
     assert (
-        "| `ShortTimed` | in the box | 52 % | 10 % | 0 % | no |" in judged and "| `Small` | informed | 15 % |" in judged
+        "| `ShortTimed` | bundled | 52 % | 10 % | 0 % | no |" in judged and "| `Small` | informed | 15 % |" in judged
     )
     assert kept.startswith("1 of 3 tasks are kept. Not kept: `ShortTimed`, where PPO leaves 10 % of")
     assert "`Small`, whose bound is only 15 % better than greedy." in kept
@@ -354,7 +354,7 @@ def test_nobody_waits_for_agents_that_a_task_has_not():
     assert has_cell(heading.ID, heading.RULE) and not has_cell(heading.ID, "greedy")
     assert not has_cell("SeastarPrey-v0", heading.RULE)
     row_ = Row("SeastarPrizes-v0", "prizes", {"greedy": [np.ones(4)]})
-    assert "Not swum yet: rest; planner; informed; PPO; PPO, memory; in the box." in table(row_, has_cell)
+    assert "Not swum yet: rest; planner; informed; PPO; PPO, memory; bundled." in table(row_, has_cell)
 
 
 def test_the_study_goes_on_where_it_was_broken_off(tmp_path, monkeypatch, capsys):

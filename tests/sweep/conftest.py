@@ -11,7 +11,7 @@ collect_ignore_glob = [] if all(map(find_spec, ("optuna", "pyarrow"))) else ["te
 
 @pytest.fixture
 def sweep():
-    """Four cells of four designs and one stroke."""
+    """Four batches of four designs and one stroke."""
     from seastar_gym.sweep.axes import Choices, Range
     from seastar_gym.sweep.designs import Sweep
 

@@ -12,7 +12,7 @@ from refusals import assert_refused
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.axes import Range
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.parts import Parts, read_part
+from seastar_gym.sweep.result_files import ResultFiles, read_result_file
 from seastar_gym.sweep.run import run
 
 ray = pytest.importorskip("ray")
@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture
 def cluster(monkeypatch, tmp_path):
-    """Head without processors for tasks, and two nodes with one each. Cells of `works` wait until both are at work."""
+    """Head without processors for tasks, and two nodes with one each. Batches of `works` wait for both."""
     from ray.cluster_utils import Cluster
 
     (tmp_path / "nodes").write_text("2")
@@ -46,13 +46,13 @@ def test_a_node_that_is_killed_in_mid_sweep_costs_its_cells(cluster, tmp_path):
         if next(counted) == 6:
             cluster.remove_node(cluster.nodes[0], allow_graceful=False)
 
-    tally = run(sweep.cells(), tmp_path, RayTasks(cluster.address), kill_a_node, works.slow)
-    parts = Parts(tmp_path)
-    nodes = Counter(read_part(parts.file(name))["text"][0].as_py() for name in parts.names())
-    print(f"{tally.done} cells done, {tally.losses} lost with their node and run again; by nodes: {nodes.values()}")
+    tally = run(sweep.batches(), tmp_path, RayTasks(cluster.address), kill_a_node, works.slow)
+    parts = ResultFiles(tmp_path)
+    nodes = Counter(read_result_file(parts.file(name))["text"][0].as_py() for name in parts.names())
+    print(f"{tally.done} batches done, {tally.losses} lost with their node and run again; by nodes: {nodes.values()}")
     assert tally.done == 24 and not tally.problems
     assert 1 <= tally.losses <= 4
-    assert set(parts.names()) == {cell.name for cell in sweep.cells()}
+    assert set(parts.names()) == {batch.name for batch in sweep.batches()}
     assert len(nodes) == 2 and min(nodes.values()) <= 6  # what was done on the killed node before
 
 
@@ -73,7 +73,7 @@ def test_an_address_has_a_port():
 
 @pytest.mark.slow
 def test_a_full_disk_on_a_node_costs_cells_that_need_it(cluster, tmp_path, small_disk):
-    """One node of three has no room. Its cells are run again, elsewhere by luck; a later run does the rest."""
+    """One node of three has no room. Its batches are run again, elsewhere by luck; a later run does the rest."""
     from seastar_gym.executors.on_ray import RayTasks
 
     place, grow = small_disk(size=4096)
@@ -82,12 +82,12 @@ def test_a_full_disk_on_a_node_costs_cells_that_need_it(cluster, tmp_path, small
     (tmp_path / "nodes").write_text("3")
     axis = Range("robot.limb_length", 0.05, 0.15).spaced(30)
     sweep = Sweep(Scene.preset("fast"), (axis,), settling=0, measured=1, robots=1)
-    tally = run(sweep.cells(), tmp_path / "out", RayTasks(cluster.address), work=works.scratching)
-    print(f"{tally.done} cells done, {tally.losses} attempts refused, {len(tally.problems)} cells without result")
+    tally = run(sweep.batches(), tmp_path / "out", RayTasks(cluster.address), work=works.scratching)
+    print(f"{tally.done} batches done, {tally.losses} attempts refused, {len(tally.problems)} batches without result")
     assert tally.losses >= 1 and tally.done + len(tally.problems) == 30 and tally.done >= 15
     assert all("no space left on device" in problem for problem in tally.problems.values())
     grow()
-    again = run(sweep.cells(), tmp_path / "out", RayTasks(cluster.address), work=works.scratching)
+    again = run(sweep.batches(), tmp_path / "out", RayTasks(cluster.address), work=works.scratching)
     assert again.kept == tally.done and again.done == len(tally.problems) and not again.problems
 
 
@@ -104,8 +104,9 @@ def test_simulating_needs_no_disk_on_a_node(cluster, tmp_path, small_disk):
     cluster.add_node(num_cpus=1, env_vars={"TMPDIR": str(place), "NUMBA_CACHE_DIR": str(place)})
     axis = Range("robot.limb_length", 0.05, 0.15).spaced(4)
     sweep = Sweep(Scene.preset("fast"), (axis,), settling=0, measured=1, robots=2)
-    tally = run(sweep.cells(), tmp_path / "full", RayTasks(cluster.address))
+    tally = run(sweep.batches(), tmp_path / "full", RayTasks(cluster.address))
     assert tally.done == 2 and not tally.losses
-    run(sweep.cells(), tmp_path / "here", Here())
-    for name in Parts(tmp_path / "here").names():
-        assert Parts(tmp_path / "full").file(name).read_bytes() == Parts(tmp_path / "here").file(name).read_bytes()
+    run(sweep.batches(), tmp_path / "here", Here())
+    full, here = ResultFiles(tmp_path / "full"), ResultFiles(tmp_path / "here")
+    for name in here.names():
+        assert full.file(name).read_bytes() == here.file(name).read_bytes()

@@ -16,8 +16,8 @@ from seastar_gym.scene import Scene, Seastar
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.sweep.axes import Choices, Range
 from seastar_gym.sweep.command import as_text, bar_of, main
-from seastar_gym.sweep.parts import Parts, read_parts
-from seastar_gym.sweep.run import Tally
+from seastar_gym.sweep.result_files import ResultFiles, read_results
+from seastar_gym.sweep.run import Progress
 from seastar_gym.sweep.text import axis_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -61,10 +61,10 @@ def test_a_sweep_from_words_to_a_table(tmp_path, capsys):
     words = "robot.limb_length=0.05:0.15", "robot.n_limbs=3,5", "--latin", "3", "--out", str(tmp_path)
     assert main([*words, *QUICK]) == 0
     printed = capsys.readouterr()
-    assert "6 designs in 2 cells" in printed.out and "strokes/s" in printed.err
-    assert read_parts(tmp_path).num_rows == 6
+    assert "6 designs in 2 batches" in printed.out and "strokes/s" in printed.err
+    assert read_results(tmp_path).num_rows == 6
     assert main([*words, *QUICK]) == 0
-    assert "cells: 0; there before, cells: 2" in capsys.readouterr().out
+    assert "batches: 0; there before, batches: 2" in capsys.readouterr().out
 
 
 def test_counting_simulates_nothing(tmp_path, capsys):
@@ -75,7 +75,7 @@ def test_counting_simulates_nothing(tmp_path, capsys):
         "actuator.peak_angle=0.1:0.6:50",
     )
     assert main([*words, "--robots", "1", "--count", "--out", str(tmp_path)]) == 0
-    assert "1,000,000 designs in 1,000,000 cells." in capsys.readouterr().out
+    assert "1,000,000 designs in 1,000,000 batches." in capsys.readouterr().out
     assert not list(tmp_path.iterdir())
 
 
@@ -83,7 +83,7 @@ def test_a_search_from_words_to_its_best(tmp_path, capsys):
     words = "robot.limb_length=0.05:0.15", "--optuna", "4", "--robots", "2", "--out", str(tmp_path)
     assert main([*words, *QUICK]) == 0
     assert "Best speed: 0.0" in capsys.readouterr().out
-    assert (tmp_path / "study.db").exists() and read_parts(tmp_path).num_rows == 4
+    assert (tmp_path / "study.db").exists() and read_results(tmp_path).num_rows == 4
 
 
 def test_a_search_does_not_write_through_a_link(tmp_path, capsys):
@@ -101,7 +101,7 @@ def test_a_scene_comes_from_a_file(ending, tmp_path):
     as_python = 'from seastar_gym import Scene\nscene = Scene.preset("fast")\n'
     file.write_text(as_python if ending == ".py" else json.dumps(Scene.preset("fast").to_dict()))
     assert main(["--scene", str(file), "--out", str(tmp_path), *QUICK]) == 0
-    assert read_parts(tmp_path).num_rows == 1
+    assert read_results(tmp_path).num_rows == 1
 
 
 @pytest.mark.parametrize(
@@ -149,10 +149,10 @@ def command(tmp_path, *words):
     )  # fmt: skip
 
 
-def finished(tmp_path, n_cells, process):
-    """Wait until so many cells are finished."""
+def finished(tmp_path, n_batches, process):
+    """Wait until so many batches are finished."""
     end = time.monotonic() + 120
-    while len(list(Parts(tmp_path).names())) < n_cells:
+    while len(list(ResultFiles(tmp_path).names())) < n_batches:
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < end
         time.sleep(0.05)
@@ -171,11 +171,11 @@ def test_a_stopped_sweep_goes_on_where_it_was(stop, tmp_path, monkeypatch):
     told = process.communicate(timeout=60)[1]
     if stop == signal.SIGINT:
         assert process.returncode == 130
-        assert told.strip().splitlines()[-1].startswith("Interrupted: all finished cells are in")
+        assert told.strip().splitlines()[-1].startswith("Interrupted: all finished batches are in")
         assert "Traceback" not in told
-    names = set(Parts(tmp_path).names())
+    names = set(ResultFiles(tmp_path).names())
     assert len(names) >= 3
-    assert all(Parts(tmp_path).file(name).read_bytes()[-4:] == b"PAR1" for name in names)
+    assert all(ResultFiles(tmp_path).file(name).read_bytes()[-4:] == b"PAR1" for name in names)
     kept = []
 
     def interrupt(tally):
@@ -185,20 +185,20 @@ def test_a_stopped_sweep_goes_on_where_it_was(stop, tmp_path, monkeypatch):
 
     monkeypatch.setattr("seastar_gym.sweep.command.bar_of", lambda *_: interrupt)
     assert main([*words[:-2], "--executor", "here", "--out", str(tmp_path)]) == INTERRUPTED
-    assert {*kept} == {len(names)} and len(names | {*Parts(tmp_path).names()}) == len(names) + 3
+    assert {*kept} == {len(names)} and len(names | {*ResultFiles(tmp_path).names()}) == len(names) + 3
 
 
 def test_what_was_done_is_told_with_what_was_not(tmp_path):
-    tally = Tally(kept=2, done=1, designs=1234, problems={"0123456789": "Lost."})
-    begin = f"New in {tmp_path}: 1,234 designs, cells: 1; there before, cells: 2."
-    assert as_text(tally, tmp_path) == f"{begin} Without result, cells: 1, such as 01234567: Lost."
-    tally = Tally(kept=2, done=1, designs=1234, damaged=[Path("a"), Path("b")])
+    tally = Progress(kept=2, done=1, designs=1234, problems={"0123456789": "Lost."})
+    begin = f"New in {tmp_path}: 1,234 designs, batches: 1; there before, batches: 2."
+    assert as_text(tally, tmp_path) == f"{begin} Without result, batches: 1, such as 01234567: Lost."
+    tally = Progress(kept=2, done=1, designs=1234, damaged=[Path("a"), Path("b")])
     assert as_text(tally, tmp_path) == f"{begin} Damaged before, and simulated again: a, b."
 
 
 @pytest.mark.parametrize("problems, code", [({}, 0), ({"cell": "Lost."}, 1)])
 def test_cells_without_result_are_an_exit_code(problems, code, tmp_path, monkeypatch):
-    monkeypatch.setattr("seastar_gym.sweep.command.run", lambda *_: Tally(problems=problems))
+    monkeypatch.setattr("seastar_gym.sweep.command.run", lambda *_: Progress(problems=problems))
     assert main(["--out", str(tmp_path), *QUICK]) == code
 
 
@@ -229,7 +229,7 @@ def test_progress_tells_rates_and_what_was_lost():
         set_postfix_str=lambda text, refresh: told.append((text, refresh)),
     )  # fmt: skip
     show = bar_of(10, bar)
-    show(Tally(kept=3, done=4, designs=7, intervals=0))
-    show(Tally(kept=3, done=4, designs=7, intervals=9, losses=2))
+    show(Progress(kept=3, done=4, designs=7, intervals=0))
+    show(Progress(kept=3, done=4, designs=7, intervals=9, losses=2))
     assert bar.total == 7 and moved == [3, 3]
     assert told == [("4 designs/s", False), ("4 designs/s, 4 strokes/s, 2 lost", False)]

@@ -10,44 +10,44 @@ import pyarrow.parquet
 import pytest
 
 from refusals import assert_refused
-from seastar_gym.controllers.learned import SHIPPED, load
+from seastar_gym.controllers.learned import BUNDLED, load
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.swim import swim as swim_one
 from seastar_gym.executors.processes import Processes
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.axes import Choices
 from seastar_gym.sweep.command import main
+from seastar_gym.sweep.controllers import Route
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.parts import Parts, part_of, read_parts
-from seastar_gym.sweep.pilots import Course
+from seastar_gym.sweep.result_files import ResultFiles, read_results, result_file_of
 from seastar_gym.sweep.run import run
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS, swim
 
 TESTS = Path(__file__).resolve().parents[1]
 FAST = Scene.preset("fast")
-SHORT = Course([[0.04, 0.0], [0.04, 0.03]], seconds=40.0)
+SHORT = Route([[0.04, 0.0], [0.04, 0.03]], seconds=40.0)
 LENGTHS = Choices("robot.limb_length", (0.08, 0.1, 0.12))
 
 
-def sweep_of(*controllers, axes=(), scene=FAST, course=SHORT, **options):
-    return Sweep(scene, (Choices("controller", controllers), *axes), course=course, **options)
+def sweep_of(*controllers, axes=(), scene=FAST, route=SHORT, **options):
+    return Sweep(scene, (Choices("controller", controllers), *axes), route=route, **options)
 
 
 def names(sweep):
-    return [cell.name for cell in sweep.cells()]
+    return [batch.name for batch in sweep.batches()]
 
 
 @pytest.fixture
 def policy(tmp_path):
-    """Copy of the policy in the box."""
-    for file in (SHIPPED, SHIPPED.with_suffix(".json")):
+    """Copy of the bundled policy."""
+    for file in (BUNDLED, BUNDLED.with_suffix(".json")):
         shutil.copy(file, tmp_path / file.name)
-    return tmp_path / SHIPPED.name
+    return tmp_path / BUNDLED.name
 
 
 def test_a_design_swims_as_the_environment_does():
-    (cell,) = sweep_of("learned", axes=(LENGTHS,)).cells()
-    found = swim(cell)
+    (batch,) = sweep_of("learned", axes=(LENGTHS,)).batches()
+    found = swim(batch)
     scene = replace(FAST, robot=replace(FAST.robot, limb_length=0.12))
     env = SeastarSwimEnv(SHORT.path, actions=load().actions, scene=scene)
     done = swim_one("learned", load(), env, max_strokes=40)
@@ -61,8 +61,8 @@ def test_a_design_swims_as_the_environment_does():
 
 
 def test_who_does_not_arrive_has_no_time_and_the_speed_of_what_is_reached():
-    (cell,) = sweep_of("rest", course=replace(SHORT, seconds=3.0)).cells()
-    found = swim(cell)
+    (batch,) = sweep_of("rest", route=replace(SHORT, seconds=3.0)).batches()
+    found = swim(batch)
     assert np.isnan(found["time"][0]) and found["waypoints"][0] == 0.0 == found["speed"][0]
 
 
@@ -70,8 +70,8 @@ def test_a_cell_is_named_by_its_controller_and_what_that_swims(policy):
     first = names(sweep_of("learned"))
     file = names(sweep_of(str(policy)))
     others = [
-        names(sweep_of("straight")), names(sweep_of("learned", course=replace(SHORT, path="line"))),
-        names(sweep_of("learned", course=replace(SHORT, seconds=39.0))), names(Sweep(FAST, ())),
+        names(sweep_of("straight")), names(sweep_of("learned", route=replace(SHORT, path="line"))),
+        names(sweep_of("learned", route=replace(SHORT, seconds=39.0))), names(Sweep(FAST, ())),
     ]  # fmt: skip
     description = policy.with_suffix(".json")
     facts = json.loads(description.read_text())
@@ -82,32 +82,32 @@ def test_a_cell_is_named_by_its_controller_and_what_that_swims(policy):
 
 
 def test_a_policy_that_changed_since_the_sweep_was_planned_swims_nothing(policy):
-    (cell,) = sweep_of(str(policy)).cells()
+    (batch,) = sweep_of(str(policy)).batches()
     policy.write_bytes(b"")
     with assert_refused("is another one here than where the sweep was planned"):
-        swim(cell)
+        swim(batch)
 
 
 def test_agents_of_one_s_own_swim_every_robot(monkeypatch):
     monkeypatch.syspath_prepend(TESTS / "controllers")
     axes = (Choices("robot.n_limbs", (4, 5)),)
-    found = [swim(cell) for cell in sweep_of("own_agents:Towards", axes=axes).cells()]
+    found = [swim(batch) for batch in sweep_of("own_agents:Towards", axes=axes).batches()]
     assert all(each["status"][0] == 0 and np.isfinite(each["energy"][0]) for each in found)
     assert found[0]["ahead"][0] != found[1]["ahead"][0]
 
 
 def test_results_are_the_same_bits_in_other_processes(tmp_path):
     sweep = sweep_of("learned", axes=(LENGTHS,), robots=2)
-    tally = run(sweep.cells(), tmp_path, Processes(2))
+    tally = run(sweep.batches(), tmp_path, Processes(2))
     assert tally.done == 2 and tally.designs == 3 and tally.intervals == 0
-    for cell in sweep.cells():
-        assert Parts(tmp_path).file(cell.name).read_bytes() == part_of(cell)
+    for batch in sweep.batches():
+        assert ResultFiles(tmp_path).file(batch.name).read_bytes() == result_file_of(batch)
 
 
 def test_a_part_says_controller_time_and_waypoints(tmp_path):
-    (cell,) = sweep_of("straight").cells()
-    Parts(tmp_path).write(cell.name, part_of(cell))
-    table = pyarrow.parquet.read_table(Parts(tmp_path).file(cell.name))
+    (batch,) = sweep_of("straight").batches()
+    ResultFiles(tmp_path).write(batch.name, result_file_of(batch))
+    table = pyarrow.parquet.read_table(ResultFiles(tmp_path).file(batch.name))
     assert table.column_names == ["controller", *UNITS, *OF_CONTROLLERS]
     assert table.schema.field("time").metadata == {b"unit": b"s"}
     told = json.loads(table.schema.metadata[b"seastar_gym"])["pilot"]
@@ -122,9 +122,9 @@ def test_a_part_says_controller_time_and_waypoints(tmp_path):
         (lambda: sweep_of("nowhere:make"), ("nowhere:make", "nowhere")),
         (lambda: sweep_of("learned", axes=(Choices("robot.n_limbs", (4,)),)), ("robot of 5 limbs",)),
         (lambda: sweep_of("learned", axes=(Choices("gait", ("straight",)),)), ("gait or a controller",)),
-        (lambda: sweep_of("learned", course=Course(decision_period=0.5)), ("SmaWires",)),
-        (lambda: Course(seconds=0.0), ("seconds",)),
-        (lambda: Course(path="zigzag"), ("zigzag",)),
+        (lambda: sweep_of("learned", route=Route(decision_period=0.5)), ("SmaWires",)),
+        (lambda: Route(seconds=0.0), ("seconds",)),
+        (lambda: Route(path="zigzag"), ("zigzag",)),
     ],
 )
 def test_bad_controllers_are_refused(make, words):
@@ -139,7 +139,7 @@ def test_the_command_compares_controllers(tmp_path, capsys):
     assert main([*words, "--executor", "here", "--out", str(tmp_path / "out")]) == 0
     printed = capsys.readouterr()
     assert "New in" in printed.out and "designs/s" in printed.err and "strokes/s" not in printed.err
-    table = read_parts(tmp_path / "out").to_pandas()
+    table = read_results(tmp_path / "out").to_pandas()
     assert sorted(table.controller) == ["learned", "learned", "straight", "straight"]
     assert table[table.controller == "learned"].waypoints.tolist() == [1.0, 1.0]
     with pytest.raises(FileNotFoundError, match="There is no trained policy at missing"):  # a sentence of `run_command`

@@ -1,4 +1,4 @@
-"""Designs of a sweep, and the cells that they are simulated in."""
+"""Designs of a sweep, and the batches that they are simulated in."""
 
 import itertools
 import json
@@ -15,7 +15,7 @@ from seastar_gym.scene import Limb, Numerics, Scene, Seastar, SmaPulse
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.simulator import Simulator
 from seastar_gym.sweep.axes import Choices, Range
-from seastar_gym.sweep.cells import Cell
+from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.gait import gait_of
 from seastar_gym.sweep.swimming import REFUSED, UNITS, scene_of, swim, ways
@@ -27,9 +27,9 @@ LENGTH = Range("robot.limb_length", 0.05, 0.15)
 def values_of(sweep, *names):
     """Values of axes, design after design."""
     found = []
-    for cell in sweep.cells():
-        labels = dict(cell.frame.labels)
-        columns = [cell.numbers.get(name, [labels.get(name)] * cell.n_robots) for name in names]
+    for batch in sweep.batches():
+        labels = dict(batch.configuration.labels)
+        columns = [batch.numbers.get(name, [labels.get(name)] * batch.n_robots) for name in names]
         found += zip(*columns, strict=True)
     return found
 
@@ -44,15 +44,15 @@ def test_a_grid_has_every_combination_once():
         found = values_of(sweep, *(axis.name for axis in axes))
         assert len(found) == sweep.n_designs == 36
         assert set(found) == set(itertools.product(*(axis.values for axis in axes)))
-        assert len(list(sweep.cells())) == sweep.n_cells
+        assert len(list(sweep.batches())) == sweep.n_batches
 
 
 def test_numbers_of_robots_are_simulated_side_by_side():
     axes = Choices("robot.limb_length", (0.05, 0.1)), Choices("numerics.step", (2e-3, 5e-3))
-    cells = list(Sweep(FAST, axes).cells())
-    assert [cell.n_robots for cell in cells] == [2, 2]
-    assert [cell.frame.scene.numerics.step for cell in cells] == [2e-3, 5e-3]
-    scene = scene_of(cells[0], np.ones(2, bool))
+    batches = list(Sweep(FAST, axes).batches())
+    assert [batch.n_robots for batch in batches] == [2, 2]
+    assert [batch.configuration.scene.numerics.step for batch in batches] == [2e-3, 5e-3]
+    scene = scene_of(batches[0], np.ones(2, bool))
     assert scene.n_robots == 2 and scene.of_robot(1).robot.limb_length == 0.1
 
 
@@ -60,10 +60,10 @@ def test_what_a_design_does_is_the_same_beside_any_others():
     """Limb 1 is bent at rest, in every design by another amount, and the way ahead is along it."""
     robot = Seastar(3, 4, limbs=(Limb(natural_curvature=1.0), Limb(), Limb()))
     bent = np.array([0.0, 8.0, -5.0])
-    frame = next(Sweep(Scene(robot), (LENGTH,), settling=0, measured=1, samples=1).cells()).frame
+    frame = next(Sweep(Scene(robot), (LENGTH,), settling=0, measured=1, samples=1).batches()).configuration
 
     def swum(order):
-        return swim(Cell(frame, {"robot.limbs.0.natural_curvature": bent[order]}, len(order)))
+        return swim(Batch(frame, {"robot.limbs.0.natural_curvature": bent[order]}, len(order)))
 
     together = swum([0, 1, 2])
     for order in ([2, 0, 1], [1], [2]):
@@ -92,7 +92,7 @@ def test_parts_fidelities_and_gaits_are_choices_of_frames():
         Choices("robot", (Seastar(), Seastar(n_limbs=4)), ("five", "four")),
         Choices("fidelity", ("fast", "balanced")),
     )
-    frames = list(Sweep(Scene(), axes).frames())
+    frames = list(Sweep(Scene(), axes).configurations())
     assert len(frames) == 8
     assert dict(frames[0].labels) == {"actuator": "SmaPulse", "robot": "five", "fidelity": "fast"}
     assert {frame.scene.robot.nodes_per_limb for frame in frames} == {7, 12}
@@ -112,7 +112,7 @@ def test_a_turn_is_the_short_way_round():
 
 def test_a_cell_is_named_by_all_that_its_results_depend_on():
     def names(scene=FAST, axes=(LENGTH,), **options):
-        return [cell.name for cell in Sweep(scene, axes, **{"samples": 4, **options}).cells()]
+        return [batch.name for batch in Sweep(scene, axes, **{"samples": 4, **options}).batches()]
 
     first = names()
     assert first == names()
@@ -126,34 +126,34 @@ def test_a_cell_is_named_by_all_that_its_results_depend_on():
 
 def test_the_text_that_names_a_cell_has_its_entries_in_order():
     """So a name does not depend on the order of a scene's fields."""
-    told = json.loads(next(Sweep(FAST, (LENGTH,), samples=1).frames()).text)
+    told = json.loads(next(Sweep(FAST, (LENGTH,), samples=1).configurations()).text)
     assert list(told) == sorted(told) and list(told["scene"]["robot"]) == sorted(told["scene"]["robot"])
 
 
 def test_a_new_version_of_the_package_is_another_cell(monkeypatch):
-    before = next(Sweep(FAST, (LENGTH,), samples=1).cells()).name
-    monkeypatch.setattr("seastar_gym.sweep.frames.__version__", "99.0")
-    assert next(Sweep(FAST, (LENGTH,), samples=1).cells()).name != before
+    before = next(Sweep(FAST, (LENGTH,), samples=1).batches()).name
+    monkeypatch.setattr("seastar_gym.sweep.configurations.__version__", "99.0")
+    assert next(Sweep(FAST, (LENGTH,), samples=1).batches()).name != before
 
 
 def test_numbers_of_a_robot_belong_to_their_names():
-    frame = next(Sweep(FAST, (LENGTH,), samples=1).frames())
+    frame = next(Sweep(FAST, (LENGTH,), samples=1).configurations())
     one, other = np.array([0.1]), np.array([0.2])
     names = {
-        Cell(frame, numbers, 1).name
+        Batch(frame, numbers, 1).name
         for numbers in ({"a": one, "b": other}, {"a": other, "b": one}, {"ab": one, "": other})
     }
     assert len(names) == 3
 
 
 def test_memory_does_not_grow_with_the_number_of_cells():
-    """Ten thousand cells of one robot are made and named one by one."""
+    """Ten thousand batches of one robot are made and named one by one."""
     axes = Range("robot.limb_length", 0.05, 0.15).spaced(100), Range("robot.density", 500.0, 2000.0).spaced(100)
 
-    def peak(n_cells):
+    def peak(n_batches):
         tracemalloc.start()
-        for cell in itertools.islice(Sweep(FAST, axes, robots=1).cells(), n_cells):
-            assert cell.name
+        for batch in itertools.islice(Sweep(FAST, axes, robots=1).batches(), n_batches):
+            assert batch.name
         size = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return size
@@ -255,8 +255,8 @@ def test_a_swim_is_measured_after_it_has_settled():
     """Columns of repeated strokes are those of a simulator, robot by robot."""
     lengths = np.array([0.08, 0.1])
     scene = Scene(Seastar(4, 5, limbs=(Limb(natural_curvature=5.0),) * 4), actuator=SmaWires(), numerics=FAST.numerics)
-    frame = next(Sweep(scene, (), "1+,3-", settling=2, measured=3).frames())
-    found = swim(Cell(frame, {"robot.limb_length": lengths}, 2))
+    frame = next(Sweep(scene, (), "1+,3-", settling=2, measured=3).configurations())
+    found = swim(Batch(frame, {"robot.limb_length": lengths}, 2))
     for k, length in enumerate(lengths):
         robot = Simulator(replace(scene, robot=replace(scene.robot, limb_length=length)), effort=True)
         reports = [robot.stroke([[1.0, 0.0, -1.0, 0.0]]) for _ in range(2)]
@@ -275,9 +275,9 @@ def test_a_swim_is_measured_after_it_has_settled():
 
 
 def test_a_design_that_a_scene_refuses_costs_itself_alone():
-    frame = next(Sweep(FAST, (LENGTH,), settling=0, measured=1, samples=1).frames())
-    found = swim(Cell(frame, {"robot.limb_length": np.array([0.1, -1.0])}, 2))
+    frame = next(Sweep(FAST, (LENGTH,), settling=0, measured=1, samples=1).configurations())
+    found = swim(Batch(frame, {"robot.limb_length": np.array([0.1, -1.0])}, 2))
     assert found["status"].tolist() == [0, REFUSED] and found["status"].dtype == np.int64
     assert np.isnan([found[name][1] for name in UNITS if name != "status"]).all() and found["speed"][0] > 0.0
-    none = swim(Cell(frame, {"robot.limb_length": np.array([-1.0])}, 1))
+    none = swim(Batch(frame, {"robot.limb_length": np.array([-1.0])}, 1))
     assert none["status"].tolist() == [REFUSED] and np.isnan(none["speed"]).all()

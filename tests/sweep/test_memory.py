@@ -1,4 +1,4 @@
-"""Memory of a sweep does not grow with the number of its cells: not while they are planned, nor while they are done."""
+"""Memory of a sweep does not grow with the number of its batches, neither while planned nor while they are done."""
 
 import resource
 import tracemalloc
@@ -22,26 +22,26 @@ ONE_ROBOT = {"settling": 0, "measured": 1, "robots": 1}
 MEGABYTE = 1e6
 
 
-def grid(n_cells):
-    """Grid of three axes, of n_cells cells at least and of one robot each."""
-    axes = tuple(axis.spaced(round(n_cells ** (1 / 3)) + 1) for axis in AXES)
+def grid(n_batches):
+    """Grid of three axes, of n_batches batches at least and of one robot each."""
+    axes = tuple(axis.spaced(round(n_batches ** (1 / 3)) + 1) for axis in AXES)
     return Sweep(Scene.preset("fast"), axes, **ONE_ROBOT)
 
 
-def latin(n_cells):
-    return Sweep(Scene.preset("fast"), AXES, samples=n_cells, **ONE_ROBOT)
+def latin(n_batches):
+    return Sweep(Scene.preset("fast"), AXES, samples=n_batches, **ONE_ROBOT)
 
 
-def one_axis(n_cells):
-    return Sweep(Scene.preset("fast"), (AXES[0].spaced(n_cells),), **ONE_ROBOT)
+def one_axis(n_batches):
+    return Sweep(Scene.preset("fast"), (AXES[0].spaced(n_batches),), **ONE_ROBOT)
 
 
-def planned(plan, n_cells, named):
-    """Most memory that a plan of so many cells holds [MB], while the first of them are named."""
+def planned(plan, n_batches, named):
+    """Most memory that a plan of so many batches holds [MB], while the first of them are named."""
     tracemalloc.start()
     try:
-        for _, cell in zip(range(named), plan(n_cells).cells(), strict=False):
-            assert cell.name
+        for _, batch in zip(range(named), plan(n_batches).batches(), strict=False):
+            assert batch.name
         return tracemalloc.get_traced_memory()[1] / MEGABYTE
     finally:
         tracemalloc.stop()
@@ -53,14 +53,14 @@ def resident():
     return pages * resource.getpagesize() / MEGABYTE
 
 
-def nothing(cell):
+def nothing(batch):
     """A part without a simulation."""
-    return cell.name.encode()
+    return batch.name.encode()
 
 
 def test_planning_a_grid_holds_the_same_for_any_number_of_cells():
     few, many = planned(grid, 1_000, 500), planned(grid, 1_000_000, 2_000)
-    assert grid(1_000_000).n_cells >= 1_000_000
+    assert grid(1_000_000).n_batches >= 1_000_000
     assert many < few + 1.0 < 10.0
 
 
@@ -74,8 +74,8 @@ def test_a_sweep_of_a_hundred_thousand_cells_does_not_grow(tmp_path):
     sweep, found = grid(100_000), []
 
     def watch(tally):
-        if tally.done >= (len(found) + 1) * sweep.n_cells // 10:
+        if tally.done >= (len(found) + 1) * sweep.n_batches // 10:
             found.append(resident())
 
-    run(sweep.cells(), tmp_path, Processes(2), watch, nothing)
+    run(sweep.batches(), tmp_path, Processes(2), watch, nothing)
     assert len(found) == 10 and found[-1] < found[0] + 20.0

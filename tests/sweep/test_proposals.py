@@ -20,10 +20,10 @@ from seastar_gym.executors.here import Here
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.axes import Choices, Range
 from seastar_gym.sweep.command import make_parser
+from seastar_gym.sweep.controllers import Route
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.parts import Parts, part_of, read_parts
-from seastar_gym.sweep.pilots import Course
 from seastar_gym.sweep.proposals import Proposals, Search, explore, put_back, put_back_stale, study_of
+from seastar_gym.sweep.result_files import ResultFiles, read_results, result_file_of
 from seastar_gym.sweep.run import run
 
 AXES = (
@@ -79,26 +79,26 @@ def states(study):
 
 
 class Losing:
-    """An executor that loses the first cell."""
+    """An executor that loses the first batch."""
 
-    def run(self, work, cells):
-        for k, cell in enumerate(cells):
-            yield Outcome(cell, None, "Lost.") if k == 0 else Outcome(cell, work(cell))
+    def run(self, work, batches):
+        for k, batch in enumerate(batches):
+            yield Outcome(batch, None, "Lost.") if k == 0 else Outcome(batch, work(batch))
 
 
 def test_proposals_are_simulated_and_told(storage, tmp_path):
     study = explore(SWEEP, Search(), storage, 10, tmp_path, Here())
     assert states(study) == [TrialState.COMPLETE] * 10
-    cells = list(Parts(tmp_path).names())
-    assert len(cells) >= 3
+    batches = list(ResultFiles(tmp_path).names())
+    assert len(batches) >= 3
     best = study.best_trial
     scene = Scene.preset("fast")
     again = Sweep(
         scene, tuple(Choices(name, (value,)) for name, value in best.params.items()), settling=0, measured=1
     )  # fmt: skip
     folder = tmp_path / "again"
-    run(again.cells(), folder, Here())
-    assert read_parts(folder).column("speed").to_pylist() == [best.value]
+    run(again.batches(), folder, Here())
+    assert read_results(folder).column("speed").to_pylist() == [best.value]
     assert best.value == max(trial.value for trial in study.trials)
 
 
@@ -155,8 +155,8 @@ def test_stale_proposals_are_put_back_once(storage, tmp_path):
     search = Search(stale_after=1e-3)
     study = study_of(SWEEP, Search("ahead"), storage)
     lost = Proposals(SWEEP, study, Search("ahead"), 4)
-    n_cells = len(lost._asked(4))  # and the process is gone
-    assert states(study) == [TrialState.RUNNING] * 4 and n_cells
+    n_batches = len(lost._asked(4))  # and the process is gone
+    assert states(study) == [TrialState.RUNNING] * 4 and n_batches
     assert put_back_stale(study, 3600.0) == 0
     assert put_back_stale(study, 0.0, {0, 1, 2, 3}) == 0
     assert put_back_stale(study, search.stale_after) == 4
@@ -170,10 +170,10 @@ def test_stale_proposals_are_put_back_once(storage, tmp_path):
 def test_a_result_that_comes_too_late_changes_nothing(sqlite):
     study = study_of(SWEEP, Search(), sqlite)
     slow = Proposals(SWEEP, study, Search(), 2)
-    cells = slow._asked(2)
+    batches = slow._asked(2)
     assert put_back_stale(study, 0.0) == 2
-    for cell in cells:
-        slow.tell(Outcome(cell, part_of(cell)))
+    for batch in batches:
+        slow.tell(Outcome(batch, result_file_of(batch)))
     assert states(study) == [TrialState.FAIL] * 2 + [TrialState.WAITING] * 2
 
 
@@ -185,17 +185,17 @@ def test_a_design_without_the_objective_is_the_worst_and_not_tried_for_ever(is_l
     study = study_of(SWEEP, search, sqlite)
     proposals = Proposals(SWEEP, study, search, 2)
     monkeypatch.setattr(proposals, "_waiting", {"cell": [study.ask(), study.ask()]})
-    proposals.tell(Outcome(type("Cell", (), {"name": "cell"})(), b"part"))
+    proposals.tell(Outcome(type("Batch", (), {"name": "batch"})(), b"part"))
     assert states(study) == [TrialState.COMPLETE] * 2 and study.best_value == 1.0
-    assert list(proposals.cells()) == []
+    assert list(proposals.batches()) == []
 
 
 def test_defaults_of_the_command_are_those_of_the_classes():
-    told, sweep, course = vars(make_parser().parse_args([])), Sweep(SWEEP.scene, ()), Course()
+    told, sweep, route = vars(make_parser().parse_args([])), Sweep(SWEEP.scene, ()), Route()
     for name in ("gait", "settling", "measured", "seed", "robots"):
         assert told[name] == getattr(sweep, name)
     assert (told["path"], told["seconds"], told["decision_period"]) == (
-        course.path, course.seconds, course.decision_period,
+        route.path, route.seconds, route.decision_period,
     )  # fmt: skip
     wanted = Search()
     assert (told["objective"], told["stale_after"]) == (wanted.objective, wanted.stale_after) == ("speed", 600.0)

@@ -1,4 +1,4 @@
-"""What a cell's part says."""
+"""What a batch's part says."""
 
 import json
 
@@ -13,7 +13,7 @@ from seastar_gym.simulator import Simulator
 from seastar_gym.sweep.axes import Choices
 from seastar_gym.sweep.command import as_text
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.parts import Parts, part_of, read_parts
+from seastar_gym.sweep.result_files import ResultFiles, read_results, result_file_of
 from seastar_gym.sweep.run import run
 from seastar_gym.sweep.swimming import REFUSED, UNITS, swim
 
@@ -21,8 +21,8 @@ FAST = Scene.preset("fast")
 
 
 def one_cell(*axes, **options):
-    (cell,) = Sweep(FAST, axes, **{"settling": 1, "measured": 2, **options}).cells()
-    return cell
+    (batch,) = Sweep(FAST, axes, **{"settling": 1, "measured": 2, **options}).batches()
+    return batch
 
 
 def test_results_are_those_of_the_simulator():
@@ -70,7 +70,7 @@ def test_a_design_that_a_scene_refuses_costs_no_other():
 def test_a_cell_of_refused_designs_is_a_result():
     chapter = Scene(Seastar(n_limbs=3, discretisation="chapter", nodes_per_limb=5), actuator=SmaPulse(0.1))
     axes = Choices("robot.n_limbs", (5, 3)), Choices("actuator.peak_angle", (0.8, 0.9))
-    five, three = Sweep(chapter, axes, settling=0, measured=1).cells()
+    five, three = Sweep(chapter, axes, settling=0, measured=1).batches()
     assert (swim(three)["status"] == REFUSED).all() and (swim(five)["status"] == 0).all()
 
 
@@ -78,33 +78,33 @@ def test_a_design_has_the_same_bits_in_every_cell():
     lengths = Choices("robot.limb_length", tuple(np.linspace(0.05, 0.15, 12).tolist()))
 
     def speeds(robots):
-        cells = Sweep(FAST, (lengths,), settling=0, measured=1, robots=robots).cells()
-        return np.concatenate([swim(cell)["speed"] for cell in cells]).tolist()
+        batches = Sweep(FAST, (lengths,), settling=0, measured=1, robots=robots).batches()
+        return np.concatenate([swim(batch)["speed"] for batch in batches]).tolist()
 
     assert speeds(12) == speeds(5) == speeds(1)
 
 
 def test_a_part_has_units_scene_and_choices(tmp_path):
     axes = Choices("robot.n_limbs", (3, 4)), Choices("robot.limb_length", (0.05, 0.1)), Choices("gait", ("1+,2-",))
-    cells = list(Sweep(FAST, axes, settling=0, measured=1).cells())
-    for cell in cells:
-        Parts(tmp_path).write(cell.name, part_of(cell))
-    table = pyarrow.parquet.read_table(Parts(tmp_path).file(cells[0].name))
+    batches = list(Sweep(FAST, axes, settling=0, measured=1).batches())
+    for batch in batches:
+        ResultFiles(tmp_path).write(batch.name, result_file_of(batch))
+    table = pyarrow.parquet.read_table(ResultFiles(tmp_path).file(batches[0].name))
     assert table.schema.field("speed").metadata == {b"unit": b"m/s"}
     assert table.schema.field("robot.limb_length").metadata == {b"unit": b"m"}
     assert table.column("gait").to_pylist() == ["1+,2-", "1+,2-"]
     told = json.loads(table.schema.metadata[b"seastar_gym"])
-    assert Scene.from_dict(told["scene"]) == cells[0].frame.scene and told["measured"] == 1
-    everything = read_parts(tmp_path)
+    assert Scene.from_dict(told["scene"]) == batches[0].configuration.scene and told["measured"] == 1
+    everything = read_results(tmp_path)
     assert sorted(everything.column("robot.n_limbs").to_pylist()) == [3, 3, 4, 4]
 
 
 def test_pandas_and_polars_read_the_parts(tmp_path):
     pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
-    cell = one_cell(Choices("robot.limb_length", (0.05, 0.1)))
-    Parts(tmp_path).write(cell.name, part_of(cell))
-    speeds = swim(cell)["speed"].tolist()
-    file = Parts(tmp_path).file(cell.name)
+    batch = one_cell(Choices("robot.limb_length", (0.05, 0.1)))
+    ResultFiles(tmp_path).write(batch.name, result_file_of(batch))
+    speeds = swim(batch)["speed"].tolist()
+    file = ResultFiles(tmp_path).file(batch.name)
     assert pandas.read_parquet(file)["speed"].tolist() == speeds
     assert polars.read_parquet(file)["speed"].to_list() == speeds
     assert polars.read_parquet(tmp_path / "parts" / "*" / "*.parquet")["speed"].to_list() == speeds
@@ -112,14 +112,14 @@ def test_pandas_and_polars_read_the_parts(tmp_path):
 
 def test_an_empty_folder_has_no_results(tmp_path):
     with pytest.raises(ValueError, match="no results"):
-        read_parts(tmp_path)
+        read_results(tmp_path)
 
 
 @pytest.fixture(scope="module")
-def cells():
-    """Two cells of two designs each."""
+def batches():
+    """Two batches of two designs each."""
     axes = Choices("robot.n_limbs", (3, 5)), Choices("robot.limb_length", (0.08, 0.1))
-    return list(Sweep(FAST, axes, settling=0, measured=1).cells())
+    return list(Sweep(FAST, axes, settling=0, measured=1).batches())
 
 
 def flipped(part):
@@ -141,43 +141,43 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
-def test_a_damaged_part_is_named_left_out_and_simulated_again(damage, tmp_path, cells):
-    first, second = cells
-    assert run(iter(cells), tmp_path, Here()).done == 2
-    whole, file = read_parts(tmp_path), Parts(tmp_path).file(first.name)
+def test_a_damaged_part_is_named_left_out_and_simulated_again(damage, tmp_path, batches):
+    first, second = batches
+    assert run(iter(batches), tmp_path, Here()).done == 2
+    whole, file = read_results(tmp_path), ResultFiles(tmp_path).file(first.name)
     sound = file.read_bytes()
     file.write_bytes(damage(sound))
-    words = rf"{file} is damaged: .*\. It is left out: the same sweep simulates its cell"
+    words = rf"{file} is damaged: .*\. It is left out: the same sweep simulates its batch"
     with pytest.warns(UserWarning, match=words) as told:
-        assert read_parts(tmp_path).num_rows == second.n_robots
+        assert read_results(tmp_path).num_rows == second.n_robots
     assert [warning.filename for warning in told] == [__file__]  # where the results are asked for
-    again = run(iter(cells), tmp_path, Here())
+    again = run(iter(batches), tmp_path, Here())
     assert (again.done, again.kept, again.damaged) == (1, 1, [file])
     assert as_text(again, tmp_path).endswith(f"Damaged before, and simulated again: {file}.")
-    assert file.read_bytes() == sound and read_parts(tmp_path).equals(whole)
+    assert file.read_bytes() == sound and read_results(tmp_path).equals(whole)
 
 
-def test_a_part_under_the_name_of_another_cell_is_damaged(tmp_path, cells):
-    first, second = cells
-    run(iter(cells), tmp_path, Here())
-    Parts(tmp_path).file(first.name).write_bytes(Parts(tmp_path).file(second.name).read_bytes())
-    with pytest.warns(UserWarning, match="it has another cell"):
-        assert read_parts(tmp_path).num_rows == second.n_robots
-    assert run(iter(cells), tmp_path, Here()).done == 1
+def test_a_part_under_the_name_of_another_cell_is_damaged(tmp_path, batches):
+    first, second = batches
+    run(iter(batches), tmp_path, Here())
+    ResultFiles(tmp_path).file(first.name).write_bytes(ResultFiles(tmp_path).file(second.name).read_bytes())
+    with pytest.warns(UserWarning, match="it has another batch"):
+        assert read_results(tmp_path).num_rows == second.n_robots
+    assert run(iter(batches), tmp_path, Here()).done == 1
 
 
-def test_no_sound_part_is_no_result(tmp_path, cells):
-    run(iter(cells[:1]), tmp_path, Here())
-    Parts(tmp_path).file(cells[0].name).write_bytes(b"")
+def test_no_sound_part_is_no_result(tmp_path, batches):
+    run(iter(batches[:1]), tmp_path, Here())
+    ResultFiles(tmp_path).file(batches[0].name).write_bytes(b"")
     with pytest.warns(UserWarning, match="is damaged"), pytest.raises(ValueError, match="no results"):
-        read_parts(tmp_path)
+        read_results(tmp_path)
 
 
 def test_a_part_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     def full(descriptor):
         raise OSError(28, "No space left on device")
 
-    parts = Parts(tmp_path)
+    parts = ResultFiles(tmp_path)
     monkeypatch.setattr("os.fsync", full)
     with pytest.raises(OSError, match="No space"):
         parts.write("ab" * 20, b"part")

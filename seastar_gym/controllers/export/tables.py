@@ -50,7 +50,7 @@ def carried(description: Description) -> NDArray[np.float32]:
 
 def told(description: Description) -> Integers:
     """Places of the numbers that the network sees of every past observation."""
-    return np.zeros(0, np.intp) if description.recollection is None else description.recollection.told
+    return np.zeros(0, np.intp) if description.frame_stack is None else description.frame_stack.features
 
 
 def restored(description: Description) -> tuple[Integers, Integers]:

@@ -375,7 +375,7 @@ def contact_force(work, node):
 
 
 @kernel
-def those_apart(work, robots):
+def not_touching(work, robots):
     """Mask of those among `robots` that did not touch when their slopes were last computed."""
     if work.contact is None:
         return robots

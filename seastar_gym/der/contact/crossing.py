@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from seastar_gym.der.contact.broad_phase import across_gap
 from seastar_gym.der.contact.contact import edge_ends
 from seastar_gym.der.contact.near_body import height_over_body
-from seastar_gym.der.contact.near_pairs import across_gap
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.star import corner_place, tail_node
 from seastar_gym.simd.compilation import kernel
@@ -12,7 +12,7 @@ from seastar_gym.simd.lanes import add_product, any_lane, load, load_number, sel
 
 
 @kernel
-def those_uncrossed(rods, work, stage, q_0, robots):
+def without_new_crossings(rods, work, stage, q_0, robots):
     """Mask of those among `robots` without edges that cross now, or enter a body, and did not when the step began.
 
     Robots whose near pairs did not all fit into the list, or whose Newton step was not found, are left out.
@@ -27,7 +27,7 @@ def those_uncrossed(rods, work, stage, q_0, robots):
         doubtful = robots & ~on_their_sides(rods, work.contact.ends, q_0, right, left)
         if any_lane(doubtful):
             robots = robots & ~(doubtful & come_to_cross(rods, work.contact.ends, q_0, right, left))
-    return those_outside(rods, work.contact.ends, q_0, robots)
+    return outside_body(rods, work.contact.ends, q_0, robots)
 
 
 @kernel
@@ -96,7 +96,7 @@ def edges_cross(rods, q, e, f):
 
 
 @kernel
-def those_outside(rods, q_1, q_0, robots):
+def outside_body(rods, q_1, q_0, robots):
     """Mask of those among `robots` without nodes in a body at q_1, nor edges through it, that were not so at q_0.
 
     Root edges are left out, which begin at the body. The robots themselves without a body.

@@ -1,4 +1,4 @@
-"""Which nodes are near a body, and which edges near its corners: listed for near_pairs.py."""
+"""Which nodes are near a body, and which edges near its corners: listed for broad_phase.py."""
 
 import numpy as np
 

@@ -45,7 +45,7 @@ from seastar_gym.der.geometry import edge_vector, half_angle, larger
 from seastar_gym.der.motion import node_motion
 from seastar_gym.der.star import edge_of, hinge_edges, is_clamped, tail_node
 from seastar_gym.der.stepping.rigid_motion import cut_velocities, rigid_motion
-from seastar_gym.der.terms.added_mass import add_fluid_energy, less_edge_fluid_energy
+from seastar_gym.der.terms.added_mass import add_fluid_energy, subtract_edge_fluid_energy
 from seastar_gym.der.terms.along import add_moved_energy, bending_stiffness
 from seastar_gym.der.terms.clamp import moved_clamp_energy
 from seastar_gym.der.terms.fluid import fluid_velocity
@@ -84,7 +84,7 @@ def moving_energy(rods, work, q, v, frame):
     """Kinetic energy of the robot, and of fluid that moves along at the normals of the last stage [J]."""
     energy = add_turning_energy(rods, q, v, frame, kinetic_energy(rods, v, frame))
     energy = add_fluid_energy(rods, work, v, frame, energy)
-    return less_edge_fluid_energy(rods, work, v, energy)
+    return subtract_edge_fluid_energy(rods, work, v, energy)
 
 
 @kernel
@@ -100,7 +100,7 @@ def add_work_of_loads(rods, work, q, h, frame, energy):
 
 
 @kernel
-def set_aside(rods, work, scheme, q, v):
+def save(rods, work, scheme, q, v):
     """Copy the state into memory that a step's last stage leaves unused."""
     rows = 2 * rods.n_free
     unused = rows * (scheme.n_stages - 1)
@@ -111,7 +111,7 @@ def set_aside(rods, work, scheme, q, v):
 
 
 @kernel
-def put_back(rods, work, scheme, q, v, robots):
+def restore(rods, work, scheme, q, v, robots):
     """Undo a step of the robots in the mask."""
     rows = 2 * rods.n_free
     unused = rows * (scheme.n_stages - 1)
@@ -179,12 +179,12 @@ def may_gain(rods, work, stage, phi, robots):
             gain = add_product(gain, m * v_0, change)
         power = load_power(rods, node, load(stage.v_hat, 2 * node), load(stage.v_hat, 2 * node + 1))
         gain = subtract_product(gain, stage.gamma, power)
-    gain = less_edge_gain(rods, work, stage, gain)
+    gain = subtract_edge_gain(rods, work, stage, gain)
     return robots & ~(gain <= 0.0)
 
 
 @kernel
-def less_edge_gain(rods, work, stage, gain):
+def subtract_edge_gain(rods, work, stage, gain):
     """Gain less v_0 mu (v_1 - v_0) of the differences along the edges [J]; unchanged for lumped masses (None)."""
     if rods.edge_mass is None:
         return gain

@@ -28,12 +28,12 @@ LOST = 1e8  # of stiffness over inertia: rounding is some 1e-10 of a Newton step
 
 
 @kernel
-def settle_momentum(rods, work, scheme, k, stage, q_0, v_0, h, robots):
+def correct_momentum(rods, work, scheme, k, stage, q_0, v_0, h, robots):
     """Move the robots in the mask whose momentum may be unbalanced to where it is balanced, after stage k of a step.
 
     q_0, v_0: State at the beginning of the step, of length h [s].
     """
-    unsettled = robots & (load(rods.scales.unsettled_rate, 0) * stage.gamma * stage.gamma > LOST)
+    unsettled = robots & (load(rods.scales.stiffness_ratio, 0) * stage.gamma * stage.gamma > LOST)
     if any_lane(unsettled):
         begin_turning(rods, work, scheme, k, q_0, v_0, h)
         move_as_a_whole(rods, work, stage, unsettled)

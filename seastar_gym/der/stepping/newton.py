@@ -10,7 +10,7 @@ from seastar_gym.der.contact.coupled import solve_coupled
 from seastar_gym.der.geometry import larger
 from seastar_gym.der.linear.star_matrix import load_pair, store_pair, substitute_node
 from seastar_gym.der.potential import factorise
-from seastar_gym.der.stepping.foresight import foreseeable_length, predictable
+from seastar_gym.der.stepping.skip_last import can_skip, quadratic_length
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import absolute, add_product, any_lane, load, select, splat, sqrt
 
@@ -24,13 +24,13 @@ def minimise(rods, work, stage, active, tolerance, iteration_limit):
     """Minimise Phi over work.q, in place, for the robots in the mask `active`.
 
     tolerance: Largest node move of the last Newton step [m], or of the one that is left out because it is predictable,
-        see foresight.py. iteration_limit: Most Newton steps per robot.
+        see skip_last.py. iteration_limit: Most Newton steps per robot.
 
     Returns (converged, Phi, iterations, regularised, backtracks), per robot: a mask, the potential before the last step
     [J], and counts of Newton steps, of those with a convex matrix, and of shortened ones.
     """
     zero, one = splat(0.0), splat(1.0)
-    quadratic_length = foreseeable_length(rods, stage)
+    length = quadratic_length(rods, stage)
     nobody = one < zero
     running, converged, convex = active, nobody, nobody
     iterations, regularised, backtracks = zero, zero, zero
@@ -60,9 +60,7 @@ def minimise(rods, work, stage, active, tolerance, iteration_limit):
         count = select(stepping, one, zero)
         iterations += count
         backtracks += select(shortening, one, zero)
-        foreseen = predictable(
-            rods, work, iterations, regularised + backtracks, phi, move, tolerance * quadratic_length
-        )
+        foreseen = can_skip(rods, work, iterations, regularised + backtracks, phi, move, tolerance * length)
         done = stepping & ((move <= tolerance) | (~convex & foreseen))
         converged = converged | done
         convex = convex & ~stepping

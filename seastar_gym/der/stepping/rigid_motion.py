@@ -10,7 +10,7 @@ from seastar_gym.simd.lanes import add_product, load, select, splat, store, subt
 
 
 @kernel
-def less_edge_turn(rods, q, v, spin, turn):
+def subtract_edge_turn(rods, q, v, spin, turn):
     """(angular momentum, moment of inertia) less those of edges' differences; unchanged for lumped masses (None)."""
     if rods.edge_mass is None:
         return spin, turn
@@ -24,7 +24,7 @@ def less_edge_turn(rods, q, v, spin, turn):
 
 
 @kernel
-def less_edge_fluid_turn(rods, work, q, v, spin, turn):
+def subtract_edge_fluid_turn(rods, work, q, v, spin, turn):
     """(angular momentum, moment of inertia) less those of edges' differences in the fluid that moves along.
 
     Unchanged without consistent added mass (None).
@@ -83,8 +83,8 @@ def rigid_motion(rods, work, q, v, frame):
     v_hub, omega = (load(v, 0) - frame[0], load(v, 1) - frame[1]), spin_rate(rods, v)
     (p_x, p_y), spin = add_spin(rods, q, v_hub, omega, hub, (p_x, p_y), spin)
     (x_turn, y_turn), turn = add_spin(rods, q, (-hub[1], hub[0]), one, hub, (x_turn, y_turn), turn)
-    spin, turn = less_edge_turn(rods, q, v, spin, turn)
-    spin, turn = less_edge_fluid_turn(rods, work, q, v, spin, turn)
+    spin, turn = subtract_edge_turn(rods, q, v, spin, turn)
+    spin, turn = subtract_edge_fluid_turn(rods, work, q, v, spin, turn)
     # Elimination of x, then y.
     lower, turn_lower = xy / xx, x_turn / xx
     yy, y_turn, turn = yy - lower * xy, y_turn - lower * x_turn, turn - turn_lower * x_turn

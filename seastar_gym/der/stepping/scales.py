@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seastar_gym.der.mesh import Mesh, mean
-from seastar_gym.der.stepping.foresight import CURVATURE
+from seastar_gym.der.stepping.skip_last import CURVATURE
 from seastar_gym.der.terms.drag import drag_per_length
 from seastar_gym.der.terms.stretching import Stretching
 
@@ -20,12 +20,12 @@ class Scales(NamedTuple):
     """One row each, but for `held`.
 
     shortest_edge: Smallest natural length of an edge [m].
-    curvature_rate: How fast the foreseeable length shrinks with the step [1/s^2], see foresight.py.
-    predictable: Potential [J] up to which Newton steps are predictable, see foresight.py; none is where drag on slender
+    curvature_rate: How fast the quadratic length shrinks with the step [1/s^2], see skip_last.py.
+    predictable: Potential [J] up to which Newton steps are predictable, see skip_last.py; none is where drag on slender
         edges curves the potential more than that allows for.
     damped: Potential [J] up to which drag takes more energy than an unregularised step may create, see guard.py; zero
         without drag.
-    unsettled_rate: How much stiffer edges are than inertia, the more the longer the step [1/s^2], see momentum.py.
+    stiffness_ratio: How much stiffer edges are than inertia, the more the longer the step [1/s^2], see momentum.py.
     free_mass: Of the nodes that are not held [kg].
     held: Whether nodes are held, so that no frame but the laboratory's will do.
     """
@@ -34,7 +34,7 @@ class Scales(NamedTuple):
     curvature_rate: np.ndarray
     predictable: np.ndarray
     damped: np.ndarray
-    unsettled_rate: np.ndarray
+    stiffness_ratio: np.ndarray
     free_mass: np.ndarray
     held: bool
 
@@ -66,7 +66,7 @@ def coefficients(
         curvature_rate=np.array([rate]),
         predictable=np.array([energy if drag_curvature <= MOST_CURVED * CURVATURE else -np.inf]),
         damped=np.array([energy * min(1.0, broadside * length / (density * mean(area)))]),
-        unsettled_rate=np.array([stiffness_over_mass * edges**2 if broadside > 0.0 else np.inf]),
+        stiffness_ratio=np.array([stiffness_over_mass * edges**2 if broadside > 0.0 else np.inf]),
         free_mass=np.array([np.delete(mass, held_nodes).sum()]),
         held=bool(held_nodes),
     )

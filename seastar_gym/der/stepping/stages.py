@@ -172,7 +172,7 @@ def step_error(rods, work, stage, a, h, last_h):
 
 
 @kernel
-def start_standing(rods, work, stage, frame, robots):
+def start_at_rest(rods, work, stage, frame, robots):
     """Start the iterate of the robots in the mask at q_hat, carried on by the frame: Phi is finite there, and no
     velocity about it leads it astray.
     """

@@ -4,9 +4,9 @@ from typing import Any, NamedTuple
 
 from seastar_gym.der.body.body import freeze_body
 from seastar_gym.der.body.forces import add_work_on_body
+from seastar_gym.der.contact.broad_phase import freeze_contact
 from seastar_gym.der.contact.coupled import solver_iterations
-from seastar_gym.der.contact.crossing import those_uncrossed
-from seastar_gym.der.contact.near_pairs import freeze_contact
+from seastar_gym.der.contact.crossing import without_new_crossings
 from seastar_gym.der.stepping.guard import (
     LARGEST_CUT,
     add_work_of_loads,
@@ -14,11 +14,11 @@ from seastar_gym.der.stepping.guard import (
     frame_velocity,
     hold_to_energy,
     may_gain,
-    put_back,
-    set_aside,
+    restore,
+    save,
     through_poles,
 )
-from seastar_gym.der.stepping.momentum import settle_momentum
+from seastar_gym.der.stepping.momentum import correct_momentum
 from seastar_gym.der.stepping.newton import minimise
 from seastar_gym.der.stepping.report import (
     BACKTRACKS,
@@ -36,7 +36,7 @@ from seastar_gym.der.stepping.stages import (
     end_step,
     guessed_motion,
     memory_row,
-    start_standing,
+    start_at_rest,
     step_error,
 )
 from seastar_gym.der.terms.damping import freeze_strains
@@ -104,15 +104,15 @@ def solve_stages(rods, work, scheme, actuation, q, v, a, step, active, limits, r
         freeze_contact(rods, work, stage, q)
         freeze_body(rods, work, stage, guessed_motion(rods, scheme, k, stage, a))
         if any_lane(step.retrying):
-            start_standing(rods, work, stage, frame_velocity(rods, q, v), step.retrying)
+            start_at_rest(rods, work, stage, frame_velocity(rods, q, v), step.retrying)
         freeze_fluid(rods, work)
         set_natural_hub_angles(rods, work, actuation, step.start + load_number(scheme.c, k) * step.size)
         freeze_strains(rods, work, stage.q_hat)
         left = limits.most_iterations - iterations_spent(report)
         most, good = select(left < step.iteration_limit, left, step.iteration_limit), good & (left > 0.0)
         good, phi, iterations, regularised, backtracks = minimise(rods, work, stage, good, tolerance, most)
-        settle_momentum(rods, work, scheme, k, stage, q, v, step.h, good)
-        good = those_uncrossed(rods, work, stage, q, good)
+        correct_momentum(rods, work, scheme, k, stage, q, v, step.h, good)
+        good = without_new_crossings(rods, work, stage, q, good)
         guarded = guarded | (regularised + backtracks > 0.0)
         if scheme.dissipative:
             guarded = guarded | those_that_may_gain(rods, work, stage, phi, good & ~guarded)
@@ -146,7 +146,7 @@ def end_guarded_step(rods, work, scheme, actuation, q, v, a, step, stage, accept
 
     Returns the mask of the robots whose step was refused and undone.
     """
-    set_aside(rods, work, scheme, q, v)
+    save(rods, work, scheme, q, v)
     frame = frame_velocity(rods, q, v)
     allowed = allowed_energy(rods, work, scheme, actuation, step.start, step.start + step.size, q, v, frame)
     end_step(rods, work, scheme, stage, q, v, a, step.h, accepted)
@@ -158,6 +158,6 @@ def end_guarded_step(rods, work, scheme, actuation, q, v, a, step, stage, accept
     turnable = guarded & (step.iteration_limit <= TURNABLE * limits.max_iterations)
     refused = refused | through_poles(rods, work, q, turnable)
     if any_lane(refused):
-        put_back(rods, work, scheme, q, v, refused)
+        restore(rods, work, scheme, q, v, refused)
     add_to_report(report, ENERGY_CUTS, select(cut, splat(1.0), splat(0.0)))
     return refused

@@ -105,7 +105,7 @@ def add_fluid_inertia(work, node, dx, dy, inverse_gamma, slopes):
 
 
 @kernel
-def less_edge_fluid_inertia(rods, work, stage, e, tail, head, slopes):
+def subtract_edge_fluid_inertia(rods, work, stage, e, tail, head, slopes):
     """(E, f, K) of an edge less mu ((d_head - d_tail) n)^2/2; unchanged where no such mass is named."""
     if rods.edge_added_mass is None:
         return slopes
@@ -125,7 +125,7 @@ def less_edge_fluid_inertia(rods, work, stage, e, tail, head, slopes):
 
 
 @kernel
-def less_edge_fluid_energy(rods, work, v, energy):
+def subtract_edge_fluid_energy(rods, work, v, energy):
     """Kinetic energy of the fluid [J] less what velocities that are linear along edges take from lumped masses'."""
     if rods.edge_added_mass is None:
         return energy

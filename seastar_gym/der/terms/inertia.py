@@ -45,7 +45,7 @@ MOST_TAKEN = 0.9
 
 
 @kernel
-def less_edge_inertia(rods, stage, e, tail, head, slopes):
+def subtract_edge_inertia(rods, stage, e, tail, head, slopes):
     """(E, f, K) of an edge less mu |d_head - d_tail|^2/2, d = v - v_hat; unchanged for lumped masses."""
     if rods.edge_mass is None:
         return slopes
@@ -68,11 +68,11 @@ def kinetic_energy(rods, v, frame):
     for node in range(rods.n_nodes):
         vx, vy = load(v, 2 * node) - frame[0], load(v, 2 * node + 1) - frame[1]
         total = add_product(total, 0.5 * load(rods.mass, node), vx * vx + vy * vy)
-    return less_edge_energy(rods, v, total)
+    return subtract_edge_energy(rods, v, total)
 
 
 @kernel
-def less_edge_energy(rods, v, energy):
+def subtract_edge_energy(rods, v, energy):
     """Kinetic energy less mu |v_head - v_tail|^2/2 of the edges [J]; unchanged for lumped masses (None)."""
     if rods.edge_mass is None:
         return energy

@@ -34,12 +34,12 @@ if TYPE_CHECKING:
     from seastar_gym.envs.symmetry.group import symmetry_of as symmetry_of
     from seastar_gym.envs.symmetry.group import transform_commands as transform_commands
     from seastar_gym.envs.symmetry.group import turns as turns
-    from seastar_gym.envs.symmetry.symmetry import Recollection as Recollection
+    from seastar_gym.envs.symmetry.symmetry import FrameStack as FrameStack
     from seastar_gym.envs.symmetry.symmetry import Symmetry as Symmetry
     from seastar_gym.envs.symmetry.symmetry import reduce_observations as reduce_observations
     from seastar_gym.envs.symmetry.symmetry import restore_actions as restore_actions
     from seastar_gym.envs.symmetry.wrappers import SymmetryReduction as SymmetryReduction
-    from seastar_gym.envs.symmetry.wrappers import VectorMemory as VectorMemory
+    from seastar_gym.envs.symmetry.wrappers import VectorFrameStack as VectorFrameStack
     from seastar_gym.envs.symmetry.wrappers import VectorSymmetryReduction as VectorSymmetryReduction
     from seastar_gym.envs.symmetry.wrappers import observed_mirror as observed_mirror
     from seastar_gym.envs.symmetry.wrappers import require_symmetry as require_symmetry

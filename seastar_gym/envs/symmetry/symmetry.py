@@ -1,4 +1,4 @@
-"""`Symmetry`: what a turned or mirrored robot sees, does and can follow; `Recollection`: the same with its past."""
+"""`Symmetry`: what a turned or mirrored robot sees, does and can follow; `FrameStack`: the same with its past."""
 
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -7,6 +7,7 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym import renamed
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, as_array, choices
 from seastar_gym.envs.layout import HEADINGS, Layout
 from seastar_gym.envs.symmetry.group import (
@@ -235,7 +236,8 @@ def _vector_order(group: Group, shows_limbs: bool, stations: int) -> NDArray[np.
     return read_only(np.concatenate([places, n_places + places, others], axis=1))
 
 
-class Recollection:
+@renamed.methods
+class FrameStack:
     """What a controller with memory sees: the present observation, and what was most telling of the last ones.
 
     The limbs of a robot are renamed from one decision to the next as the waypoint moves from sector to sector. Here all
@@ -253,7 +255,7 @@ class Recollection:
         self.symmetry, self.layout, self.past = symmetry, symmetry.layout, int(past)
 
     @cached_property
-    def told(self) -> NDArray[np.intp]:
+    def features(self) -> NDArray[np.intp]:
         """Places of the numbers that are kept of a past observation."""
         if not self.layout.shows_limbs:
             return np.arange(self.layout.size)
@@ -262,9 +264,9 @@ class Recollection:
     @property
     def size(self) -> int:
         """Length of what is shown."""
-        return self.layout.size + self.past * len(self.told)
+        return self.layout.size + self.past * len(self.features)
 
-    def shown(self, observations: NDArray[Any], past: NDArray[Any]) -> tuple[NDArray[np.float32], Elements]:
+    def stacked(self, observations: NDArray[Any], past: NDArray[Any]) -> tuple[NDArray[np.float32], Elements]:
         """What is shown of observations, shape (n, size), and the elements that brought their targets into sector 0.
 
         observations: Present ones, shape (n, layout.size). past: Those before, latest first, (n, past, layout.size).
@@ -273,7 +275,7 @@ class Recollection:
         every = np.concatenate([observations[:, None], past], axis=1)
         reduced = self.symmetry.carry(every, np.repeat(elements[:, None], every.shape[1], axis=1))
         n = len(observations)
-        shown = np.concatenate([reduced[:, 0], reduced[:, 1:, self.told].reshape(n, -1)], axis=1)
+        shown = np.concatenate([reduced[:, 0], reduced[:, 1:, self.features].reshape(n, -1)], axis=1)
         return shown.astype(np.float32), elements
 
 

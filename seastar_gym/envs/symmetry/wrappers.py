@@ -11,9 +11,10 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from seastar_gym import renamed
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.symmetry.group import memory_mirror, symmetry_of
-from seastar_gym.envs.symmetry.symmetry import Recollection, Symmetry
+from seastar_gym.envs.symmetry.symmetry import FrameStack, Symmetry
 from seastar_gym.envs.task_env import TaskEnv
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror, complete
@@ -162,8 +163,9 @@ class VectorSymmetryReduction(_VectorWrapper):
         return {"final_obs": final, "final_info": self._symmetry.carry_info(info["final_info"], elements)}
 
 
-class VectorMemory(VectorSymmetryReduction):
-    """Wrapper of a native batch that shows a `Recollection`, and takes actions that were chosen on it.
+@renamed.methods
+class VectorFrameStack(VectorSymmetryReduction):
+    """Wrapper of a native batch that shows a `FrameStack`, and takes actions that were chosen on it.
 
     At the beginning of an episode, the past is the first observation. Asked headings are not shown in the past.
 
@@ -174,11 +176,11 @@ class VectorMemory(VectorSymmetryReduction):
         super().__init__(env)
         if self._symmetry.layout.asks_headings:
             raise ValueError("Asked headings have no place in this memory: take a task without them.")
-        self.recollection = Recollection(self._symmetry, past)
+        self.frame_stack = FrameStack(self._symmetry, past)
         self._over = np.zeros(env.num_envs, bool)  # robots whose next step begins an episode
         self._begins_later = env.metadata.get("autoreset_mode") == AutoresetMode.NEXT_STEP
-        self._past = np.zeros((env.num_envs, past, self.recollection.layout.size), np.float32)
-        self.single_observation_space = gym.spaces.Box(-np.inf, np.inf, (self.recollection.size,), np.float32)
+        self._past = np.zeros((env.num_envs, past, self.frame_stack.layout.size), np.float32)
+        self.single_observation_space = gym.spaces.Box(-np.inf, np.inf, (self.frame_stack.size,), np.float32)
         self.observation_space = gym.vector.utils.batch_space(self.single_observation_space, env.num_envs)
 
     def reset(
@@ -191,7 +193,7 @@ class VectorMemory(VectorSymmetryReduction):
         self._past[begun] = observations[begun, None]
         self._over[begun] = False
         self._latest = observations
-        shown, self._elements = self.recollection.shown(observations, self._past)
+        shown, self._elements = self.frame_stack.stacked(observations, self._past)
         return shown, self._symmetry.carry_info(info, self._elements)
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
@@ -207,13 +209,13 @@ class VectorMemory(VectorSymmetryReduction):
             info = {**info, **self._shown_final(info)}
         self._past[begun] = observations[begun, None]
         self._latest = observations
-        shown, self._elements = self.recollection.shown(observations, self._past)
+        shown, self._elements = self.frame_stack.stacked(observations, self._past)
         return shown, rewards, terminated, truncated, self._symmetry.carry_info(info, self._elements)
 
     def _shown_final(self, info: dict[str, Any]) -> dict[str, Any]:
         """Last observations with their past, and masks, of episodes that are over."""
         over, final, elements = info["_final_obs"], info["final_obs"].copy(), np.zeros(self.num_envs, np.intp)
-        shown, elements[over] = self.recollection.shown(np.stack(list(final[over])), self._past[over])
+        shown, elements[over] = self.frame_stack.stacked(np.stack(list(final[over])), self._past[over])
         for robot, last in zip(np.flatnonzero(over), shown, strict=True):
             final[robot] = last
         return {"final_obs": final, "final_info": self._symmetry.carry_info(info["final_info"], elements)}

@@ -102,15 +102,15 @@ class FailBlindTask(Numbered, SwimTask):
     entries: tuple[Entry, ...] = ("vector", "pseudoscalar")
     shows_limbs = False
 
-    def __init__(self, about: FailBlind, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
-        self.about = about
+    def __init__(self, config: FailBlind, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
+        self.config = config
         self._hub, self._before = np.zeros((n_robots, 2)), np.zeros(n_robots)  # hub and heading at the last look
         self._way, self._turn = np.zeros((n_robots, 2)), np.zeros(n_robots)  # of the last decision
-        options = replace(options, path="random", random_heading=True, reward=about.reward)
+        options = replace(options, path="random", random_heading=True, reward=config.reward)
         blind = replace(options, observe_actuators=False)  # wires of dead limbs stay cold
         SwimTask.__init__(self, blind, n_robots, threads)
         self._tells_errors = False  # errors were measured of whole robots
-        self._draws = AnyLimbs(about.dead)
+        self._draws = AnyLimbs(config.dead)
         self.drawn = self._draws.first_values(self.scene, n_robots)
         self._number(split)
 
@@ -120,15 +120,15 @@ class FailBlindTask(Numbered, SwimTask):
         self._before[robots] = self.seen_heading()[robots]
         self._way[robots], self._turn[robots] = 0.0, 0.0
 
-    def _score(self, hub: Floats, pulses: Floats) -> Score:
+    def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
         place, heading, c, s = self.seen_hub(), self.seen_heading(), np.cos(self._before), np.sin(self._before)
         x, y = (place - self._hub).T
         self._way = np.stack([c * x + s * y, c * y - s * x], axis=1)
         self._turn = wrapped(heading - self._before)
         self._hub, self._before = place, heading
-        return super()._score(hub, pulses)
+        return super()._reward_terms(hub, pulses)
 
-    def _wanted(self) -> Floats:
+    def _task_observation(self) -> Floats:
         velocity = self._way / (VELOCITY_SCALE * self.decision_period)
         return np.column_stack([velocity, self._turn])
 

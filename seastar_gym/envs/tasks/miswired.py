@@ -79,23 +79,23 @@ class MiswiredTask(Numbered, SwimTask):
 
     observes_commands = True
 
-    def __init__(self, about: Miswired, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
-        self.about = about
-        options = replace(options, path="random", random_heading=True, reward=about.reward)
+    def __init__(self, config: Miswired, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
+        self.config = config
+        options = replace(options, path="random", random_heading=True, reward=config.reward)
         SwimTask.__init__(self, options, n_robots, threads)
         self.wiring = np.ones((n_robots, self.scene.robot.n_limbs))
         self._number(split)
 
     def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
         super()._draw(robot, rng, asked)
-        swapped = rng.random(self.wiring.shape[1]) < self.about.swap_probability
+        swapped = rng.random(self.wiring.shape[1]) < self.config.swap_probability
         self.wiring[robot] = np.where(swapped, -1.0, 1.0)
 
     def _wired(self, commands: Floats) -> Floats:
         return commands * self.wiring
 
-    def _deaf_wires(self) -> Flags:
-        return self._by_command(super()._deaf_wires())
+    def _refractory_wires(self) -> Flags:
+        return self._by_command(super()._refractory_wires())
 
     def _by_command(self, of_wires: NDArray[Any]) -> NDArray[Any]:
         """Values of wires + and -, shape (n_robots, n_limbs, 2), in the names that commands have for them."""
@@ -105,8 +105,8 @@ class MiswiredTask(Numbered, SwimTask):
         wires = super()._observed_wires().reshape(*self.wiring.shape, -1)
         return self._by_command(wires).reshape(self.n_robots, -1)
 
-    def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
-        return {**super()._goal_facts(hub), "wiring": self.wiring.copy()}
+    def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
+        return {**super()._task_info(hub), "wiring": self.wiring.copy()}
 
     def scenery(self, robot: int) -> Scenery:
         """What pictures of a robot show besides its waypoints."""

@@ -206,13 +206,13 @@ class ObstTrapTask(Numbered, SwimTask):
     TERMS = (*SwimTask.TERMS, "reward_touch")
     entries: tuple[Entry, ...] = ("vector", "scalar") * SEEN
 
-    def __init__(self, about: ObstTrap, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
-        self.about = about
-        self.discs = np.zeros((n_robots, N_HORSESHOE + about.scattered, 3))
-        self._is_geodesic = about.potential == "geodesic"
+    def __init__(self, config: ObstTrap, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
+        self.config = config
+        self.discs = np.zeros((n_robots, N_HORSESHOE + config.scattered, 3))
+        self._is_geodesic = config.potential == "geodesic"
         self._ways = Ways(np.zeros((n_robots, 1, 1)), STEP)
-        goal = np.array([[about.distance[0], 0.0]])
-        options = replace(options, path=goal, random_heading=True, reward=about.reward)
+        goal = np.array([[config.distance[0], 0.0]])
+        options = replace(options, path=goal, random_heading=True, reward=config.reward)
         SwimTask.__init__(self, options, n_robots, threads)
         if self._is_geodesic:
             shape = ways(np.zeros((0, 3)), goal[0], 0.0, STEP).lengths.shape
@@ -220,9 +220,9 @@ class ObstTrapTask(Numbered, SwimTask):
         self._number(split)
 
     def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
-        goal = np.array([rng.uniform(*self.about.distance), 0.0])
+        goal = np.array([rng.uniform(*self.config.distance), 0.0])
         self._set_path(robot, goal[None])
-        self.discs[robot] = draw_discs(rng, goal, self.about.scattered, self.about.longest_way)
+        self.discs[robot] = draw_discs(rng, goal, self.config.scattered, self.config.longest_way)
         if self._is_geodesic:
             self._ways.lengths[robot] = ways(self.discs[robot], goal, PASSAGE, STEP).lengths
 
@@ -235,21 +235,21 @@ class ObstTrapTask(Numbered, SwimTask):
         """Distance of hubs [m], shape (n_robots, 2), from the nearest rim [m], shape (n_robots,)."""
         return np.asarray(rims(hub, self.discs).min(axis=1))
 
-    def _score(self, hub: Floats, pulses: Floats) -> Score:
-        score = super()._score(hub, pulses)
+    def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
+        score = super()._reward_terms(hub, pulses)
         touches = self.clearance(hub) < 0.0
-        terms = {**score.terms, "reward_touch": -self.about.touch * touches.astype(np.float64)}
+        terms = {**score.terms, "reward_touch": -self.config.touch * touches.astype(np.float64)}
         return Score(terms, score.success & ~touches, score.over | touches)
 
-    def _wanted(self) -> Floats:
+    def _task_observation(self) -> Floats:
         hub = self.seen_hub()
         order = np.argsort(rims(hub, self.discs), axis=1, kind="stable")[:, :SEEN]
         nearest = np.take_along_axis(self.discs, order[..., None], axis=1)
         seen = np.concatenate([self._in_body_frame(nearest[..., :2] - hub[:, None]), nearest[..., 2:]], axis=-1)
         return seen.reshape(self.n_robots, -1) / self.scene.robot.limb_length
 
-    def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
-        return {**super()._goal_facts(hub), "clearance": self.clearance(hub), "discs": self.discs.copy()}
+    def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
+        return {**super()._task_info(hub), "clearance": self.clearance(hub), "discs": self.discs.copy()}
 
     def scenery(self, robot: int) -> Scenery:
         """The discs, and the end of who touched one."""

@@ -97,9 +97,9 @@ class PreyTask(Numbered, Swimming):
 
     TERMS = ("reward_progress", "reward_catch", "reward_effort")
 
-    def __init__(self, about: Prey, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
+    def __init__(self, config: Prey, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
         Swimming.__init__(self, replace(options, random_heading=True), n_robots, threads)
-        self.about, self.waypoint_radius = about, about.catch_radius
+        self.config, self.waypoint_radius = config, config.catch_radius
         self.catches = np.zeros(n_robots, np.int64)
         self._drawn_courses = np.zeros((n_robots, MOST_PREY, 8))  # around the robot, from time 0 on
         self.courses = np.zeros((n_robots, 8))  # of the present prey
@@ -107,10 +107,10 @@ class PreyTask(Numbered, Swimming):
         self._number(split)
 
     def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
-        about = self.about
+        config = self.config
         for k in range(MOST_PREY):
-            can_be_met = Pursuit(about.robot_speed, about.catch_radius)
-            self._drawn_courses[robot, k] = draw_course(rng, about.radius, about.speed, about.epicycle, can_be_met)
+            can_be_met = Pursuit(config.robot_speed, config.catch_radius)
+            self._drawn_courses[robot, k] = draw_course(rng, config.radius, config.speed, config.epicycle, can_be_met)
 
     def _begin(self, robots: Flags) -> None:
         self.catches[robots] = 0
@@ -139,19 +139,19 @@ class PreyTask(Numbered, Swimming):
         place, velocity = self.prey()
         return np.concatenate([place, place + LOOK_AHEAD * velocity], axis=1)
 
-    def _score(self, hub: Floats, pulses: Floats) -> Score:
+    def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
         before, self._distance = self._distance, self._measure(hub)
-        caught = self._distance <= self.about.catch_radius
+        caught = self._distance <= self.config.catch_radius
         terms = {
-            "reward_progress": self.about.progress * (before - self._distance),
-            "reward_catch": self.about.catch * caught.astype(np.float64),
-            "reward_effort": -self.about.effort * pulses,
+            "reward_progress": self.config.progress * (before - self._distance),
+            "reward_catch": self.config.catch * caught.astype(np.float64),
+            "reward_effort": -self.config.effort * pulses,
         }
         self.catches += caught
         self._release(caught, hub)
-        return Score(terms, self.catches >= self.about.wanted, np.zeros(self.n_robots, bool))
+        return Score(terms, self.catches >= self.config.wanted, np.zeros(self.n_robots, bool))
 
-    def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
+    def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
         return {
             "distance": self._measure(hub),
             "prey": self.prey()[0],
@@ -164,7 +164,7 @@ class PreyTask(Numbered, Swimming):
         place, velocity = (of_all[robot] for of_all in self.prey())
         round_trip = Courses(self.courses[robot]).once_round()
         return Scenery(
-            rings=(Ring(place, self.about.catch_radius),),
+            rings=(Ring(place, self.config.catch_radius),),
             lines=(round_trip,),
             arrows=(np.array([place, place + 5.0 * velocity]),),
             progress=f"{self.catches[robot]} caught",

@@ -97,15 +97,15 @@ ATTRACTION = 0.1
 MOST_DRAWS = 1000
 
 
-def draw_prizes(rng: np.random.Generator, about: Prizes) -> Floats:
+def draw_prizes(rng: np.random.Generator, config: Prizes) -> Floats:
     """Prizes around the origin: x, y [m], worth; shape (N_PRIZES, 3). ValueError: none were found."""
-    way = about.robot_speed * about.seconds
+    way = config.robot_speed * config.seconds
     for _ in range(MOST_DRAWS):
-        places = rng.uniform(-0.5 * about.side, 0.5 * about.side, (N_PRIZES, 2))
+        places = rng.uniform(-0.5 * config.side, 0.5 * config.side, (N_PRIZES, 2))
         worth = rng.choice(WORTHS, N_PRIZES)
         first, between = np.hypot(places[:, 0], places[:, 1]), distances(places)
-        wanted = (1.0 + about.gain) * greedy_round(first, between, worth, way)
-        if first.min() <= about.radius or wanted > worth.sum():
+        wanted = (1.0 + config.gain) * greedy_round(first, between, worth, way)
+        if first.min() <= config.radius or wanted > worth.sum():
             continue
         if best_round(first, between, worth, way).worth >= wanted:
             return np.column_stack([places, worth])
@@ -118,16 +118,16 @@ class PrizesTask(Numbered, Swimming):
     TERMS = ("reward_progress", "reward_prize", "reward_effort")
     entries: tuple[Entry, ...] = (*("vector", "scalar") * N_PRIZES, "scalar")
 
-    def __init__(self, about: Prizes, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
+    def __init__(self, config: Prizes, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
         Swimming.__init__(self, replace(options, random_heading=True), n_robots, threads)
-        self.about, self.waypoint_radius = about, about.radius
+        self.config, self.waypoint_radius = config, config.radius
         self.prizes = np.zeros((n_robots, N_PRIZES, 3))
         self.taken = np.zeros(n_robots)
         self._hub = np.zeros((n_robots, 2))
         self._number(split)
 
     def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
-        self.prizes[robot] = draw_prizes(rng, self.about)
+        self.prizes[robot] = draw_prizes(rng, self.config)
 
     def _begin(self, robots: Flags) -> None:
         self.taken[robots] = 0.0
@@ -151,7 +151,7 @@ class PrizesTask(Numbered, Swimming):
         second = np.where(near[:, 1, 2:] > 0.0, near[:, 1, :2], near[:, 0, :2])
         return np.concatenate([hub + near[:, 0, :2], hub + second], axis=1)
 
-    def _wanted(self) -> Floats:
+    def _task_observation(self) -> Floats:
         near = self._nearest_first(self.seen_hub())
         places = self._in_body_frame(near[..., :2]) / self.scene.robot.limb_length
         seen = np.concatenate([places, near[..., 2:]], axis=-1).reshape(self.n_robots, -1)
@@ -159,26 +159,26 @@ class PrizesTask(Numbered, Swimming):
 
     def _share_left(self) -> Floats:
         """Share of time that is left."""
-        return np.maximum(0.0, 1.0 - self.simulator.time / self.about.seconds)
+        return np.maximum(0.0, 1.0 - self.simulator.time / self.config.seconds)
 
-    def _score(self, hub: Floats, pulses: Floats) -> Score:
-        about, worth = self.about, self.prizes[..., 2]
+    def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
+        config, worth = self.config, self.prizes[..., 2]
         before, after = (np.exp(-self._distances(at) / ATTRACTION) for at in (self._hub, hub))
-        in_time = self.simulator.time <= about.seconds * (1.0 + ROUNDING)
-        reached = (self._distances(hub) <= about.radius) & in_time[:, None]
+        in_time = self.simulator.time <= config.seconds * (1.0 + ROUNDING)
+        reached = (self._distances(hub) <= config.radius) & in_time[:, None]
         gained = np.where(reached, worth, 0.0).sum(axis=1)
         terms = {
-            "reward_progress": about.progress * (worth * (after - before)).sum(axis=1),
-            "reward_prize": about.prize * gained,
-            "reward_effort": -about.effort * pulses,
+            "reward_progress": config.progress * (worth * (after - before)).sum(axis=1),
+            "reward_prize": config.prize * gained,
+            "reward_effort": -config.effort * pulses,
         }
         worth[reached] = 0.0
         self.taken += gained
         self._hub = hub.copy()
         none_left = (worth == 0.0).all(axis=1)
-        return Score(terms, none_left, none_left | (self.simulator.time >= about.seconds * (1.0 - ROUNDING)))
+        return Score(terms, none_left, none_left | (self.simulator.time >= config.seconds * (1.0 - ROUNDING)))
 
-    def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
+    def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
         nearest = self._distances(hub).min(axis=1)
         return {
             "distance": np.where(np.isinf(nearest), 0.0, nearest),
@@ -190,7 +190,7 @@ class PrizesTask(Numbered, Swimming):
         """The prizes that are left, and what they are worth."""
         left = self.prizes[robot, self.prizes[robot, :, 2] > 0.0]
         return Scenery(
-            rings=tuple(Ring(prize[:2], self.about.radius, f"{prize[2]:g}") for prize in left),
+            rings=tuple(Ring(prize[:2], self.config.radius, f"{prize[2]:g}") for prize in left),
             progress=f"{self.taken[robot]:g} taken, {left[:, 2].sum():g} left",
         )
 

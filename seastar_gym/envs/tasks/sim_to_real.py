@@ -96,11 +96,11 @@ class SimToReal(Challenge):
 class SimToRealTask(Numbered, SwimTask):
     """Task of robots that a camera sees, and whose numbers are drawn."""
 
-    def __init__(self, about: SimToReal, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
-        self.about = about
+    def __init__(self, config: SimToReal, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
+        self.config = config
         options = replace(
-            options, path="random", random_heading=True, reward=about.reward, randomization=about.randomization,
-            sight=about.sight if options.sight is None else options.sight,
+            options, path="random", random_heading=True, reward=config.reward, randomization=config.randomization,
+            sight=config.sight if options.sight is None else options.sight,
         )  # fmt: skip
         SwimTask.__init__(self, options, n_robots, threads)
         self._tells_errors = False  # errors were measured of equally strong limbs

@@ -112,20 +112,20 @@ class StationTask(Numbered, Swimming):
     TERMS = ("reward_progress", "reward_distance", "reward_effort")
     observes_commands = True
 
-    def __init__(self, about: Station, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
-        scene, draws = options.modelled, AnyDirection(about.current)
+    def __init__(self, config: Station, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
+        scene, draws = options.modelled, AnyDirection(config.current)
         water = Water() if scene.fluid is None else scene.fluid
         flowing = replace(scene, fluid=replace(water, current=UniformCurrent()))
         options = replace(options, scene=flowing, fidelity=None, random_heading=True)
         Swimming.__init__(self, options, n_robots, threads, draws=draws)
-        self.about, self.scene, self.waypoint_radius = about, scene, about.tolerance
+        self.config, self.scene, self.waypoint_radius = config, scene, config.tolerance
         self.station = np.zeros((n_robots, 2))
         self._distance = np.zeros(n_robots)
         self._tells_errors = False  # errors were measured in still water
         self._number(split)
 
     def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
-        distance, direction = rng.uniform(*self.about.distance), rng.uniform(-np.pi, np.pi)
+        distance, direction = rng.uniform(*self.config.distance), rng.uniform(-np.pi, np.pi)
         self.station[robot] = distance * np.cos(direction), distance * np.sin(direction)
 
     def _begin(self, robots: Flags) -> None:
@@ -139,22 +139,22 @@ class StationTask(Numbered, Swimming):
     def _targets(self) -> Floats:
         return np.concatenate([self.station, self.station], axis=1)
 
-    def _score(self, hub: Floats, pulses: Floats) -> Score:
+    def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
         before, self._distance = self._distance, self._measure(hub)
-        about, counted = self.about, np.minimum(self._distance, FARTHEST_COUNTED)
+        config, counted = self.config, np.minimum(self._distance, FARTHEST_COUNTED)
         terms = {
-            "reward_progress": about.progress * (before - self._distance),
-            "reward_distance": -about.nearness * self.decision_period * counted,
-            "reward_effort": -about.effort * pulses,
+            "reward_progress": config.progress * (before - self._distance),
+            "reward_distance": -config.nearness * self.decision_period * counted,
+            "reward_effort": -config.effort * pulses,
         }
-        return Score(terms, self._distance <= about.tolerance, np.zeros(self.n_robots, bool))
+        return Score(terms, self._distance <= config.tolerance, np.zeros(self.n_robots, bool))
 
-    def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
+    def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
         return {"distance": self._measure(hub), "station": self.station.copy()}
 
     def scenery(self, robot: int) -> Scenery:
         """The station; pictures show the current by themselves."""
         return Scenery(
-            rings=(Ring(self.station[robot], self.about.tolerance),),
+            rings=(Ring(self.station[robot], self.config.tolerance),),
             progress=f"{1000.0 * self._distance[robot]:.1f} mm off",
         )

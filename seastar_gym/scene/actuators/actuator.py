@@ -12,11 +12,12 @@ Where numbers of an actuator differ from robot to robot (see per_robot.py), curv
 """
 
 import math
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym import renamed
 from seastar_gym.scene.checks import shown
 from seastar_gym.scene.number import Numbers
 
@@ -54,6 +55,7 @@ class Actuator(Protocol):
         ...
 
 
+@renamed.methods
 class ActuatorBase(Actuator):
     """Base of actuators, with the answers of one that remembers nothing and says no more than it has to.
 
@@ -62,7 +64,7 @@ class ActuatorBase(Actuator):
     mirror: (index, sign) for each number of the state: number k of the mirrored limb is sign times number `index` of
         the limb. The same holds for the numbers of `observe`. None: it is not known.
     heating_power: Electric power of a heated wire [W]; NaN: it is not known.
-    can_be_deaf: Whether there ever are wires that cannot be heated.
+    can_be_refractory: Whether there ever are wires that cannot be heated.
     """
 
     @property
@@ -82,7 +84,7 @@ class ActuatorBase(Actuator):
         return math.nan
 
     @property
-    def can_be_deaf(self) -> bool:
+    def can_be_refractory(self) -> bool:
         return False
 
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
@@ -111,7 +113,7 @@ class ActuatorBase(Actuator):
         """
         return np.full_like(commands, math.nan)
 
-    def deaf_wires(self, state: Floats) -> Mask | None:
+    def refractory_wires(self, state: Floats) -> Mask | None:
         """Wires for + and - that cannot be heated now, shape (*S, 2); None: it is not known.
 
         state: Shape (*S, n_state).
@@ -131,7 +133,11 @@ class Adapted(ActuatorBase):
 
 
 def _own_or_base(name: str) -> property:
-    return property(lambda self: getattr(self.own if hasattr(self.own, name) else super(Adapted, self), name))
+    def answer(self: Adapted) -> Any:
+        own = renamed.name_in(self.own, "ActuatorBase", name)
+        return getattr(super(Adapted, self), name) if own is None else getattr(self.own, own)
+
+    return property(answer)
 
 
 for _name in {name for kind in (Actuator, ActuatorBase) for name in vars(kind) if not name.startswith("_")}:

@@ -159,11 +159,11 @@ class ThermalSma(HeatingAndCooling, WirePair):
         return np.concatenate([temperatures, numbers[..., 2:], np.zeros_like(temperatures)], axis=-1)
 
     @property
-    def can_be_deaf(self) -> bool:
+    def can_be_refractory(self) -> bool:
         """Whether there ever are wires that cannot be heated."""
         return self.largest_temperature is not None
 
-    def deaf_wires(self, state: Floats) -> NDArray[np.bool_]:
+    def refractory_wires(self, state: Floats) -> NDArray[np.bool_]:
         """Wires that cannot be heated now, shape (..., 2): those at the largest temperature."""
         if self.largest_temperature is None:
             return np.zeros((*state.shape[:-1], 2), dtype=bool)

@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym import renamed
 from seastar_gym.scene.actuators.heating import WIRE_POWER, WirePair
 from seastar_gym.scene.checks import require_flag
 from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive
@@ -21,6 +22,7 @@ COLD = 1e-9
 
 
 @register_part
+@renamed.arguments
 @dataclass(frozen=True)
 class SmaWires(WirePair):
     """Actuator of two wires per limb, + and -, that contract linearly while they are heated and relax while they cool.
@@ -42,7 +44,7 @@ class SmaWires(WirePair):
     heating_time: Time in which a heated wire contracts [s].
     cooling_time: Time in which it relaxes [s].
     period: Length of a stroke [s]. None means heating_time + cooling_time.
-    deaf: Whether a limb ignores commands until both its wires are cold.
+    refractory: Whether a limb ignores commands until both its wires are cold.
     heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
     """
 
@@ -50,7 +52,7 @@ class SmaWires(WirePair):
     heating_time: Annotated[float, positive("s")] = 0.1
     cooling_time: Annotated[float, positive("s")] = 0.9
     period: Annotated[float, positive("s")] = None  # type: ignore[assignment]  # a number after __post_init__
-    deaf: bool = False
+    refractory: bool = False
     heating_power: Annotated[float, not_negative("W")] = WIRE_POWER
 
     def __post_init__(self) -> None:
@@ -58,7 +60,7 @@ class SmaWires(WirePair):
         if self.period is None:
             object.__setattr__(self, "period", self.heating_time + self.cooling_time)
             check_numbers(self)  # which refuses a sum beyond all floats
-        require_flag("deaf", self.deaf)
+        require_flag("refractory", self.refractory)
 
     @property
     def corners(self) -> tuple[float, ...]:
@@ -80,7 +82,7 @@ class SmaWires(WirePair):
         return turned, np.concatenate([contraction[-1], self._left_after(since[-1], left)], axis=-1)
 
     def _left(self, t: Floats, commands: Floats, state: Floats) -> Floats:
-        heard = np.where(self.deaf_wires(state)[..., 0], 0.0, commands) if self.deaf else commands
+        heard = np.where(self.refractory_wires(state)[..., 0], 0.0, commands) if self.refractory else commands
         return super()._left(t, heard, state)
 
     def _contraction(self, since: Floats, before: Floats, left: Floats) -> Floats:
@@ -102,11 +104,11 @@ class SmaWires(WirePair):
         return np.concatenate([numbers, np.zeros_like(numbers)], axis=-1)
 
     @property
-    def can_be_deaf(self) -> bool:
+    def can_be_refractory(self) -> bool:
         """Whether there ever are wires that cannot be heated."""
-        return self.deaf
+        return self.refractory
 
-    def deaf_wires(self, state: Floats) -> Mask:
-        """Wires that cannot be heated now, shape (..., 2): both of a deaf limb until both are cold, otherwise none."""
+    def refractory_wires(self, state: Floats) -> Mask:
+        """Wires that cannot be heated now, shape (..., 2): both of a limb until both are cold, or none."""
         warm = (state[..., :2] > COLD).any(axis=-1) | (state[..., 2:] > 0.0).any(axis=-1)
-        return np.stack([warm & self.deaf, warm & self.deaf], axis=-1)
+        return np.stack([warm & self.refractory, warm & self.refractory], axis=-1)

@@ -234,10 +234,10 @@ def test_what_an_actuator_of_ones_own_does_not_say_is_not_known():
     assert not plain.has_memory and plain.mirror == () and plain.rest.shape == (0,)
     assert remembering.has_memory and remembering.mirror is None and remembering.rest.shape == (1,)
     for actuator in (plain, remembering):
-        assert actuator.peak_angle == 0.3 and actuator.corners == Triangle.corners and not actuator.can_be_deaf
+        assert actuator.peak_angle == 0.3 and actuator.corners == Triangle.corners and not actuator.can_be_refractory
         assert np.isnan(actuator.heating_power) and actuator.recall(np.ones(1)) is None
         assert np.isnan(actuator.seconds_heated(np.ones(2), np.ones(5), np.ones((5, 1)))).all()
-        assert actuator.deaf_wires(np.ones((5, 1))) is None
+        assert actuator.refractory_wires(np.ones((5, 1))) is None
 
 
 def test_what_an_actuator_of_ones_own_says_is_heeded():

@@ -16,7 +16,7 @@ from strokes import assert_same, ternary
 NUMERICS = Numerics("implicit-midpoint", 0.01)
 SINGLE = {name: actuator for name, actuator in ACTUATORS.items() if Scene(actuator=actuator).n_robots is None} | {
     "wires": SmaWires(),
-    "deaf wires": SmaWires(deaf=True),
+    "refractory wires": SmaWires(refractory=True),
     "thermal": ThermalSma(),
     "hot": ThermalSma(largest_temperature=50.0),
     "slow": Limited(SmaPulse(), largest_rate=0.4),

@@ -166,7 +166,7 @@ def test_heating_ends_exactly_where_the_limit_is_reached():
     assert SAFE.seconds_heated(np.array([0.0, 0.2]), np.ones(()), state) == pytest.approx(time, rel=1e-12)
     _, at_limit = SAFE.respond(np.array([0.0, time]), np.ones(()), state)
     assert at_limit[0] == pytest.approx(LIMIT, rel=1e-14) and at_limit[4] == 0.0
-    np.testing.assert_array_equal(SAFE.deaf_wires(np.stack([state, at_limit])), [[False, False], [True, False]])
+    np.testing.assert_array_equal(SAFE.refractory_wires(np.stack([state, at_limit])), [[False, False], [True, False]])
     _, after = SAFE.respond(np.array([0.0, time + 0.03]), np.ones(()), state)
     assert after[0] == pytest.approx(20.0 + (LIMIT - 20.0) * np.exp(-0.03 / 0.42), rel=1e-12)
 

@@ -70,12 +70,12 @@ def test_no_command_leaves_a_pulse_alone_and_a_new_one_replaces_it():
 
 
 def test_a_deaf_limb_ignores_commands_until_both_wires_are_cold():
-    deaf, commands = SmaWires(deaf=True), np.array([-1.0, -1.0, -1.0])
+    refractory, commands = SmaWires(refractory=True), np.array([-1.0, -1.0, -1.0])
     states = np.array([[0.2, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1e-3], [1e-17, 0.0, 0.0, 0.0]])
-    np.testing.assert_array_equal(deaf.deaf_wires(states), [[True, True], [True, True], [False, False]])
-    assert not WIRES.deaf_wires(states).any()
-    np.testing.assert_allclose(deaf.seconds_heated(np.array([0.0, 1.0]), commands, states), [0.0, 1e-3, 0.1])
-    turned, _ = deaf.respond(np.array([0.0, 0.009]), commands, states)
+    np.testing.assert_array_equal(refractory.refractory_wires(states), [[True, True], [True, True], [False, False]])
+    assert not WIRES.refractory_wires(states).any()
+    np.testing.assert_allclose(refractory.seconds_heated(np.array([0.0, 1.0]), commands, states), [0.0, 1e-3, 0.1])
+    turned, _ = refractory.respond(np.array([0.0, 0.009]), commands, states)
     np.testing.assert_allclose(turned[1] / PEAK, [0.2 - 0.01, -0.01 + 0.008 / 0.9, -0.09], atol=SMALL)
 
 
@@ -106,7 +106,7 @@ def test_corners_are_those_of_the_wire_whatever_the_period(period):
 
 @pytest.mark.parametrize(
     "change",
-    [{"deaf": 1}, {"period": None, "heating_time": 1e308, "cooling_time": 1e308}],
+    [{"refractory": 1}, {"period": None, "heating_time": 1e308, "cooling_time": 1e308}],
 )  # fmt: skip
 def test_wires_that_cannot_be_are_refused(change):
     with assert_refused(next(iter(change))):

@@ -17,8 +17,8 @@ from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar
 from seastar_gym.controllers.contract import actions_of
 from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.foreign import load_model
-from seastar_gym.controllers.roster import load_agents
+from seastar_gym.controllers.registry import load_agents
+from seastar_gym.controllers.third_party import load_model
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.many import swim_many
 from seastar_gym.evaluation.swim import swim

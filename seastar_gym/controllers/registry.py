@@ -11,7 +11,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from seastar_gym.controllers import foreign, learned, learner_zip
+from seastar_gym.controllers import checkpoint, learned, third_party
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.planner import Planner, gait_planner
@@ -31,7 +31,7 @@ from seastar_gym.scene.checks import (
 from seastar_gym.scene.numerics import Fidelity
 
 AGENTS: dict[str, Callable[[Scene, float | None, str | None], Policy]] = {
-    "learned": lambda scene, decision_period, task: learned.load(learned.in_the_box(decision_period, task=task)),
+    "learned": lambda scene, decision_period, task: learned.load(learned.bundled_file(decision_period, task=task)),
     "greedy": lambda scene, decision_period, task: GreedyPolicy(scene, decision_period=decision_period),
     "planner": lambda scene, decision_period, task: Planner(decision_period=decision_period),  # at fidelity "fast"
     "gait-planner": lambda scene, decision_period, task: gait_planner(decision_period),  # likewise
@@ -40,8 +40,8 @@ AGENTS: dict[str, Callable[[Scene, float | None, str | None], Policy]] = {
 decisions [s], None for strokes, and the name of the task, None for waypoints."""
 
 HELP = (
-    f"Agents: {', '.join(AGENTS)} (learned is the policy in the box for the task and the time between decisions); "
-    "policies in the box by name, such as seastar-0.2s; "
+    f"Agents: {', '.join(AGENTS)} (learned is the bundled policy for the task and the time between decisions); "
+    "bundled policies by name, such as timed-0.2s; "
     f"scripted gaits, {', '.join(GAITS)}, random, or a pair of limbs such as 4+,1-; files of policies (.safetensors, "
     "or a model.zip of train.py or of plain Stable-Baselines3); module:function, which gets an environment and returns "
     "anything with predict. A model.zip of plain Stable-Baselines3 and module:function execute the code of whoever "
@@ -154,12 +154,12 @@ def files_of(name: str, decision_period: float | None = None) -> list[Path]:
 
     decision_period: Time between decisions [s]. None means strokes.
     """
-    if foreign.is_function(name):
-        return [foreign.module_file(name)]
-    known = learned.by_name()
-    if name != "learned" and name not in known and not _is_file(name):
+    if third_party.is_function(name):
+        return [third_party.module_file(name)]
+    bundled = learned.bundled_file(decision_period) if name == "learned" else learned.file_of(name)
+    if bundled is None and not _is_file(name):
         return []
-    file = learned.in_the_box(decision_period) if name == "learned" else known.get(name, Path(name))
+    file = bundled or Path(name)
     return [file, file.with_suffix(".json")] if file.suffix == ".safetensors" else [file]
 
 
@@ -177,10 +177,11 @@ def _load_agent(
 ) -> Policy:
     if name in AGENTS:
         return AGENTS[name](scene, decision_period, task)
-    if name in learned.by_name():
-        return learned.load(learned.by_name()[name])
-    if foreign.is_function(name):
-        return foreign.call_function(name, make_env())
+    bundled = learned.file_of(name)
+    if bundled is not None:
+        return learned.load(bundled)
+    if third_party.is_function(name):
+        return third_party.call_function(name, make_env())
     return _load_file(name) if _is_file(name) else _scripted(name, seed, decision_period, scene.robot.n_limbs)
 
 
@@ -198,10 +199,10 @@ def _scripted(name: str, seed: int, decision_period: float | None, n_limbs: int)
 def _load_file(name: str) -> Policy:
     if not name.endswith(".zip"):
         return learned.load(name)
-    if not foreign.is_model(name):
-        return learner_zip.load(name)
+    if not third_party.is_model(name):
+        return checkpoint.load(name)
     try:
-        return foreign.load_model(name)
+        return third_party.load_model(name)
     except ModuleNotFoundError as missing:
         raise ValueError(
             f'A model.zip of Stable-Baselines3 needs {missing.name}: pip install "seastar-gym[train]".'

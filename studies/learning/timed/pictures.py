@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from studies.learning.in_time.tables import PENTAGON, Runs
+from studies.learning.timed.tables import PENTAGON, Runs
 from studies.style import CYCLE, as_numbers, subplots
 
 MARKERS = "osD^vP*X"

@@ -1,5 +1,6 @@
 """Agents by name: one line adds one, and the command lines tell all names."""
 
+import json
 import json.decoder
 from pathlib import Path
 
@@ -11,8 +12,9 @@ from refusals import assert_refused
 from seastar_gym import Scene, Seastar
 from seastar_gym.cli.main import main
 from seastar_gym.controllers.contract import actions_in, actions_of
-from seastar_gym.controllers.learned import SHIPPED, in_the_box, of_task
-from seastar_gym.controllers.roster import AGENTS, default_agents, files_of, load_agent, load_agents
+from seastar_gym.controllers.description import Description
+from seastar_gym.controllers.learned import BUNDLED, bundled_file, by_name, of_task, pretrained
+from seastar_gym.controllers.registry import AGENTS, default_agents, files_of, load_agent, load_agents
 from seastar_gym.controllers.scripted import GAITS, scripted
 from seastar_gym.envs.paths import PATHS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -56,14 +58,14 @@ def test_agents_by_default_fit_the_robot(n_limbs, names):
 
 
 def test_what_a_policy_is_made_of_has_files():
-    box = in_the_box(None)
+    box = bundled_file(None)
     assert files_of("learned") == [box, box.with_suffix(".json")]
-    assert files_of("learned", 0.5) == [in_the_box(0.5), in_the_box(0.5).with_suffix(".json")]
+    assert files_of("learned", 0.5) == [bundled_file(0.5), bundled_file(0.5).with_suffix(".json")]
     assert files_of("runs/mine.safetensors") == [Path("runs/mine.safetensors"), Path("runs/mine.json")]
     assert files_of("model.zip") == [Path("model.zip")] and files_of("runs/mine") == [Path("runs/mine")]
-    named = in_the_box(0.2)
-    assert files_of("seastar-0.2s") == [named, named.with_suffix(".json")]
-    assert load_agents(["seastar-0.2s"], decision_period=0.2)["seastar-0.2s"].decision_period == 0.2
+    named = bundled_file(0.2)
+    assert files_of("timed-0.2s") == [named, named.with_suffix(".json")]
+    assert load_agents(["timed-0.2s"], decision_period=0.2)["timed-0.2s"].decision_period == 0.2
     assert [files_of(name) for name in ("greedy", "planner", "straight", "4+,1-")] == [[]] * 4
     assert files_of("json.decoder:JSONDecoder") == [Path(json.decoder.__file__)]
     for nothing in ("nowhere_at_all:make", "sys:exit", "nowhere.at_all:make"):
@@ -72,16 +74,27 @@ def test_what_a_policy_is_made_of_has_files():
 
 
 def test_the_policy_in_the_box_is_that_of_the_task_and_the_decisions():
-    assert [in_the_box(period).name for period in (None, 0.5, 0.1)] == [
-        "seastar.safetensors", "seastar-0.5s.safetensors", "seastar-0.1s.safetensors",
+    assert [bundled_file(period).name for period in (None, 0.5, 0.1)] == [
+        "strokes.safetensors", "timed-0.5s.safetensors", "timed-0.1s.safetensors",
     ]  # fmt: skip
-    of_miswired = SHIPPED.parent / "tasks" / "miswired-0.5s.safetensors"
-    assert in_the_box(0.5, task="miswired") == of_task("miswired", 0.5) == of_miswired
+    of_miswired = BUNDLED.parent / "tasks" / "miswired-0.5s.safetensors"
+    assert bundled_file(0.5, task="miswired") == of_task("miswired", 0.5) == of_miswired
     assert of_task("miswired", None).name == "miswired.safetensors"
-    assert in_the_box(0.25, task="miswired").name == "seastar-0.25s.safetensors"  # of waypoints, where there is none
+    assert bundled_file(0.25, task="miswired").name == "timed-0.25s.safetensors"  # of waypoints, where there is none
     for wrong in ({"decision_period": -1.0}, {"decision_period": None, "task": 3}):
         with assert_refused([*wrong][-1]):
-            in_the_box(**wrong)
+            bundled_file(**wrong)
+
+
+def test_a_bundled_policy_has_a_name():
+    for name, file in by_name().items():
+        assert Description.from_facts(json.loads(file.with_suffix(".json").read_text())).scene == pretrained(name).scene
+    assert pretrained().decision_period == 1.0 and pretrained("timed-0.2s").decision_period == 0.2
+    with pytest.warns(DeprecationWarning, match="The policy seastar-0.2s is called timed-0.2s now"):
+        assert pretrained("seastar-0.2s").decision_period == 0.2
+    for wrong in ("timed-0.3s", 0.2):
+        with assert_refused("There is no bundled policy", "take one of strokes, timed-0.2s, timed-0.5s, fail-blind"):
+            pretrained(wrong)
 
 
 def test_a_policy_says_its_action_mode_or_takes_that_of_the_environment():

@@ -1,4 +1,4 @@
-"""Policy in the box, with its card: replaced by a trained one if that is no worse."""
+"""Bundled policy, with its card: replaced by a trained one if that is no worse."""
 
 import sys
 from pathlib import Path
@@ -8,29 +8,29 @@ import numpy as np
 from agents.cards import HELD_OUT_PATHS, write_card
 from agents.training.folder import resume_command
 from agents.training.options import Options
-from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, in_the_box
+from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, bundled_file
 from seastar_gym.controllers.learned import load as load_policy
 from seastar_gym.controllers.learned import save as save_policy
 from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 
 
-def put_in_the_box(options: Options, folder: Path) -> int:
-    """Make the run's policy the one in the box, unless it is worse and not confirmed; returns the exit code."""
+def publish(options: Options, folder: Path) -> int:
+    """Make the run's policy the bundled one, unless it is worse and not confirmed; returns the exit code."""
     policy = load_policy(folder / "policy.safetensors")
-    if not options.ship_anyway and (objection := why_not(policy, options)):
-        command = f"{resume_command(folder)} --ship --ship-anyway"
-        print(f"The policy in the box stays: {objection}. Replace it all the same with\n    {command}", file=sys.stderr)
+    if not options.publish_anyway and (objection := why_not(policy, options)):
+        command = f"{resume_command(folder)} --publish --publish-anyway"
+        print(f"The bundled policy stays: {objection}. Replace it all the same with\n    {command}", file=sys.stderr)
         return 1
-    file = in_the_box(options.ppo.decision_period, SHIPPED)
+    file = bundled_file(options.ppo.decision_period, BUNDLED)
     save_policy(policy, file)
     print(f"In the box: {file}, with its card {write_card(file, options.num_threads).name}")
     return 0
 
 
 def why_not(policy: LearnedPolicy, options: Options) -> str | None:
-    """Reason against replacing the policy in the box by this one, None if there is none."""
-    file = in_the_box(options.ppo.decision_period, SHIPPED)
+    """Reason against replacing the bundled policy by this one, None if there is none."""
+    file = bundled_file(options.ppo.decision_period, BUNDLED)
     if not file.exists():
         return None
     try:

@@ -1,6 +1,6 @@
 """When Newton's last step may be left out, because quadratic convergence foretells that it would be small enough.
 
-After one of its first steps, of size d, the next is expected to be at most d^2/(foreseeable length). That is measured,
+After one of its first steps, of size d, the next is expected to be at most d^2/(quadratic length). That is measured,
 not proved: by `python -m studies.speed.foresight --discretisation chapter` at commit 0e818f3, in 1000 strokes of every
 kind by eight robots, stiff and soft, with edges of 3 to 50 radii, at steps of 0.1 to 20 ms, in water and in vacuum. Had
 every step been just small enough, the one left out would have been
@@ -25,7 +25,7 @@ curvature of drag, about l rho_f C_d/(pi r rho_m), is ten times CURVATURE, as wi
 left out: one that was had been 300 times the tolerance.
 """
 
-from seastar_gym.der.contact.contact import those_apart
+from seastar_gym.der.contact.contact import not_touching
 from seastar_gym.der.geometry import larger
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import load, select, splat
@@ -37,22 +37,22 @@ FORESEEABLE_T = 4.0  # larger values of tan(phi/2) are too near its pole for tha
 
 
 @inlined_kernel
-def predictable(rods, work, iterations, setbacks, phi, move, tolerated):
+def can_skip(rods, work, iterations, setbacks, phi, move, tolerated):
     """Mask of the robots whose next Newton step is expected to be small enough.
 
     iterations, setbacks: Newton steps so far, and how many of them were shortened or needed a convex matrix. phi:
-    Potential before the step [J]. move: Largest node move of the step [m]. tolerated: Tolerance times the foreseeable
+    Potential before the step [J]. move: Largest node move of the step [m]. tolerated: Tolerance times the quadratic
     length [m^2].
     """
     easy = (setbacks <= 0.0) & (iterations <= EASY) & (phi <= load(rods.scales.predictable, 0))
-    easy = those_apart(work, easy)
+    easy = not_touching(work, easy)
     late = select(iterations < EASY, splat(1.0), LATE)
     foreseen = late * move * move <= tolerated
     return easy & foreseen & (largest_hub_t(rods, work) < FORESEEABLE_T)
 
 
 @kernel
-def foreseeable_length(rods, stage):
+def quadratic_length(rods, stage):
     """Length [m] that a Newton step's square is divided by to foresee the size of the next one.
 
     Turning an edge stretches it, and the tension that this makes moves nodes the farther, the stiffer the edges are

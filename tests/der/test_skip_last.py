@@ -8,16 +8,16 @@ import pytest
 from hubs import TEN
 from seastar_gym import Scene, Seastar
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.foresight import (
+from seastar_gym.der.stepping.scales import PREDICTABLE_STRAIN, SLENDER
+from seastar_gym.der.stepping.skip_last import (
     CURVATURE,
     EASY,
     FORESEEABLE_T,
     LATE,
-    foreseeable_length,
+    can_skip,
     largest_hub_t,
-    predictable,
+    quadratic_length,
 )
-from seastar_gym.der.stepping.scales import PREDICTABLE_STRAIN, SLENDER
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes
@@ -37,7 +37,7 @@ def foreseen(iterations=1.0, setbacks=0.0, phi=0.0, move=0.99e-5, tolerated=1e-1
     WORK.hub_t[:] = 0.5
     WORK.hub_t[-1] = t
     numbers = map(Lanes, (iterations, setbacks, phi, move, tolerated))
-    mask = plain(predictable.plain(RODS, WORK, *numbers))
+    mask = plain(can_skip.plain(RODS, WORK, *numbers))
     assert mask.all() == mask.any()
     return bool(mask.all())
 
@@ -63,13 +63,13 @@ def test_limbs_that_touch_are_not_predictable():
     touching = touching_limbs(apart=3)
     touching.work.contact.touching[0] = np.arange(N_LANES) >= 3
     numbers = map(Lanes, (1.0, 0.0, 0.0, 1e-9, 1.0))
-    mask = plain(predictable.plain(touching.rods, touching.work, *numbers))
+    mask = plain(can_skip.plain(touching.rods, touching.work, *numbers))
     np.testing.assert_array_equal(mask, np.arange(N_LANES) < 3)
 
 
 def length(gamma: float, **robot: float) -> float:
     rods = make_rods(Scene(Seastar(nodes_per_limb=10, **robot)))
-    return float(np.max(plain(foreseeable_length.plain(rods, SimpleNamespace(gamma=Lanes(gamma))))))
+    return float(np.max(plain(quadratic_length.plain(rods, SimpleNamespace(gamma=Lanes(gamma))))))
 
 
 def test_the_foreseeable_length_of_light_edges_is_a_fraction_of_the_shortest():

@@ -1,4 +1,4 @@
-"""Frames: what all robots of a lane batch have in common, a scene, and a gait or a controller."""
+"""Configurations: what all robots of a lane batch have in common, a scene, and a gait or a controller."""
 
 import hashlib
 import json
@@ -10,8 +10,8 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
 from seastar_gym.scene.per_robot import with_numbers
 from seastar_gym.sweep.axes import PARTS
+from seastar_gym.sweep.controllers import Controller, Route, controller_of
 from seastar_gym.sweep.gait import Gait, gait_of
-from seastar_gym.sweep.pilots import Course, Pilot, pilot_of
 from seastar_gym.version import __version__
 
 FORM = 2
@@ -27,34 +27,34 @@ class Swim:
 
 
 @dataclass(frozen=True)
-class Frame:
+class Configuration:
     """Scene and gait, or controller, of a lane batch, before its robots get their own numbers.
 
     gait, swim: Of robots without a controller.
     labels: What was chosen, by the name of the axis: texts or numbers.
-    pilot: Controller, None for a gait.
+    controller: Controller, None for a gait.
     """
 
     scene: Scene
     gait: Gait
     swim: Swim
     labels: tuple[tuple[str, Any], ...]
-    pilot: Pilot | None = None
+    controller: Controller | None = None
 
     @cached_property
     def text(self) -> str:
         """All that results depend on except the numbers of robots, as JSON."""
         told = {"scene": self.scene.to_dict(), "labels": self.labels, "version": __version__, "form": FORM}
-        if self.pilot is None:
+        if self.controller is None:
             told |= {"commands": self.gait.commands, "interval": self.gait.interval, **asdict(self.swim)}
         else:
-            told["pilot"] = asdict(self.pilot)
+            told["pilot"] = asdict(self.controller)
         return json.dumps(told, sort_keys=True)
 
     @property
     def intervals(self) -> int:
         """Intervals, such as strokes, that every robot swims; 0 for controllers, which end when they arrive."""
-        return self.swim.settling + self.swim.measured if self.pilot is None else 0
+        return self.swim.settling + self.swim.measured if self.controller is None else 0
 
     @cached_property
     def digest(self) -> bytes:
@@ -62,21 +62,22 @@ class Frame:
         return hashlib.sha256(self.text.encode()).digest()
 
 
-def frame_with(
-    scene: Scene, gait: Any, swim: Swim, choices: dict[str, tuple[Any, Any]], course: Course = Course()
-) -> Frame:
-    """Frame of a scene in which choices, (value, label) by the name of the axis, have replaced what was there.
+def configuration_with(
+    scene: Scene, gait: Any, swim: Swim, choices: dict[str, tuple[Any, Any]], route: Route = Route()
+) -> Configuration:
+    """Configuration of a scene in which choices, (value, label) by the name of the axis, have replaced what was there.
 
-    course: What controllers swim.
+    route: What controllers swim.
     """
     values = {name: value for name, (value, _) in choices.items()}
     try:
         changed = scene_with(scene, values)
-        pilot = pilot_of(values["controller"], course, changed) if "controller" in values else None
-        chosen_gait = gait_of(values.get("gait", gait), changed) if pilot is None else Gait(())
+        controller = controller_of(values["controller"], route, changed) if "controller" in values else None
+        chosen_gait = gait_of(values.get("gait", gait), changed) if controller is None else Gait(())
     except TypeError as unfit:
         raise ValueError(f"{shown(values)} do not fit the scene: {unfit}.") from None
-    return Frame(changed, chosen_gait, swim, tuple((name, label) for name, (_, label) in choices.items()), pilot)
+    labels = tuple((name, label) for name, (_, label) in choices.items())
+    return Configuration(changed, chosen_gait, swim, labels, controller)
 
 
 def scene_with(scene: Scene, values: dict[str, Any]) -> Scene:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from stable_baselines3 import SAC
 
-from seastar_gym.controllers import learner_zip
+from seastar_gym.controllers import checkpoint
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.options import make_scene
@@ -18,11 +18,11 @@ from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.statistics import mean_with_interval
 from seastar_gym.evaluation.swim import swim
 from studies.command import main
-from studies.learning.in_time import study, trainings
-from studies.learning.in_time.shares import ChosenCommands, shares_of_pairs
-from studies.learning.in_time.study import Options
-from studies.learning.in_time.tables import as_markdown, pulses_per_metre
-from studies.learning.in_time.trainings import TRAININGS, ReducedPolicy, Training, learn
+from studies.learning.timed import study, trainings
+from studies.learning.timed.shares import ChosenCommands, shares_of_pairs
+from studies.learning.timed.study import Options
+from studies.learning.timed.tables import as_markdown, pulses_per_metre
+from studies.learning.timed.trainings import TRAININGS, ReducedPolicy, Training, learn
 from symmetries import assert_equivariant
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -74,7 +74,7 @@ def test_pages_beside_the_study_quote_its_mean_of_ten_seeds(page):
 def test_every_learner_is_measured_and_none_twice(small, tmp_path, capsys):
     out = tmp_path / "in_time.json"
     names = ("pairs", "shares", "gaussian", "sac", "td3", "later")
-    command = ["learning.in_time", "--trainings", *names, "--paths", "2", "--again", "fast"]
+    command = ["learning.timed", "--trainings", *names, "--paths", "2", "--again", "fast"]
     command += ["--networks", str(tmp_path), "--out", str(out)]
     assert main([*command, "--seeds", "0"]) == 0
     first = json.loads(out.read_text())
@@ -106,7 +106,7 @@ def test_a_training_begins_with_another_s_network(small, tmp_path, monkeypatch):
     learn("pairs", 0, "fast", tmp_path)
     monkeypatch.setitem(trainings.TRAININGS, "later", replace(trainings.TRAININGS["later"], decisions=0))
     learn("later", 0, "fast", tmp_path)
-    before, after = (learner_zip.load(trainings.network_file(tmp_path, name, 0)) for name in ("pairs", "later"))
+    before, after = (checkpoint.load(trainings.network_file(tmp_path, name, 0)) for name in ("pairs", "later"))
     assert (before.decision_period, after.decision_period) == (0.5, 0.2)
     for name, weights in before.weights.items():
         np.testing.assert_array_equal(after.weights[name], weights)

@@ -10,7 +10,7 @@ from seastar_gym.scene import Scene
 from studies.chapter.pictures import PENTAGON_TIMES
 from studies.chapter.statements import PAIRS, stroke_motion
 from studies.chapter.swims import MM, QUICK, SETTINGS, Floats, Swim
-from studies.kept import rounded
+from studies.results_file import rounded
 
 UNIT = 1e-6
 """Length that counts as one in the data [m]."""
@@ -40,17 +40,17 @@ def as_data(swim: Swim, times: Sequence[float] = ()) -> dict[str, Any]:
     }
 
 
-def from_data(kept: Mapping[str, Any], commands: Floats) -> Swim:
+def from_data(data: Mapping[str, Any], commands: Floats) -> Swim:
     """A swim of which the hub is known, and all nodes at some times; other nodes and velocities are NaN."""
     settings = [each.coarser(step) for each in SETTINGS for step in (0.0, QUICK)]
-    setting = next(each for each in settings if each.label == kept["setting"])
+    setting = next(each for each in settings if each.label == data["setting"])
     scene = Scene(setting.robot, numerics=setting.numerics)
     starts = np.arange(len(commands))[:, None] * scene.actuator.period
-    time = np.append(0.0, (starts + np.array(kept["times_of_a_stroke_s"])).ravel())
+    time = np.append(0.0, (starts + np.array(data["times_of_a_stroke_s"])).ravel())
     positions = np.full((len(time), commands.shape[1], scene.robot.n_nodes, 2), np.nan)
-    positions[:, :, 0] = UNIT * np.stack([np.transpose(kept["hub_x"]), np.transpose(kept["hub_y"])], axis=-1)
+    positions[:, :, 0] = UNIT * np.stack([np.transpose(data["hub_x"]), np.transpose(data["hub_y"])], axis=-1)
     swim = Swim(setting.label, scene, commands, time, positions, np.full_like(positions, np.nan))
-    for at, nodes in kept["robots"].items():
+    for at, nodes in data["robots"].items():
         positions[swim.at(float(at)), 0] = UNIT * np.transpose(nodes)
     return swim
 
@@ -95,7 +95,7 @@ def strokes_table(results: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def kept(straight: Sequence[Swim], pentagon: Sequence[Swim], pairs: Sequence[Swim]) -> dict[str, Any]:
+def as_results(straight: Sequence[Swim], pentagon: Sequence[Swim], pairs: Sequence[Swim]) -> dict[str, Any]:
     """What the pictures and tables of docs/ show: all settings, and the swims in the continuum and with the chapter's.
 
     straight, pentagon: Swims of every setting of SETTINGS. pairs: Of these and of the limit.

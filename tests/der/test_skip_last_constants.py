@@ -1,4 +1,4 @@
-"""Every constant of der/stepping/foresight.py is what plain Newton needs: ten times more or less fails here."""
+"""Every constant of der/stepping/skip_last.py is what plain Newton needs: ten times more or less fails here."""
 
 from functools import cache
 from typing import NamedTuple
@@ -10,10 +10,10 @@ from seastar_gym import Scene, Seastar, SmaPulse, Water
 from seastar_gym.der.energy import elastic_energy
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.foresight import CURVATURE, EASY, FORESEEABLE_T, LATE, largest_hub_t
 from seastar_gym.der.stepping.newton import ROUNDING, take_step
 from seastar_gym.der.stepping.scales import PREDICTABLE_STRAIN, SLENDER
 from seastar_gym.der.stepping.schemes import SCHEMES
+from seastar_gym.der.stepping.skip_last import CURVATURE, EASY, FORESEEABLE_T, LATE, largest_hub_t
 from seastar_gym.der.stepping.stages import begin_stage, end_step
 from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.der.terms.inertia import kinetic_energy
@@ -180,7 +180,7 @@ class Decisions(NamedTuple):
     """Iterations after which some tolerance would leave the next step out, were it foreseen to be as small.
 
     iteration: Its number, from 1. curvature: Next move times edge length over this move squared, the number that
-    foresight.py has a bound for. rate: curvature_rate gamma^2. excess: Curvature over CURVATURE + rate.
+    skip_last.py has a bound for. rate: curvature_rate gamma^2. excess: Curvature over CURVATURE + rate.
     """
 
     iteration: np.ndarray

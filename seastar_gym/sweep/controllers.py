@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from seastar_gym import renamed
 from seastar_gym.controllers.contract import Policy, require_fit
-from seastar_gym.controllers.learned import in_the_box, load
-from seastar_gym.controllers.roster import AGENTS, files_of, load_agent
+from seastar_gym.controllers.learned import bundled_file, load
+from seastar_gym.controllers.registry import AGENTS, files_of, load_agent
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.commands import checked_decision_period
 from seastar_gym.envs.options import Path as SwimPath
@@ -21,9 +22,11 @@ from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number, shown
 
+__getattr__ = renamed.names_of(__name__)
+
 
 @dataclass(frozen=True)
-class Course:
+class Route:
     """What controllers swim: a path, once, from rest.
 
     path: Name of a path, or waypoints [m]. One that is drawn, such as "random", is the same for all designs.
@@ -43,10 +46,10 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Pilot:
+class Controller:
     """A controller, and what it swims.
 
-    name: As in `seastar_gym.controllers.roster`. digest: SHA-256 of the files that it is made of. waypoints: [m].
+    name: As in `seastar_gym.controllers.registry`. digest: SHA-256 of the files that it is made of. waypoints: [m].
     decisions: Decisions at most. decision_period: Time between them [s]. None means a stroke.
     """
 
@@ -66,24 +69,25 @@ class Pilot:
         return load_agent(self.name, SeastarSwimEnv(scene=scene, decision_period=self.decision_period))
 
 
-def pilot_of(name: Any, course: Course, scene: Scene) -> Pilot:
-    """Pilot of a name for a scene. ValueError, or FileNotFoundError, where there is none or a learned one does not fit.
+def controller_of(name: Any, route: Route, scene: Scene) -> Controller:
+    """Controller of a name for a scene.
 
-    Whether agents of one's own fit, their first cell says: they are not made here.
+    ValueError, or FileNotFoundError, where there is none or a learned one does not fit. Whether agents of one's own
+    fit, their first batch says: they are not made here.
     """
     if not isinstance(name, str):
         raise ValueError(f"A controller is the name of an agent, such as learned, not {shown(name)}.")
-    seconds = checked_decision_period(course.decision_period, scene)
-    period = None if seconds == scene.actuator.period else course.decision_period
+    seconds = checked_decision_period(route.decision_period, scene)
+    period = None if seconds == scene.actuator.period else route.decision_period
     files = files_of(name, period)
     if name == "learned" or name.endswith(".safetensors"):
-        policy = load(in_the_box(period) if name == "learned" else name)
+        policy = load(bundled_file(period) if name == "learned" else name)
         require_fit(policy, scene, policy.actions, period)
     elif name not in AGENTS and not files:
         scripted(name, n_limbs=scene.robot.n_limbs, decision_period=period)
-    waypoints = make_path(course.path, np.random.default_rng(HELD_OUT_SEED))
-    return Pilot(
-        name, _digest(files), tuple(map(tuple, waypoints.tolist())), max(1, round(course.seconds / seconds)), period
+    waypoints = make_path(route.path, np.random.default_rng(HELD_OUT_SEED))
+    return Controller(
+        name, _digest(files), tuple(map(tuple, waypoints.tolist())), max(1, round(route.seconds / seconds)), period
     )
 
 

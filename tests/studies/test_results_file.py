@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from studies.chapter import kept as chapter
+from studies.chapter import results as chapter
 from studies.chapter.swims import CHAPTER, swim
-from studies.kept import as_json, keep, rounded
 from studies.learning import traces
+from studies.results_file import as_json, keep, rounded
 
 PLAIN = {"name": "a [list] of\nlines", "numbers": [1, 2.5, None], "rows": [[1, "two"], []], "inner": {"x": [0.1]}}
 

@@ -1,7 +1,7 @@
 """How fast, and with how much heat, do policies swim that decide every 0.5, 0.2 or 0.1 s? Trainings side by side.
 
-    python -m studies.learning.in_time
-    python -m studies.learning.in_time --trainings "0.2 s, coasting" --seeds 0 1 2
+    python -m studies.learning.timed
+    python -m studies.learning.timed --trainings "0.2 s, coasting" --seeds 0 1 2
 
 Every policy swims the pentagon at every fidelity asked for, and held-out random paths at the fidelity of the training.
 Results are written after every training. A training whose result is already in the file is not repeated, nor is one
@@ -26,9 +26,9 @@ from seastar_gym.evaluation.swim import Swim
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
 from studies.frame import Results, Study, require_known
-from studies.learning.in_time.pictures import draw
-from studies.learning.in_time.tables import summary
-from studies.learning.in_time.trainings import TRAININGS, learn
+from studies.learning.timed.pictures import draw
+from studies.learning.timed.tables import summary
+from studies.learning.timed.trainings import TRAININGS, learn
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def told(found: dict[str, Any]) -> str:
 
 
 STUDY = Study(
-    "learning.in_time",
+    "learning.timed",
     study,
     Options,
     "in_time.json",

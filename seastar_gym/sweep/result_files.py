@@ -1,4 +1,4 @@
-"""Parts: the results of a cell each, as Parquet files with units and the scene in their metadata."""
+"""Files of results: those of a batch each, as Parquet files with units and the scene in their metadata."""
 
 import os
 import warnings
@@ -9,22 +9,25 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet
 
+from seastar_gym import renamed
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_file
 from seastar_gym.scene.per_robot import unit_of
-from seastar_gym.sweep.cells import Cell
+from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS, swim
 
+__getattr__ = renamed.names_of(__name__)
 
-def part_of(cell: Cell, device: str = "cpu") -> bytes:
-    """Parquet file of a cell's results. device: Where robots swim, see `Simulator`; the results are the same."""
-    columns = {**dict(cell.frame.labels), **cell.numbers, **swim(cell, device)}
-    arrays = [pa.array([column] * cell.n_robots if name in dict(cell.frame.labels) else column)
+
+def result_file_of(batch: Batch, device: str = "cpu") -> bytes:
+    """Parquet file of a batch's results. device: Where robots swim, see `Simulator`; the results are the same."""
+    columns = {**dict(batch.configuration.labels), **batch.numbers, **swim(batch, device)}
+    arrays = [pa.array([column] * batch.n_robots if name in dict(batch.configuration.labels) else column)
               for name, column in columns.items()]  # fmt: skip
     schema = pa.schema(
-        [_field(name, array, cell.frame.scene) for name, array in zip(columns, arrays, strict=True)],
-        {"seastar_gym": cell.frame.text, "cell": cell.name},
+        [_field(name, array, batch.configuration.scene) for name, array in zip(columns, arrays, strict=True)],
+        {"seastar_gym": batch.configuration.text, "cell": batch.name},
     )
     return to_parquet(pa.Table.from_arrays(arrays, schema=schema))
 
@@ -41,7 +44,7 @@ def to_parquet(table: Any) -> bytes:
     return sink.getvalue().to_pybytes()
 
 
-def read_part(file: Path) -> Any:
+def read_result_file(file: Path) -> Any:
     """Table of a part. ValueError, with one sentence, if it is damaged."""
     try:
         with pa.parquet.ParquetFile(file, page_checksum_verification=True) as part:
@@ -49,24 +52,24 @@ def read_part(file: Path) -> Any:
     except (OSError, pa.ArrowException) as damaged:
         raise ValueError(f"{file} is damaged: {str(damaged).splitlines()[0].rstrip('.')}.") from damaged
     if (table.schema.metadata or {}).get(b"cell") != file.stem.encode():
-        raise ValueError(f"{file} is damaged: it has another cell.")
+        raise ValueError(f"{file} is damaged: it has another batch.")
     return table
 
 
-class Parts:
+class ResultFiles:
     """Folder of a sweep's parts. It may hold those of several sweeps, and several may write into it at once."""
 
     def __init__(self, folder: str | os.PathLike[str]):
         self.folder = Path(folder) / "parts"
 
     def file(self, name: str) -> Path:
-        """File of the cell of this name."""
+        """File of the batch of this name."""
         return self.folder / name[:2] / f"{name}.parquet"
 
     def has(self, name: str) -> bool:
-        """Whether the cell of this name is finished: its part is there and sound."""
+        """Whether the batch of this name is finished: its part is there and sound."""
         try:
-            read_part(self.file(name))
+            read_result_file(self.file(name))
         except ValueError:
             return False
         return True
@@ -76,23 +79,23 @@ class Parts:
         write_atomically(self.file(name), part)
 
     def names(self) -> Iterator[str]:
-        """Names of the cells that have parts."""
+        """Names of the batches that have parts."""
         for place in sorted(self.folder.glob("??/*.parquet")):
             yield place.stem
 
 
-def read_parts(folder: str | os.PathLike[str]) -> Any:
-    """All results of a folder as one pyarrow.Table, in the order of the cells' names.
+def read_results(folder: str | os.PathLike[str]) -> Any:
+    """All results of a folder as one pyarrow.Table, in the order of the batches' names.
 
-    Parts that are damaged are left out with a warning: the same sweep simulates their cells again.
+    Parts that are damaged are left out with a warning: the same sweep simulates their batches again.
     """
     require_file("folder", folder)
     tables = []
-    for file in sorted(Parts(folder).folder.glob("??/*.parquet")):
+    for file in sorted(ResultFiles(folder).folder.glob("??/*.parquet")):
         try:
-            tables.append(read_part(file))
+            tables.append(read_result_file(file))
         except ValueError as damaged:
-            warnings.warn(f"{damaged} It is left out: the same sweep simulates its cell again.", stacklevel=2)
+            warnings.warn(f"{damaged} It is left out: the same sweep simulates its batch again.", stacklevel=2)
     if not tables:
         raise ValueError(f"There are no results in {folder}.")
     return pa.concat_tables(tables, promote_options="default")  # sweeps differ in their columns

@@ -15,12 +15,12 @@ from agents import learner_file
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model, make_training_env
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.controllers import foreign, learner_zip
+from seastar_gym.controllers import checkpoint, third_party
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import Symmetry
 from seastar_gym.scene.numerics import Fidelity
-from studies.learning.in_time.shares import ChosenCommands, shares_of_pairs
+from studies.learning.timed.shares import ChosenCommands, shares_of_pairs
 
 COMMON = Hyperparameters(discount=0.9, rollout=32, num_envs=64, gae_lambda=0.95)
 """Hyperparameters of the trainings, but for what differs."""
@@ -154,9 +154,9 @@ def _write(training: Training, file: Path, model: BaseAlgorithm) -> None:
 
 def _read(training: Training, file: Path, env: BatchVecEnv) -> Policy:
     if training.learner == "pairs":
-        return learner_zip.load(file)
+        return checkpoint.load(file)
     symmetry = Symmetry.of(env.get_attr("scene")[0], "continuous")
-    return ReducedPolicy(foreign.load_model(file), symmetry, getattr(env.env, "table", None))
+    return ReducedPolicy(third_party.load_model(file), symmetry, getattr(env.env, "table", None))
 
 
 def network_file(folder: Path, name: str, seed: int) -> Path:
