@@ -91,4 +91,4 @@ def test_contacts_are_told_by_error_softness_and_the_speed_that_stops_a_robot():
         {what: dict.fromkeys(every, value) for what, value in (("contacts", row), ("bounds", 0.03), ("thrown", 5.0))}
     )
     assert "| `Contact()` | 10 %, 10 % | 5 %, 5 % | fails, fails | 3 % | 20 %, 1 % | 5 | x 2.5 |" in told
-    assert "| `Contact(layer=7e-3)` | | | | 3 % | | 5 | |" in told
+    assert "Contact(layer=7e-3)" not in told  # measured by its promise and speed alone
