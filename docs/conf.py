@@ -13,7 +13,7 @@ author = copyright = "The seastar-gym authors"
 version = release = __version__
 
 extensions = ["myst_parser", "mathml", "generated"]
-exclude_patterns = ["_*"]
+exclude_patterns = ["_*", "drive"]
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 4
 
