@@ -26,7 +26,8 @@ from seastar_gym.simulator.state import State
 
 Floats = NDArray[np.float64]
 
-COUNTS = ("halvings", "rejections", "energy_cuts")
+COUNTS = ("halvings", "rejections", "energy_cuts", "solver_iterations")
+"""Rows of a report that tell whether a swim is one of several branches."""
 
 
 class Motion(NamedTuple):
@@ -53,6 +54,7 @@ class Derivatives(NamedTuple):
     swim: The swim, to the bits of `Simulator`. by: Derivatives by the names of unknowns, per unit of each.
     status: SolverStatus of every interval, shape (n,). After a failure all is NaN.
     halvings, rejections, energy_cuts: Counts of every interval, as in StrokeReport, shape (n,).
+    solver_iterations: Iterations of the linear solver where limbs touched, in every interval, shape (n,).
     """
 
     swim: Motion
@@ -61,21 +63,28 @@ class Derivatives(NamedTuple):
     halvings: NDArray[np.int64]
     rejections: NDArray[np.int64]
     energy_cuts: NDArray[np.int64]
+    solver_iterations: NDArray[np.int64]
 
     @property
     def sentence(self) -> str:
         """What the derivatives are of, in one sentence."""
-        if self.status.any():
-            return f"The solver failed in interval {int(np.flatnonzero(self.status)[0]) + 1}: {self._failure}"
-        counts = {name: int(getattr(self, name).sum()) for name in COUNTS}
-        if not any(counts.values()):
-            return "The derivatives are of the swim as it is: no step was halved and no energy cut."
-        halved, cut = counts["halvings"] + counts["rejections"], counts["energy_cuts"]
-        return f"The derivatives are of the steps that were taken: {halved} were halved and {cut} lost energy."
+        return sentence_of(self.status, {name: getattr(self, name) for name in COUNTS})
 
-    @property
-    def _failure(self) -> str:
-        return SolverStatus(int(self.status.max())).sentence
+
+def sentence_of(status: NDArray[np.int64], counts: dict[str, NDArray[np.int64]]) -> str:
+    """What derivatives of a swim are of, in one sentence, from its status and COUNTS of every interval."""
+    if status.any():
+        first = int(np.flatnonzero(status)[0])
+        return f"The solver failed in interval {first + 1}: {SolverStatus(int(status[first])).sentence}"
+    total = {name: int(count.sum()) for name, count in counts.items()}
+    if not any(total.values()):
+        return "The derivatives are of the swim as it is: no step was halved, no energy cut, and no limb touched."
+    halved, cut = total["halvings"] + total["rejections"], total["energy_cuts"]
+    touched = "some" if total["solver_iterations"] else "no"
+    return (
+        f"The derivatives are of the branch that was taken: {halved} steps were halved, {cut} lost energy, and "
+        f"{touched} limbs touched."
+    )
 
 
 def differentiate(
@@ -94,20 +103,8 @@ def differentiate(
     steps were halved, limbs touched and energies were cut is taken as it came. At the ends of [-1, 1], derivatives in
     commands are those from within; where a wire's rotation has a corner, they are the mean of both sides.
     """
-    require_kind("scene", scene, Scene, "a Scene")
-    if scene.n_robots is not None:
-        raise ValueError("differentiate needs the scene of one robot, such as scene.of_robot(0).")
-    _refuse_unproven(scene)
-    require_texts("by", by)
-    if not by or len(set(by)) < len(by):
-        raise ValueError("by must name one unknown or more, each once.")
-    told = as_finite("commands", commands, (None, scene.robot.n_limbs))
-    length = scene.actuator.period if duration is None else duration
-    require_duration(length, scene.numerics.step)
-    length = float(length)
-    strengths = Simulator(scene, 1, threads=1).limb_strengths
-    for command in told:
-        checked_commands(command[None], scene, strengths)
+    told, length = checked_swim(scene, commands, duration)
+    require_names(by)
     unknowns = unknowns_of(scene, told, by)
     start, slopes = slopes_of_start(scene, state, unknowns)
     rotations, groups = Rotations(scene, state, told, unknowns), _groups(scene, start, slopes)
@@ -125,19 +122,25 @@ def differentiate(
     return Derivatives(value, found, groups[0].counts("status"), **report)
 
 
-def _refuse_unproven(scene: Scene) -> None:
-    """ValueError for terms whose derivatives have not been compared with differences of swims."""
-    robot = scene.robot
-    terms = {
-        "contact": scene.contact is not None,
-        "a body": robot.has_body,
-        "actuators along the limbs": robot.along is not None or robot.stiffening is not None,
-        "loads or gravity": bool(scene.loads) or scene.gravity is not None,
-        "held nodes": bool(scene.held_nodes),
-    }
-    for name, is_there in terms.items():
-        if is_there:
-            raise ValueError(f"There are no derivatives of swims with {name} yet.")
+def checked_swim(scene: Scene, commands: ArrayLike, duration: float | None) -> tuple[Floats, float]:
+    """Commands as an array, and the length of an interval [s]. ValueError if the scene's one robot cannot follow."""
+    require_kind("scene", scene, Scene, "a Scene")
+    if scene.n_robots is not None:
+        raise ValueError("Derivatives need the scene of one robot, such as scene.of_robot(0).")
+    told = as_finite("commands", commands, (None, scene.robot.n_limbs))
+    length = scene.actuator.period if duration is None else duration
+    require_duration(length, scene.numerics.step)
+    strengths = Simulator(scene, 1, threads=1).limb_strengths
+    for command in told:
+        checked_commands(command[None], scene, strengths)
+    return told, float(length)
+
+
+def require_names(by: Sequence[str]) -> None:
+    """ValueError if `by` does not name unknowns, each once."""
+    require_texts("by", by)
+    if not by or len(set(by)) < len(by):
+        raise ValueError("by must name one unknown or more, each once.")
 
 
 class _Group:
@@ -237,11 +240,26 @@ def _joined(groups: list[_Group], start: Start, slopes: Start) -> tuple[Motion, 
 
 def _heading(places: Floats, rises: Floats, rest: Floats, rest_rises: Floats) -> tuple[Floats, Floats]:
     """Heading of every state and its slopes, see body_frame.py."""
+    across, along = turned_from(places, rest)
+    of_places, of_rest = slopes_of_heading(places, rest)
+    rise = np.einsum("knx,knxu->ku", of_places, rises) + np.einsum("knx,nxu->ku", of_rest, rest_rises)
+    return np.arctan2(across, along), rise
+
+
+def turned_from(places: Floats, rest: Floats) -> tuple[Floats, Floats]:
+    """Sums of cross and dot products of node positions, from the hub, with those at rest, of every state."""
     x, y = np.moveaxis(places - places[:, :1], -1, 0)
-    dx, dy = np.moveaxis(rises - rises[:, :1], 2, 0)
-    (a, b), (da, db) = rest.T, np.moveaxis(rest_rises, 1, 0)
-    across, along = y @ a - x @ b, x @ a + y @ b
-    d_across = np.einsum("knu,n->ku", dy, a) - np.einsum("knu,n->ku", dx, b) + y @ da - x @ db
-    d_along = np.einsum("knu,n->ku", dx, a) + np.einsum("knu,n->ku", dy, b) + x @ da + y @ db
-    rise = along[:, None] * d_across - across[:, None] * d_along
-    return np.arctan2(across, along), rise / (across**2 + along**2)[:, None]
+    a, b = rest.T
+    return y @ a - x @ b, x @ a + y @ b
+
+
+def slopes_of_heading(places: Floats, rest: Floats) -> tuple[Floats, Floats]:
+    """Slopes of the heading of every state in its positions, and in those at rest, shape (n + 1, n_nodes, 2) each."""
+    across, along = (part[:, None] for part in turned_from(places, rest))
+    x, y = np.moveaxis(places - places[:, :1], -1, 0)
+    a, b = rest.T
+    squared = across**2 + along**2
+    of_places = np.stack([-along * b - across * a, along * a - across * b], axis=-1) / squared[..., None]
+    of_rest = np.stack([along * y - across * x, -along * x - across * y], axis=-1) / squared[..., None]
+    of_places[:, 0] -= of_places.sum(axis=1)
+    return of_places, of_rest

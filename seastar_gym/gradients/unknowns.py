@@ -35,11 +35,15 @@ class Start(NamedTuple):
 
 
 def start_of(scene: Scene, state: State | None) -> Start:
-    simulator = Simulator(scene, 1, threads=1)
-    if state is not None:
+    rods, nodes = make_rods(scene), np.asarray(scene.robot.nodes(0))
+    if state is None:
+        q, v = np.zeros(2 * rods.n_points), np.zeros(2 * rods.n_points)
+        q[: nodes.size] = nodes.ravel()  # roots of limbs on a body are placed when the swim begins
+    else:
+        simulator = Simulator(scene, 1, threads=1)
         simulator.set_state(state)
-    rest = np.asarray(simulator.coefficients.rest_shapes())
-    return Start(arrays_of(make_rods(scene)), simulator.q[0, :, 0].copy(), simulator.v[0, :, 0].copy(), rest)
+        q, v = simulator.q[0, :, 0].copy(), simulator.v[0, :, 0].copy()
+    return Start(arrays_of(rods), q, v, nodes)
 
 
 class Unknown(NamedTuple):
@@ -91,7 +95,7 @@ def slopes_of_start(scene: Scene, state: State | None, unknowns: Sequence[Unknow
     columns: list[Start] = []
     for unknown in unknowns:
         if unknown.beside:
-            columns.append(_slope_in_number(start, state, unknown))
+            columns.append(slope_in_number(start, state, unknown))
             continue
         n = start.q.size
         nothing = Start([np.zeros(a.shape) for a in start.coefficients], np.zeros(n), np.zeros(n), 0.0 * start.rest)
@@ -105,7 +109,7 @@ def slopes_of_start(scene: Scene, state: State | None, unknowns: Sequence[Unknow
     return start, Start([np.stack(each, axis=-1) for each in coefficients], *(np.stack(f, axis=-1) for f in fields))
 
 
-def _slope_in_number(start: Start, state: State | None, unknown: Unknown) -> Start:
+def slope_in_number(start: Start, state: State | None, unknown: Unknown) -> Start:
     beside = [start_of(scene, state) for scene in unknown.beside]
     if any([a.shape for a in one.coefficients] != [a.shape for a in start.coefficients] for one in beside):
         raise ValueError(f"There is no derivative in {unknown.name}, whose smallest change adds or removes a term.")
@@ -122,61 +126,83 @@ def _slope_in_number(start: Start, state: State | None, unknown: Unknown) -> Sta
     )
 
 
+FORGOTTEN = 4e-16
+"""Relative difference of actuators' states from which on an earlier command has no effect any more."""
+
+
 class Rotations:
     """Rotations of the limbs in intervals one after the other, and their slopes in all unknowns."""
 
     def __init__(self, scene: Scene, state: State | None, commands: Floats, unknowns: Sequence[Unknown]):
-        self._unknowns = unknowns
         self._own: list[tuple[int, Unknown, list[Drive]]] = []
-        self._in_commands, self._stencils = -1, [of_command(command) for command in commands.flat]
-        column = 0
+        self._in_commands, column = -1, 0
         for unknown in unknowns:
             if unknown.name == "commands":
                 self._in_commands = column
             elif unknown.beside and unknown.name.split(".")[0] in ("actuator", "limb_strengths"):
-                drives = [_drive(one, state, 1) for one in unknown.beside]
-                self._own.append((column, unknown, drives))
+                self._own.append((column, unknown, [_drive(one, state) for one in unknown.beside]))
             column += unknown.size
-        self._n, self._commands = column, commands
-        n_changed = 4 * commands.size if self._in_commands >= 0 else 0
-        self._drive = _drive(scene, state, 1 + n_changed)
-        self._changed = self._changes() if n_changed else np.zeros((0, *commands.shape))
-
-    def _changes(self) -> Floats:
-        """Commands of all swims of which one differs, shape (4 commands.size, n_intervals, n_limbs)."""
-        changes = np.zeros((self._commands.size, 4, self._commands.size))
-        for k, stencil in enumerate(self._stencils):
-            changes[k, :, k] = OF_COMMANDS * np.array(stencil.places)
-        return self._commands + changes.reshape(-1, *self._commands.shape)
+        self._n, self._commands, self._scene = column, commands, scene
+        self._drive = _drive(scene, state)
+        self._felt: list[tuple[int, Floats, Floats]] = []
+        """Commands that limbs still feel: number of the interval, and states and commands of drives beside this one."""
 
     def interval(self, k: int, duration: float) -> tuple[Floats, Floats, Floats]:
         """Ends of the time steps of interval k [s], rotations, shape (n_times, n_limbs) [rad], and slopes (.., n)."""
-        told = np.concatenate([self._commands[None, k], self._changed[:, k]])
-        times, turned = _turned(self._drive, told, duration)
-        slopes = np.zeros((*turned.shape[:1], *turned.shape[2:], self._n))
+        told = self._commands[k]
+        before = self._drive.state, self._drive.commands, self._drive.phase
+        times, turned = _turned(self._drive, told[None], duration)
         value = turned[:, 0]
+        slopes = np.zeros((*value.shape, self._n))
         if self._in_commands >= 0:
-            beside = turned[:, 1:].reshape(len(times), -1, 4, turned.shape[2])
-            for n, stencil in enumerate(self._stencils):
-                of_command_n = stencil.slope(value, np.moveaxis(beside[:, n], 1, 0), OF_COMMANDS)
-                slopes[..., self._in_commands + n] = of_command_n
+            self._add_slopes_in_commands(k, duration, before, value, slopes)
         for column, unknown, drives in self._own:
-            grids, beside_it = zip(*(_turned(drive, told[:1], duration) for drive in drives), strict=True)
+            grids, beside_it = zip(*(_turned(drive, told[None], duration) for drive in drives), strict=True)
             if any(len(grid) != len(times) or not np.array_equal(grid, times) for grid in grids):
                 raise ValueError(f"There is no derivative in {unknown.name}, which moves the ends of time steps.")
             slopes[..., column] = CENTRAL.slope(value, np.array([each[:, 0] for each in beside_it]), unknown.step)
         return times, value, slopes
 
+    def _add_slopes_in_commands(
+        self, k: int, duration: float, before: tuple[Floats, Floats, float], value: Floats, slopes: Floats
+    ) -> None:
+        """Let drives beside this one follow the interval, four for every command that is still felt and every limb."""
+        told, n_limbs = self._commands[k], self._commands.shape[1]
+        state, under_way, phase = before
+        stencils = [of_command(command) for command in told]
+        changed = np.repeat(told[None, None], n_limbs, axis=0).repeat(4, axis=1)  # (limb, place, limb)
+        for limb, stencil in enumerate(stencils):
+            changed[limb, :, limb] += OF_COMMANDS * np.array(stencil.places)
+        size = 4 * n_limbs
+        self._felt.append((k, np.repeat(state, size, axis=0), np.repeat(under_way, size, axis=0)))
+        n = size * len(self._felt)
+        drive = Drive(self._scene.actuator, n, n_limbs, self._scene.numerics.step)
+        drive.strengths = np.repeat(self._drive.strengths, n, axis=0)
+        states, commands = (np.concatenate([each[i] for each in self._felt]) for i in (1, 2))
+        drive.put(states, commands, np.full(n, phase))
+        given = np.repeat(told[None], n, axis=0)
+        given[n - size :] = changed.reshape(size, n_limbs)
+        _, turned = _turned(drive, given, duration)
+        still: list[tuple[int, Floats, Floats]] = []
+        for i, (j, _, _) in enumerate(self._felt):
+            own = slice(size * i, size * (i + 1))
+            for limb, command in enumerate(self._commands[j]):
+                beside = turned[:, own][:, 4 * limb : 4 * limb + 4]
+                column = self._in_commands + n_limbs * j + limb
+                slopes[..., column] = of_command(command).slope(value, np.moveaxis(beside, 1, 0), OF_COMMANDS)
+            if not np.allclose(drive.state[own], self._drive.state, rtol=FORGOTTEN, atol=0.0):
+                still.append((j, drive.state[own], drive.commands[own]))
+        self._felt = still
 
-def _drive(scene: Scene, state: State | None, n_robots: int) -> Drive:
-    """Drive of as many robots as `Simulator` would have it."""
+
+def _drive(scene: Scene, state: State | None) -> Drive:
+    """Drive of one robot as `Simulator` would have it."""
     simulator = Simulator(scene, 1, threads=1)
     if state is not None:
         simulator.set_state(state)
-    drive, one = Drive(scene.actuator, n_robots, scene.robot.n_limbs, scene.numerics.step), simulator.get_state()
-    drive.strengths = np.repeat(simulator.limb_strengths, n_robots, axis=0)
-    actuators, commands, phase = (np.repeat(part, n_robots, axis=0) for part in one[3:6])  # type: ignore[arg-type]
-    drive.put(actuators, commands, phase)
+    drive, one = Drive(scene.actuator, 1, scene.robot.n_limbs, scene.numerics.step), simulator.get_state()
+    drive.strengths = simulator.limb_strengths
+    drive.put(*one[3:6])  # type: ignore[arg-type]
     return drive
 
 

@@ -1,0 +1,379 @@
+"""`record` and `gradient`: the gradient of a number of a swim in all unknowns, by one sweep back through the swim."""
+
+from collections import namedtuple
+from collections.abc import Callable, Mapping, Sequence
+from threading import Lock
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seastar_gym.der.rods import Work, make_work
+from seastar_gym.der.stepping.report import MOMENTS, REPORT_ROWS, SMALLEST_HUB_T, WORK
+from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
+from seastar_gym.der.stepping.stroke import advance
+from seastar_gym.der.terms.hub import Actuation
+from seastar_gym.gradients.history import CAPACITY, COUNTERS, INTERVAL, N_STEPS, OF_STEP, Kept, keeping_swim, n_numbers
+from seastar_gym.gradients.replay import pulling_back
+from seastar_gym.gradients.stencils import arrays_of
+from seastar_gym.gradients.swim import (
+    COUNTS,
+    Motion,
+    checked_swim,
+    require_names,
+    sentence_of,
+    slopes_of_heading,
+    turned_from,
+)
+from seastar_gym.gradients.unknowns import OF_START, Rotations, Start, Unknown, slope_in_number, start_of, unknowns_of
+from seastar_gym.model.rods import make_limits, make_rods
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import as_floats, shown
+from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.rows import aligned_rows, side_by_side
+from seastar_gym.simd.tape_lanes import ENTRY, ROW
+from seastar_gym.simulator.state import State
+
+Floats = NDArray[np.float64]
+
+QUANTITIES = ("hub", *Motion._fields)
+"""Quantities of a swim that a number may depend on."""
+SPARE_STEPS = 16
+"""Steps more than there are ends of steps in an interval, for which there is room at first."""
+ENTRIES = 1 << 16
+"""Entries of a new tape; it grows where a time step needs more. Each takes 24 bytes, and 8 for its slope."""
+
+WorkOfGradient = namedtuple("WorkOfGradient", (*Work._fields, "kept", "solution"))  # type: ignore[misc]
+"""`Work` with a history, see history.py, or with the numbers of a step, see replay.py."""
+
+_the_tape = Lock()
+
+
+class Gradient(NamedTuple):
+    """A number of a swim, and its gradient.
+
+    value: The number. swim: The swim, to the bits of `Simulator`.
+    by: Gradients by the names of unknowns, per unit and in the shape of each.
+    status: SolverStatus of every interval, shape (n,). After a failure all is NaN.
+    sentence: What the gradient is of.
+    """
+
+    value: float
+    swim: Motion
+    by: dict[str, Floats]
+    status: NDArray[np.int64]
+    sentence: str
+
+
+def gradient(
+    scene: Scene,
+    commands: ArrayLike,
+    objective: Callable[[Motion], tuple[float, Mapping[str, ArrayLike]]],
+    by: Sequence[str],
+    state: State | None = None,
+    duration: float | None = None,
+) -> Gradient:
+    """Swim with these commands, and find the gradient of a number of the swim.
+
+    objective: From a swim, its number, and the number's slopes in quantities of the swim by their names: "hub",
+        "positions", "velocities", "heading" and "work", each of the shape in `Motion`.
+
+    Other arguments are those of `differentiate`, and so is what derivatives are. The cost does not depend on how many
+    unknowns there are, see docs/gradients.md.
+    """
+    require_names(by)
+    record_of_swim = record(scene, commands, state, duration)
+    value, slopes = objective(record_of_swim.swim)
+    found = record_of_swim.gradient(slopes, by)
+    return Gradient(float(value), record_of_swim.swim, found, record_of_swim.status, record_of_swim.sentence)
+
+
+def record(scene: Scene, commands: ArrayLike, state: State | None = None, duration: float | None = None) -> "Record":
+    """Swim with these commands, and keep the states between intervals, for gradients of the swim.
+
+    Arguments are those of `differentiate`.
+    """
+    told, length = checked_swim(scene, commands, duration)
+    return Record(scene, told, state, length)
+
+
+class Record:
+    """A swim that can be gone back through.
+
+    swim: The swim, to the bits of `Simulator`. status: SolverStatus of every interval, shape (n,).
+
+    Between intervals it keeps the state alone. `gradient` swims one interval after the other once more and keeps its
+    time steps while it goes back through it: some 30 kB each for a robot of 56 nodes.
+    """
+
+    def __init__(self, scene: Scene, commands: Floats, state: State | None, duration: float):
+        refuse_unproven(scene)
+        self._scene, self._commands, self._state, self._duration = scene, commands, state, duration
+        self._rods, self._limits = make_rods(scene), make_limits(scene)
+        self._scheme = scheme_of(scene.numerics.scheme, scene.numerics.damping)
+        self._n_limbs = scene.robot.n_limbs
+        self._held = np.array([2 * node + axis for node in scene.held_nodes for axis in (0, 1)], dtype=int)
+        self._start = start_of(scene, state)
+        drives = Rotations(scene, state, commands, ())
+        self._memory = np.zeros((0, N_LANES))
+        self._turns = [drives.interval(k, duration)[:2] for k in range(len(commands))]
+        self._states, self._reports, work = [(self._start.q, self._start.v)], [], []
+        for times, turned in self._turns:
+            done, report = self._swim(times, turned)
+            work.append(done)
+            self._reports.append(report)
+        places, velocities = (
+            np.array([state[field][: 2 * self._rods.n_nodes] for state in self._states]).reshape(
+                len(self._states), -1, 2
+            )
+            for field in (0, 1)
+        )
+        heading = np.arctan2(*turned_from(places, self._start.rest))
+        self.swim = Motion(places, velocities, heading, np.array(work))
+        self.status = self._counts("status")
+
+    @property
+    def sentence(self) -> str:
+        """What gradients of this swim are of, in one sentence."""
+        return sentence_of(self.status, {name: self._counts(name) for name in COUNTS})
+
+    def gradient(self, slopes: Mapping[str, ArrayLike], by: Sequence[str]) -> dict[str, Floats]:
+        """Gradient, by the names of unknowns, of a number with these slopes in quantities of the swim.
+
+        slopes: By names of quantities, as in `gradient`; of those that are not there the number does not depend. by: As
+        in `differentiate`.
+        """
+        require_names(by)
+        unknowns = unknowns_of(self._scene, self._commands, by)
+        given = self._checked(slopes)
+        if self.status.any():
+            return {unknown.name: np.full(unknown.shape, np.nan) for unknown in unknowns}
+        beside = {u.name: slope_in_number(self._start, self._state, u) for u in unknowns if u.beside}
+        with _the_tape:
+            sweep = _Sweep(self, given, list(beside.values()))
+        of_rotations = self._through_rotations(unknowns, sweep.of_turns)
+        found = {}
+        for unknown in unknowns:
+            if unknown.beside:
+                found[unknown.name] = np.asarray(
+                    sweep.slope_along(beside[unknown.name]) + of_rotations.get(unknown.name, 0.0)
+                )
+            elif unknown.name in OF_START:
+                rows = sweep.of_q if unknown.name == "positions" else sweep.of_v
+                found[unknown.name] = rows[: unknown.size].reshape(unknown.shape)
+            else:
+                found[unknown.name] = of_rotations[unknown.name]
+        return found
+
+    def _checked(self, slopes: Mapping[str, ArrayLike]) -> dict[str, Floats]:
+        unknown = sorted(set(slopes) - set(QUANTITIES))
+        if unknown:
+            raise ValueError(f"slopes has {shown(unknown[0])}, which is none of {', '.join(QUANTITIES)}.")
+        given = {name: as_floats(f"slopes in {name}", value) for name, value in slopes.items()}
+        for name, value in given.items():
+            if value.shape != getattr(self.swim, name).shape:
+                raise ValueError(
+                    f"slopes in {name} must have shape {getattr(self.swim, name).shape}, not {value.shape}."
+                )
+        return {name: given.get(name, np.zeros(getattr(self.swim, name).shape)) for name in QUANTITIES}
+
+    def _through_rotations(self, unknowns: Sequence[Unknown], of_turns: list[Floats]) -> dict[str, Floats]:
+        """What the gradients in commands and in numbers of the actuators owe to the limbs' rotations."""
+        some = [u for u in unknowns if u.name == "commands" or u.name.split(".")[0] in ("actuator", "limb_strengths")]
+        if not some:
+            return {}
+        drives = Rotations(self._scene, self._state, self._commands, some)
+        total = np.zeros(sum(u.size for u in some))
+        for k, of_turn in enumerate(of_turns):
+            total = total + np.tensordot(of_turn, drives.interval(k, self._duration)[2], axes=2)
+        parts = np.split(total, np.cumsum([u.size for u in some])[:-1])
+        return {u.name: part.reshape(u.shape) for u, part in zip(some, parts, strict=True)}
+
+    def _counts(self, name: str) -> NDArray[np.int64]:
+        return np.array([report[name] for report in self._reports], dtype=np.int64)
+
+    def _lanes(self, k: int) -> tuple[Floats, Floats, Floats]:
+        """q, v and a at the beginning of interval k, shape (n_rows, N_LANES)."""
+        q, v = (aligned_rows(self._start.q.size, N_LANES) for _ in range(2))
+        q[:], v[:] = (rows[:, None] for rows in self._states[k])
+        v[self._held] = 0.0
+        return q, v, aligned_rows(self._n_a, N_LANES)
+
+    @property
+    def _n_a(self) -> int:
+        stages, has_body = self._scheme.n_stages, self._rods.body is not None
+        return (2 * self._rods.n_free + 1) * stages + 2 + (stages if has_body else 0)
+
+    def _swim(self, times: Floats, turned: Floats) -> tuple[float, dict[str, float]]:
+        """Swim on through an interval; the actuators' work [J], and the report."""
+        q, v, a = self._lanes(-1)
+        report, effort = np.zeros((1, len(REPORT_ROWS), N_LANES)), np.zeros((1, MOMENTS + self._n_limbs, N_LANES))
+        report[:, SMALLEST_HUB_T] = np.inf
+        shape = np.repeat(turned.ravel()[:, None], N_LANES, axis=1)
+        peaks, failed = np.ones((1, self._n_limbs, N_LANES)), np.zeros((1, 1, N_LANES))
+        advance(
+            self._rods, make_work(self._rods, self._scheme.n_stages), self._scheme, SCHEMES["implicit-euler"],
+            _actuation(self._n_limbs, N_LANES), q[None], v[None], a[None], peaks, times, shape[None],
+            self._n_limbs, failed, report, self._limits, effort,
+        )  # fmt: skip
+        if failed[0, 0, 0] > 0.0:
+            q[:] = v[:] = effort[:] = np.nan
+        q[self._held, 0], v[self._held] = self._states[-1][0][self._held], 0.0
+        self._states.append((q[:, 0].copy(), v[:, 0].copy()))
+        counts = dict(zip(REPORT_ROWS, report[0, :, 0].tolist(), strict=True))
+        return float(effort[0, WORK, 0]), {**counts, "status": float(failed[0, 0, 0])}
+
+    def _keep(self, k: int) -> Floats:
+        """History of interval k, shape (n_steps + 1, n_numbers): of every step, and where the last one has ended."""
+        times, turned = self._turns[k]
+        n_q, stages = self._start.q.size, self._scheme.n_stages
+        n_rows = n_numbers(n_q, self._n_a, stages, self._rods.n_points)
+        shape = np.repeat(turned.ravel()[:, None], N_LANES, axis=1)
+        capacity = len(times) + SPARE_STEPS
+        while True:
+            q, v, a = self._lanes(k)
+            if len(self._memory) < (capacity + 1) * n_rows:
+                self._memory = aligned_rows((capacity + 1) * n_rows, N_LANES)
+            counters, rows = np.zeros(COUNTERS), self._memory[: (capacity + 1) * n_rows]
+            counters[CAPACITY] = capacity
+            kept = Kept(counters, rows, n_rows, n_q, self._n_a)
+            work = WorkOfGradient(*make_work(self._rods, stages), kept, None)  # type: ignore[call-arg]
+            keeping_swim()(
+                self._rods, work, self._scheme, SCHEMES["implicit-euler"], _actuation(self._n_limbs, N_LANES), q, v,
+                a, times, shape, self._limits, np.zeros((len(REPORT_ROWS), N_LANES)),
+            )  # fmt: skip
+            n = int(counters[N_STEPS])
+            if n < capacity:
+                break
+            capacity *= 2
+        found: Floats = np.ascontiguousarray(rows.reshape(capacity + 1, n_rows, N_LANES)[: n + 1, :, 0])
+        found[n] = 0.0
+        found[n, INTERVAL] = len(times) - 1
+        found[n, OF_STEP : OF_STEP + n_q], found[n, OF_STEP + n_q : OF_STEP + 2 * n_q] = q[:, 0], v[:, 0]
+        return found
+
+
+def refuse_unproven(scene: Scene) -> None:
+    """ValueError for terms whose gradients have not been compared with dual lanes."""
+    robot = scene.robot
+    terms = {
+        "contact": scene.contact is not None,
+        "a body": robot.has_body,
+        "actuators along the limbs": robot.along is not None or robot.stiffening is not None,
+    }
+    for name, is_there in terms.items():
+        if is_there:
+            raise ValueError(f"There are no gradients of swims with {name} yet: differentiate has derivatives.")
+
+
+def _actuation(n_limbs: int, n: int) -> Actuation:
+    return Actuation(*(np.zeros((n_limbs, n)) for _ in range(2)))
+
+
+class _Sweep:
+    """Slopes of a number, taken from the end of a swim to its beginning.
+
+    given: Slopes in the quantities of the swim, all of QUANTITIES.
+    changes: Changes of what the swim begins with, in whose direction `slope_along` will be asked for.
+    of_q, of_v: Slopes in rows of the state at the start. of_turns: Slopes in the rotations of every interval. of_rest:
+        Those in positions at rest.
+    """
+
+    def __init__(self, record: Record, given: Mapping[str, Floats], changes: Sequence[Start]):
+        self._record, one, stages = record, record._rods, record._scheme.n_stages
+        self._rods = _on_tape(side_by_side([one]))
+        self._moved = [
+            np.any([change.coefficients[k] != 0.0 for change in changes], axis=0) & np.full(len(rows), bool(changes))
+            for k, rows in enumerate(arrays_of(self._rods))
+        ]
+        self._n_coefficients = _number(self._rods, self._moved)
+        memory = make_work(one, stages)
+        n_rows = n_numbers(record._start.q.size, record._n_a, stages, one.n_points)
+        self._work = WorkOfGradient(*_on_tape(memory), None, np.zeros(1 + n_rows))  # type: ignore[call-arg]
+        self._rows = tuple(
+            np.zeros((n, ROW)) for n in (*2 * (record._start.q.size,), record._n_a, *3 * (record._n_limbs,))
+        )
+        self._grow(ENTRIES)
+        of_places, of_rest = slopes_of_heading(record.swim.positions, record._start.rest)
+        in_places = given["positions"] + given["heading"][:, None, None] * of_places
+        in_places[:, 0] += given["hub"]
+        self.of_rest: Floats = np.tensordot(given["heading"], of_rest, axes=1)
+        n, held = 2 * one.n_nodes, record._held
+        self.of_q, self.of_v = (np.zeros(record._start.q.size) for _ in range(2))
+        self.of_turns: list[Floats] = []
+        for k in range(len(record._turns), -1, -1):
+            if k < len(record._turns):
+                kept_still = self.of_q[held].copy()
+                self.of_q[held] = self.of_v[held] = 0.0
+                self.of_turns.insert(0, self._pull_back(k, float(given["work"][k])))
+                self.of_q[held] += kept_still
+                self.of_v[held] = 0.0
+            self.of_q[:n] += in_places[k].ravel()
+            self.of_v[:n] += given["velocities"][k].ravel()
+        self.of_coefficients: Floats = self._slopes[1 : 1 + self._n_coefficients]
+
+    def slope_along(self, start: Start) -> float:
+        """Slope of the number if what the swim begins with changes like this."""
+        total = self.of_q @ start.q + self.of_v @ start.v + (self.of_rest * start.rest).sum()
+        place = 0
+        for rows, moved, change in zip(arrays_of(self._rods), self._moved, start.coefficients, strict=True):
+            if moved.any() and rows.ndim == 1:
+                raise ValueError("There are no derivatives in numbers on a grid.")
+            n = int(moved.sum())
+            total += self.of_coefficients[place : place + n] @ change[moved]
+            place += n
+        return float(total)
+
+    def _grow(self, capacity: int) -> None:
+        self._entries = np.zeros((capacity, ENTRY))
+        self._slopes = np.zeros(capacity)
+
+    def _pull_back(self, k: int, of_work: float) -> Floats:
+        """Take slopes through interval k; returns those in its rotations, shape (n_times, n_limbs)."""
+        record = self._record
+        times, turned = record._turns[k]
+        kept = record._keep(k)
+        before = self._slopes[: 1 + self._n_coefficients].copy()
+        places = tuple(rows.view(np.int64) for rows in self._rows)
+        while True:
+            of_q, of_v, of_a, of_turn = self.of_q.copy(), self.of_v.copy(), np.zeros(record._n_a), 0.0 * turned
+            outcome = pulling_back()(
+                self._rods, self._work, record._scheme, SCHEMES["implicit-euler"],
+                _actuation_of(self._rows), record._limits, np.zeros((len(REPORT_ROWS), ROW)), self._rows, places,
+                kept, times, turned, of_work, self._entries, self._entries.view(np.int32), self._slopes,
+                1 + self._n_coefficients, of_q, of_v, of_a, of_turn,
+            )  # fmt: skip
+            if outcome == 0:
+                break
+            if outcome == 2:
+                raise RuntimeError("A time step could not be repeated as it was.")
+            self._grow(2 * len(self._entries))
+            self._slopes[: len(before)] = before
+        self.of_q, self.of_v = of_q, of_v
+        return of_turn
+
+
+def _actuation_of(rows: tuple[Floats, ...]) -> Actuation:
+    return Actuation(rows[3], rows[4])
+
+
+def _on_tape(bundle: Any) -> Any:
+    """A bundle whose rows of robots are rows of a tape: value and place, which is 0."""
+    if isinstance(bundle, np.ndarray) and bundle.ndim == 2:
+        rows = aligned_rows(len(bundle), ROW)
+        rows[:, 0] = bundle[:, 0]
+        return rows
+    if hasattr(bundle, "_fields"):
+        return bundle._replace(**{name: _on_tape(getattr(bundle, name)) for name in bundle._fields})
+    return bundle
+
+
+def _number(bundle: Any, moved: Sequence[NDArray[np.bool_]]) -> int:
+    """Give those rows of a tape that are moved their places, from 1 on, in the order of `arrays_of`; how many."""
+    n = 0
+    for rows, some in zip(arrays_of(bundle), moved, strict=True):
+        if rows.ndim == 2:
+            count = int(some.sum())
+            rows.view(np.int64)[some, 1] = np.arange(n + 1, n + 1 + count)
+            n += count
+    return n

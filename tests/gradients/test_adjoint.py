@@ -1,0 +1,151 @@
+"""Gradients of swims: against dual lanes, and against differences of swims."""
+
+import runpy
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+import seastar_gym.gradients.adjoint as adjoint
+from gradients.test_differentiate import COMMANDS, SMALL, TERMS, differences, swum
+from seastar_gym import Numerics, Simulator, SmaWires, ThermalSma, Water
+from seastar_gym.gradients import differentiate, gradient, record
+from seastar_gym.gradients.adjoint import QUANTITIES
+from seastar_gym.scene.per_robot import at, with_numbers
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="lanes of a tape have compiled code alone")
+
+ALL_KINDS = ["commands", "robot.youngs_modulus", "fluid.drag_coefficient", "actuator.peak_angle", "robot.limb_length"]
+OF_START = ["positions", "velocities"]
+
+
+def slopes_of(swim, seed=0):
+    """Random slopes in all quantities of a swim."""
+    rng = np.random.default_rng(seed)
+    return {name: rng.standard_normal(getattr(swim, name).shape) for name in QUANTITIES}
+
+
+def number_of(slopes, quantities):
+    """The number that has these slopes, or its derivative; quantities: A Motion."""
+    return sum(np.tensordot(each, getattr(quantities, name), axes=each.ndim) for name, each in slopes.items())
+
+
+def assert_is_that_of_dual_lanes(scene, names, commands=COMMANDS, tolerance=1e-10, **start):
+    """The gradient of a number of all quantities is that of dual lanes, and the swim is theirs to the bit."""
+    expected, recorded = differentiate(scene, commands, names, **start), record(scene, commands, **start)
+    for mine, theirs in zip(recorded.swim, expected.swim, strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+    slopes = slopes_of(recorded.swim)
+    for name, found in recorded.gradient(slopes, names).items():
+        right = number_of(slopes, expected.by[name])
+        np.testing.assert_allclose(found, right, rtol=0.0, atol=tolerance * np.abs(right).max(), err_msg=name)
+    assert recorded.sentence == expected.sentence
+    return recorded
+
+
+def test_gradient_is_that_of_dual_lanes():
+    assert_is_that_of_dual_lanes(SMALL, [*ALL_KINDS, *OF_START])
+
+
+@pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"])
+def test_every_scheme(scheme):
+    assert_is_that_of_dual_lanes(replace(SMALL, numerics=Numerics(scheme, 5e-3, 1e-12)), ALL_KINDS)
+
+
+@pytest.mark.parametrize(
+    "numerics",
+    [
+        Numerics("implicit-midpoint", 0.02, 1e-12, path_tolerance=0.01),
+        Numerics("implicit-euler", 0.05, 1e-12, 3),
+        Numerics("implicit-midpoint", 0.05, 1e-12, 3),
+    ],
+)
+def test_halved_steps_are_of_their_branch(numerics):
+    recorded = assert_is_that_of_dual_lanes(replace(SMALL, fluid=Water(), numerics=numerics), ALL_KINDS)
+    assert recorded.sentence.startswith("The derivatives are of the branch that was taken")
+
+
+@pytest.mark.parametrize("actuator", [SmaWires(0.6, 0.05, 0.3, period=0.1), ThermalSma()])
+def test_actuators_with_memory(actuator):
+    numerics = replace(SMALL.numerics, newton_tolerance=1e-14)
+    scene = replace(SMALL, actuator=actuator, numerics=numerics)
+    assert_is_that_of_dual_lanes(scene, ALL_KINDS[:4], 0.5 + 0.3 * COMMANDS)
+
+
+def test_gradient_is_a_difference_of_swims():
+    def objective(swim):
+        return float(swim.hub[-1] @ [0.6, 0.8]), {"hub": np.multiply.outer([0, 0, 0, 1], [0.6, 0.8])}
+
+    found = gradient(SMALL, COMMANDS, objective, ALL_KINDS)
+    assert found.value == found.swim.hub[-1] @ [0.6, 0.8]
+    for name in ALL_KINDS[1:]:
+        number = at(SMALL, name)
+        path, *_ = differences(
+            lambda change, name=name, number=number: swum(with_numbers(SMALL, {name: number + change}), COMMANDS),
+            1e-4 * number,
+        )
+        np.testing.assert_allclose(found.by[name], path[-1, 0] @ [0.6, 0.8], rtol=1e-6)
+
+
+def test_a_swim_in_two_parts_has_the_gradient_of_the_whole():
+    simulator = Simulator(SMALL, 1, threads=1)
+    simulator.stroke(COMMANDS[:1])
+    whole, rest = record(SMALL, COMMANDS), record(SMALL, COMMANDS[1:], simulator.get_state())
+    np.testing.assert_array_equal(rest.swim.positions, whole.swim.positions[1:])
+    first, at_end = record(SMALL, COMMANDS[:1]), np.zeros((3, 2))
+    at_end[-1] = 1.0
+    between = rest.gradient({"hub": at_end}, OF_START)
+    slopes = {name: np.stack([0.0 * between[name], between[name]]) for name in OF_START}
+    found = first.gradient(slopes, ["commands"])["commands"]
+    expected = whole.gradient({"hub": np.vstack([np.zeros((1, 2)), at_end])}, ["commands"])["commands"][:1]
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_a_tape_grows_where_a_step_needs_more(monkeypatch):
+    slopes = slopes_of(record(SMALL, COMMANDS).swim)
+    expected = record(SMALL, COMMANDS).gradient(slopes, ["robot.density"])
+    monkeypatch.setattr(adjoint, "ENTRIES", 1000)
+    assert record(SMALL, COMMANDS).gradient(slopes, ["robot.density"]) == expected
+
+
+def test_a_swim_that_failed_has_no_gradient():
+    state = Simulator(SMALL, 1, threads=1).get_state()
+    state.positions[:] = 0.25  # all nodes in one point: no angle, no direction, no way on
+    recorded = record(SMALL, COMMANDS, state)
+    assert recorded.status.any()
+    assert np.isnan(recorded.gradient({"heading": np.ones(4)}, ["commands"])["commands"]).all()
+    assert recorded.sentence.startswith("The solver failed in interval 1")
+
+
+@pytest.mark.parametrize(
+    ("slopes", "reason"),
+    [
+        ({"hope": np.zeros(3)}, "slopes has 'hope', which is none of hub, positions"),
+        ({"hub": np.zeros((3, 2))}, r"slopes in hub must have shape \(4, 2\), not \(3, 2\)"),
+    ],
+)
+def test_refusals_are_sentences(slopes, reason):
+    with pytest.raises(ValueError, match=rf"{reason}.*\.$"):
+        record(SMALL, COMMANDS).gradient(slopes, ["commands"])
+
+
+def test_pytorch_swims_farther_along_the_gradient():
+    torch = pytest.importorskip("torch")
+    example = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "torch_gradients.py"))
+    distances = example["swim_far"](SMALL, steps=5)
+    assert all(after > before for before, after in pairwise(distances))
+    commands = torch.tensor(COMMANDS, requires_grad=True)
+    example["Swim"].apply(commands, SMALL)[-1, 0].backward()
+    expected = differentiate(SMALL, COMMANDS, ["commands"]).by["commands"].hub[-1, 0]
+    np.testing.assert_allclose(commands.grad.numpy(), expected, rtol=0.0, atol=1e-10 * np.abs(expected).max())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TERMS)
+def test_every_term_has_the_gradient_of_dual_lanes(name):
+    scene, numbers, commands = TERMS[name]
+    recorded = assert_is_that_of_dual_lanes(scene, ["commands", *numbers], commands)
+    assert ("some limbs touched" in recorded.sentence) == ("contact" in name)
