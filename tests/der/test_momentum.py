@@ -42,7 +42,7 @@ def moved(hub: str, fluid: bool, robots: np.ndarray, times: int = 1):
 
     before, q = unbalanced(), nodes(work.q)
     for _ in range(times):
-        move_as_a_whole.plain(rods, work, stage, Mask(robots))
+        move_as_a_whole.plain(rods, work, SCHEMES["implicit-euler"], 0, stage, Mask(robots))
     return before, unbalanced(), q, nodes(work.q)
 
 
@@ -116,7 +116,7 @@ def test_what_contact_pushed_when_it_was_last_asked_moves_no_robot_as_a_whole():
     for force in (0.0, 1.0):
         limbs = touching_limbs()
         limbs.work.contact.force[:] = force * np.random.default_rng(1).standard_normal(limbs.work.q.shape)
-        move_as_a_whole.plain(limbs.rods, limbs.work, limbs.stage, Mask(EVERYONE))
+        move_as_a_whole.plain(limbs.rods, limbs.work, SCHEMES["implicit-euler"], 0, limbs.stage, Mask(EVERYONE))
         found.append(limbs.work.q.copy())
     np.testing.assert_array_equal(*found)
 

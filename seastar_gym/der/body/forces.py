@@ -202,14 +202,17 @@ def begin_turning(rods, work, scheme, k, q_0, v_0, h):
 
 
 @kernel
-def turning_rate(rods, work, stage):
-    """B (x, y) of a stage [N], by the iterate."""
+def turning_rate(rods, work, scheme, k, stage):
+    """B (x, y) of stage k [N], by the iterate."""
     row, inverse = 2 * rods.n_nodes, load(rods.body.inverse_scale, 0)
     theta, theta_hat = load(work.q, row) * inverse, load(stage.q_hat, row) * inverse
     omega, omega_hat = (theta - theta_hat) * stage.inverse_gamma, load(stage.v_hat, row) * inverse
     rate = stage.inverse_gamma
     if stage.ahead:
-        theta, omega, rate = theta + (theta - theta_hat), omega + (omega - omega_hat), 0.5 * rate
+        share = load_number(scheme.a, k * scheme.n_stages + k)
+        left = 1.0 / share - 1.0
+        theta, omega = theta + left * (theta - theta_hat), omega + left * (omega - omega_hat)
+        rate = share * rate
     c, s = rotation(theta)
     x, y = turned(c, s, rods.body.moment, 0)
     b_x, b_y = load(work.body.turning, 0), load(work.body.turning, 1)
@@ -217,23 +220,23 @@ def turning_rate(rods, work, stage):
 
 
 @kernel
-def add_turning_rate(rods, work, stage, force):
+def add_turning_rate(rods, work, scheme, k, stage, force):
     """Replace what add_body takes for the rate of b by B, in a residual [N]."""
     row, inverse = 2 * rods.n_nodes, load(rods.body.inverse_scale, 0)
     omega = (load(work.q, row) - load(stage.q_hat, row)) * stage.inverse_gamma * inverse
     rate = (omega - load(stage.v_hat, row) * inverse) * stage.inverse_gamma
-    x, y = turning_rate(rods, work, stage)
+    x, y = turning_rate(rods, work, scheme, k, stage)
     x -= rate * load(work.body.frozen, J_X) - load(work.body.frozen, F_X)
     y -= rate * load(work.body.frozen, J_Y) - load(work.body.frozen, F_Y)
     return force[0] + x, force[1] + y
 
 
 @kernel
-def end_turning(rods, work, k, stage):
+def end_turning(rods, work, scheme, k, stage):
     """Keep B of stage k, in scenes with a body."""
     if rods.body is None:
         return
-    x, y = turning_rate(rods, work, stage)
+    x, y = turning_rate(rods, work, scheme, k, stage)
     store(work.body.turning, 2 + 2 * k, x)
     store(work.body.turning, 3 + 2 * k, y)
 

@@ -11,8 +11,8 @@ of its own after the others: from the residual summed over the nodes, and its sl
 A body whose centre of mass is not the hub has the momentum b = omega J_S because it turns, too (body/). Stages take
 its rate as d_theta J*_S - gamma omega*^2 A*_S from their first guess, which is off by the scheme's error. Here the rate
 is B = (b - b_hat)/gamma, of the angle that the stage has found, with b_hat = b_0 + h sum_{j<i} a_ij B_j: b follows the
-tableau as velocities do, and what nodes get is what b loses. The implicit midpoint rule ends with b of the angle and
-velocity that it extrapolates to, so that its B is the difference of b over the whole step.
+tableau as velocities do, and what nodes get is what b loses. The implicit midpoint rule, damped or not, ends with b of
+the angle and velocity that it extrapolates to, so that its B is the difference of b over the whole step.
 """
 
 from seastar_gym.der.body.body import place_roots, root_motion, tail_motion
@@ -36,13 +36,13 @@ def correct_momentum(rods, work, scheme, k, stage, q_0, v_0, h, robots):
     unsettled = robots & (load(rods.scales.stiffness_ratio, 0) * stage.gamma * stage.gamma > LOST)
     if any_lane(unsettled):
         begin_turning(rods, work, scheme, k, q_0, v_0, h)
-        move_as_a_whole(rods, work, stage, unsettled)
-        end_turning(rods, work, k, stage)
+        move_as_a_whole(rods, work, scheme, k, stage, unsettled)
+        end_turning(rods, work, scheme, k, stage)
 
 
 @kernel
-def move_as_a_whole(rods, work, stage, robots):
-    """Newton step of a stage in which all nodes of a robot move alike.
+def move_as_a_whole(rods, work, scheme, k, stage, robots):
+    """Newton step of stage k in which all nodes of a robot move alike.
 
     Contact, which cancels but for its rounding, is left out: its forces are those of where Newton's last step began,
     or, as long as others in the lanes go on, of where it has ended.
@@ -53,7 +53,7 @@ def move_as_a_whole(rods, work, stage, robots):
         _, gradient, hessian = node_slopes(rods, work, stage, node, node_motion(work, stage, node), (zero, zero))
         fx, fy = fx + gradient[0], fy + gradient[1]
         xx, xy, yy = xx + hessian[0], xy + hessian[1], yy + hessian[2]
-    fx, fy, xx, xy, yy = add_roots(rods, work, stage, fx, fy, xx, xy, yy)
+    fx, fy, xx, xy, yy = add_roots(rods, work, scheme, k, stage, fx, fy, xx, xy, yy)
     fx, fy, xx, xy, yy = add_middles(rods, work, stage, fx, fy, xx, xy, yy)
     determinant = xx * yy - xy * xy
     dx, dy = (yy * fx - xy * fy) / determinant, (xx * fy - xy * fx) / determinant
@@ -65,13 +65,13 @@ def move_as_a_whole(rods, work, stage, robots):
 
 
 @kernel
-def add_roots(rods, work, stage, fx, fy, xx, xy, yy):
+def add_roots(rods, work, scheme, k, stage, fx, fy, xx, xy, yy):
     """Add a body, and the fluid at its limbs' roots, to the residual and slope of a move of the whole robot."""
     if rods.body is None:
         return fx, fy, xx, xy, yy
     of_hub, zero = node_motion(work, stage, 0), splat(0.0)
     _, (fx, fy), (xx, xy, yy) = add_body(rods, work, stage, None, of_hub, zero, (fx, fy), (xx, xy, yy))
-    fx, fy = add_turning_rate(rods, work, stage, (fx, fy))
+    fx, fy = add_turning_rate(rods, work, scheme, k, stage, (fx, fy))
     for limb in range(rods.n_limbs):
         motion = root_motion(rods, work, stage, limb)
         _, g, h = node_slopes(rods, work, stage, root_place(rods, limb), motion, (zero, zero))
