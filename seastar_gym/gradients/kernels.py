@@ -22,7 +22,7 @@ groups_on_dual_lanes: Callable[..., None]
 
 
 class DualKernels(KernelModules):
-    """The kernels on dual lanes. Where stages settle their momentum they settle their slopes as well."""
+    """The kernels on dual lanes. Where stages correct their momentum they correct their slopes as well."""
 
     def __init__(self) -> None:
         super().__init__({LANES: dual_lanes, COMPILATION: compilation})

@@ -22,7 +22,7 @@ from seastar_gym.der.linear.star_matrix import eliminate_node, eliminate_root, s
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.stepping import steps
-from seastar_gym.der.stepping.momentum import settle_momentum
+from seastar_gym.der.stepping.momentum import correct_momentum
 from seastar_gym.der.stepping.steps import Step, try_step
 from seastar_gym.gradients.history import (
     FALLBACK,
@@ -65,10 +65,10 @@ def read_solution(rods, work, stage, active, tolerance, iteration_limit):
 
 
 @kernel
-def settle_on_tape(rods, work, scheme, k, stage, q_0, v_0, h, robots):
+def correct_on_tape(rods, work, scheme, k, stage, q_0, v_0, h, robots):
     """Settle the momentum, see momentum.py, and put the solution of stage k of a step on the tape."""
     pause_tape()
-    settle_momentum(rods, work, scheme, k, stage, q_0, v_0, h, robots)
+    correct_momentum(rods, work, scheme, k, stage, q_0, v_0, h, robots)
     resume_tape()
     factorise(rods, work, stage, None)
     substitute_star(rods, work, work.step)
@@ -186,7 +186,7 @@ class TapeKernels(KernelModules):
         super().__init__({LANES: tape_lanes, COMPILATION: compilation})
         instead = {
             "minimise": self(read_solution),
-            "settle_momentum": self(settle_on_tape),
+            "correct_momentum": self(correct_on_tape),
             "eliminate_node": self(eliminate_right_hand_side),
             "eliminate_root": self(eliminate_root_of_constants),
             "store_root": self(store_root_of_constants),
