@@ -115,7 +115,7 @@ class Record:
         self._held = np.array([2 * node + axis for node in scene.held_nodes for axis in (0, 1)], dtype=int)
         self._start = start_of(scene, state)
         drives = Rotations(scene, state, commands, ())
-        self._memory = np.zeros((0, N_LANES))
+        self._memory, self._work = np.zeros((0, N_LANES)), make_work(self._rods, self._scheme.n_stages)
         self._turns = [drives.interval(k, duration)[:2] for k in range(len(commands))]
         self._states, self._reports, work = [(self._start.q, self._start.v)], [], []
         for times, turned in self._turns:
@@ -212,7 +212,7 @@ class Record:
         shape = np.repeat(turned.ravel()[:, None], N_LANES, axis=1)
         peaks, failed = np.ones((1, self._n_limbs, N_LANES)), np.zeros((1, 1, N_LANES))
         advance(
-            self._rods, make_work(self._rods, self._scheme.n_stages), self._scheme, SCHEMES["implicit-euler"],
+            self._rods, self._work, self._scheme, SCHEMES["implicit-euler"],
             _actuation(self._n_limbs, N_LANES), q[None], v[None], a[None], peaks, times, shape[None],
             self._n_limbs, failed, report, self._limits, effort,
         )  # fmt: skip
@@ -237,7 +237,7 @@ class Record:
             counters, rows = np.zeros(COUNTERS), self._memory[: (capacity + 1) * n_rows]
             counters[CAPACITY] = capacity
             kept = Kept(counters, rows, n_rows, n_q, self._n_a)
-            work = WorkOfGradient(*make_work(self._rods, stages), kept, None)  # type: ignore[call-arg]
+            work = WorkOfGradient(*self._work, kept, None)  # type: ignore[call-arg]
             keeping_swim()(
                 self._rods, work, self._scheme, SCHEMES["implicit-euler"], _actuation(self._n_limbs, N_LANES), q, v,
                 a, times, shape, self._limits, np.zeros((len(REPORT_ROWS), N_LANES)),

@@ -130,6 +130,19 @@ FORGOTTEN = 4e-16
 """Relative difference of actuators' states from which on an earlier command has no effect any more."""
 
 
+class Felt(NamedTuple):
+    """Commands of an interval that limbs still feel.
+
+    interval: Its number. weights: Of the stencils, shape (n_limbs, 4).
+    states, commands: Of drives beside that of the swim, four for the command of every limb.
+    """
+
+    interval: int
+    weights: Floats
+    states: Floats
+    commands: Floats
+
+
 class Rotations:
     """Rotations of the limbs in intervals one after the other, and their slopes in all unknowns."""
 
@@ -144,8 +157,7 @@ class Rotations:
             column += unknown.size
         self._n, self._commands, self._scene = column, commands, scene
         self._drive = _drive(scene, state)
-        self._felt: list[tuple[int, Floats, Floats]] = []
-        """Commands that limbs still feel: number of the interval, and states and commands of drives beside this one."""
+        self._felt: list[Felt] = []
 
     def interval(self, k: int, duration: float) -> tuple[Floats, Floats, Floats]:
         """Ends of the time steps of interval k [s], rotations, shape (n_times, n_limbs) [rad], and slopes (.., n)."""
@@ -168,31 +180,34 @@ class Rotations:
     ) -> None:
         """Let drives beside this one follow the interval, four for every command that is still felt and every limb."""
         told, n_limbs = self._commands[k], self._commands.shape[1]
-        state, under_way, phase = before
+        size = 4 * n_limbs  # four drives for the command of every limb
         stencils = [of_command(command) for command in told]
         changed = np.repeat(told[None, None], n_limbs, axis=0).repeat(4, axis=1)  # (limb, place, limb)
         for limb, stencil in enumerate(stencils):
             changed[limb, :, limb] += OF_COMMANDS * np.array(stencil.places)
-        size = 4 * n_limbs
-        self._felt.append((k, np.repeat(state, size, axis=0), np.repeat(under_way, size, axis=0)))
-        n = size * len(self._felt)
-        drive = Drive(self._scene.actuator, n, n_limbs, self._scene.numerics.step)
-        drive.strengths = np.repeat(self._drive.strengths, n, axis=0)
-        states, commands = (np.concatenate([each[i] for each in self._felt]) for i in (1, 2))
-        drive.put(states, commands, np.full(n, phase))
-        given = np.repeat(told[None], n, axis=0)
-        given[n - size :] = changed.reshape(size, n_limbs)
+        state, under_way, phase = before
+        weights = np.array([stencil.weights for stencil in stencils])
+        self._felt.append(Felt(k, weights, np.repeat(state, size, axis=0), np.repeat(under_way, size, axis=0)))
+        n_felt = len(self._felt)
+        drive = Drive(self._scene.actuator, size * n_felt, n_limbs, self._scene.numerics.step)
+        drive.strengths = np.repeat(self._drive.strengths, size * n_felt, axis=0)
+        states, commands = (np.concatenate(each) for each in list(zip(*self._felt, strict=True))[2:])
+        drive.put(states, commands, np.full(size * n_felt, phase))
+        given = np.repeat(told[None], size * n_felt, axis=0)
+        given[-size:] = changed.reshape(size, n_limbs)
         _, turned = _turned(drive, given, duration)
-        still: list[tuple[int, Floats, Floats]] = []
-        for i, (j, _, _) in enumerate(self._felt):
-            own = slice(size * i, size * (i + 1))
-            for limb, command in enumerate(self._commands[j]):
-                beside = turned[:, own][:, 4 * limb : 4 * limb + 4]
-                column = self._in_commands + n_limbs * j + limb
-                slopes[..., column] = of_command(command).slope(value, np.moveaxis(beside, 1, 0), OF_COMMANDS)
-            if not np.allclose(drive.state[own], self._drive.state, rtol=FORGOTTEN, atol=0.0):
-                still.append((j, drive.state[own], drive.commands[own]))
-        self._felt = still
+        beside = (turned - value[:, None]).reshape(len(value), n_felt, n_limbs, 4, n_limbs)
+        found = np.einsum("tflpx,flp->txfl", beside, np.array([felt.weights for felt in self._felt])) / OF_COMMANDS
+        for i, felt in enumerate(self._felt):
+            column = self._in_commands + n_limbs * felt.interval
+            slopes[..., column : column + n_limbs] = found[..., i, :]
+        base = self._drive.state
+        differs = np.abs(drive.state - base) > FORGOTTEN * np.abs(base)
+        self._felt = [
+            felt._replace(states=drive.state[own], commands=drive.commands[own])
+            for felt, own in ((felt, slice(size * i, size * (i + 1))) for i, felt in enumerate(self._felt))
+            if differs[own].any()
+        ]
 
 
 def _drive(scene: Scene, state: State | None) -> Drive:
