@@ -1,13 +1,14 @@
-"""Certificates of the robots that won: how far the numbers of designs.json can be trusted, by their total errors.
+"""Certificates of the robots that won: how far numbers of designs.json and front.json can be trusted, by total errors.
 
-Robots are those of the table, with its rounded numbers. `seastar_gym.certify` swims random sequences of commands with
-each and compares them with swims of many nodes and short steps: some processor minutes for every robot. Certificates
-are kept in OUT, so that the command goes on with those that are missing. Writes certificates.json once all robots have
-theirs.
+Robots are those of the tables, with their rounded numbers; those of front.json have limbs that touch.
+`seastar_gym.certify` swims random sequences of commands with each and compares them with swims of many nodes and short
+steps: some processor minutes for every robot. Certificates are kept in FOLDER, and numbers of a robot are written once
+it has its certificate, so that the command goes on with those that are missing. Writes certificates.json.
 """
 
 import json
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,11 @@ from tqdm import tqdm
 
 from seastar_gym.accuracy import Certificate
 from seastar_gym.accuracy.measure import SAMPLES, certify
-from seastar_gym.scene import Scene, SmaPulse
+from seastar_gym.scene import Contact, Scene, Seastar, SmaPulse
 from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.configurations import Swim, configuration_with
 from seastar_gym.sweep.swimming import swim
+from studies.designs.front import AT_WORK, THRIFTIEST
 from studies.designs.space import MEASURED, SETTLING, Body
 from studies.frame import Results, Study, require_known
 
@@ -26,22 +28,37 @@ Table = dict[str, Any]
 WINNERS = (
     "fastest", "fastest in its lengths", "fastest at the chapter's length and angle", "fastest of them without taper",
 )  # fmt: skip
+ENDS = (AT_WORK, THRIFTIEST)
+"""Robots of front.json: ends of the search at equal work."""
+ROBOTS = WINNERS + ENDS
 CLASS = "repeated ternary"
 """Class of commands that are repeated, as the study's are."""
 NODES = (7, 19)
 """Nodes per limb of the certified settings that are told of: those of `fast`, and most."""
 STEPS = (5e-3, 1e-3)
 """Their steps [s]."""
-DESIGNS = Path(__file__).resolve().parents[2] / "docs" / "designs.json"
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+def rows() -> Table:
+    """What designs.json and front.json say of the robots, by their names."""
+    designs, front = (json.loads((DOCS / f"{name}.json").read_text(encoding="utf-8")) for name in ("designs", "front"))
+    return {name: designs[name] for name in WINNERS} | {name: front["robots"][name] for name in ENDS}
 
 
 def scene_of(row: Table) -> Scene:
-    """Scene of a winner as designs.json describes it."""
-    body = Body(row["n_limbs"], 1e-3 * row["mean_radius_mm"], row["taper"])
-    robot = replace(
-        body.robot(), limb_length=1e-3 * row["limb_length_mm"], youngs_modulus=1e6 * row["youngs_modulus_MPa"]
-    )
-    return replace(Scene.preset("fast"), robot=robot, actuator=SmaPulse(row["peak_angle_rad"]))
+    """Scene of a robot as its row describes it: of front.json with contact, and radii of root and tip."""
+    is_front = "radius_mm" in row
+    robot = robot_between(row) if is_front else Body(row["n_limbs"], 1e-3 * row["mean_radius_mm"], row["taper"]).robot()
+    robot = replace(robot, limb_length=1e-3 * row["limb_length_mm"], youngs_modulus=1e6 * row["youngs_modulus_MPa"])
+    actuator, contact = SmaPulse(row["peak_angle_rad"]), Contact() if is_front else None
+    return replace(Scene.preset("fast"), robot=robot, actuator=actuator, contact=contact)
+
+
+def robot_between(row: Table) -> Seastar:
+    """Robot of the radii of root and tip that a row of front.json has."""
+    root, tip = (1e-3 * radius for radius in row["radius_mm"])
+    return Body(row["n_limbs"], 0.5 * (root + tip), tip / root).robot()
 
 
 def file_of(name: str, folder: Path, samples: int) -> Path:
@@ -90,16 +107,16 @@ def told(certificate: Certificate) -> Table:
 def table(found: Table) -> str:
     """Table in Markdown of all robots and settings."""
     lines = [
-        "| robot | setting | repeated [%] | median [%] | all [%] | energy |",
-        "|---|---|---:|---:|---:|---:|",
+        "| robot | sequences | setting | repeated [%] | median [%] | all [%] | energy |",
+        "|---|---:|---|---:|---:|---:|---:|",
     ]
     for name, robot in found["robots"].items():
         for nodes, step in zip(NODES, STEPS, strict=True):
             setting = f"{nodes} nodes, {1e3 * step:g} ms"
             row = robot[setting]
             lines.append(
-                f"| {name} | {setting} | {row['repeated_percent']:g} | {row['typical_percent']:g} "
-                f"| {row['promised_percent']:g} | {row['energy_growth']:g} |"
+                f"| {name} | {robot['samples']} | {setting} | {row['repeated_percent']:g} "
+                f"| {row['typical_percent']:g} | {row['promised_percent']:g} | {row['energy_growth']:g} |"
             )
     return "\n".join(lines)
 
@@ -108,36 +125,33 @@ def table(found: Table) -> str:
 class Options:
     """Certificates of the robots that won."""
 
-    out: Path = Path("runs/certificates")
+    out: Path = Path("docs")
     """Folder of the files, or the file of the numbers."""
+    folder: Path = Path("runs/certificates")
+    """Folder of the certificates."""
     samples: int = SAMPLES
     """Sequences per class."""
-    robots: tuple[str, ...] = WINNERS
-    """Winners."""
+    robots: tuple[str, ...] = ROBOTS
+    """Robots; those whose numbers are there, of as many sequences, are left as they are."""
 
     def __post_init__(self) -> None:
-        require_known("robot", self.robots, WINNERS)
+        require_known("robot", self.robots, ROBOTS)
 
 
 def certify_all(options: Options, results: Results) -> None:
-    """Certify robots, and tell their errors once all winners have certificates."""
-    rows = json.loads(DESIGNS.read_text(encoding="utf-8"))
-    found: Table = {}
+    """Certify the robots that are missing, and tell their errors."""
 
-    def add(name: str) -> None:
-        found[name] = told(certificate_of(name, scene_of(rows[name]), options.out, options.samples))
+    def certified(name: str, row: Table) -> Table:
+        return told(certificate_of(name, scene_of(row), options.folder, options.samples))
 
-    for name in options.robots:
-        add(name)
-        print(json.dumps({name: found[name]}, indent=1), flush=True)
-    if missing := [name for name in WINNERS if not file_of(name, options.out, options.samples).exists()]:
-        print(f"certificates.json is written once these have certificates, too: {', '.join(missing)}.")
-        return
-    for name in set(WINNERS) - set(found):
-        add(name)
-    results["robots"] = {name: found[name] for name in WINNERS}
+    results.fill(
+        {("robots", name): partial(certified, name, row) for name, row in rows().items() if name in options.robots},
+        lambda found: json.dumps(found, indent=1),
+        lambda found: found["samples"] == options.samples,
+    )
 
 
 STUDY = Study(
-    "designs.certificates", certify_all, Options, "certificates.json", tables={"certificates": table}
-)
+    "designs.certificates", certify_all, Options, "certificates.json", settings=lambda _: {"class": CLASS},
+    tables={"certificates": table},
+)  # fmt: skip

@@ -3,7 +3,8 @@
 Robots with many samples of the unknowns swim in every condition, side by side in batches. The four speeds weigh the
 samples, and the weighted samples predict the other speeds. So no fit can end in the wrong minimum, and what the speeds
 do not tell of the unknowns is in the intervals. Then parts of the model are left out or added, one at a time, swimmers
-whose limbs follow their curves swim by other laws of drag, and laws of one constant are fitted to the same four speeds.
+whose limbs follow their curves swim by other laws of drag, laws of one constant are fitted to the same four speeds, and
+turns of two tracked swims are predicted.
 
 Speeds are kept in the folder RUNS, so the study goes on where it was interrupted. It writes
 `validation.json` and `validation.png`.
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.frame import Results, Study, require_known
-from studies.validation import follow, laws
+from studies.validation import follow, laws, turns
 from studies.validation.inference import MODEL, SCATTER, effective, hindsight, one_speed, predict, score, weights
 from studies.validation.luck import other_fours, scores
 from studies.validation.pictures import draw
@@ -149,6 +150,13 @@ def run(options: Options, results: Results) -> None:
     def of_follower(name: str) -> dict[str, Any]:
         return row(analyse(follow.speeds(conditions, samples(fewer), follow.LAWS[name]), conditions))
 
+    def of_turns(second: str) -> dict[str, Any]:
+        four = [conditions[k] for k in training(conditions)]
+        measured, known = np.array([condition.speed for condition in four]), list(range(len(four)))
+        weight = weights(simulate(four, "full", fewer, options.runs), measured, known)
+        return turns.examine(second, samples(fewer), weight)
+
+    results.fill({("turns", second): partial(of_turns, second) for second in turns.SECOND}, turns.tell)
     results.fill({("models", name): partial(of_variant, name) for name in options.variants}, laws.tell)
     results.fill({("followers", name): partial(of_follower, name) for name in follow.LAWS}, laws.tell)
 
@@ -168,6 +176,6 @@ STUDY = Study(
     Options,
     "validation.json",
     pictures={"validation.png": draw},
-    tables={"validation": laws.table, "validation tried": laws.tried},
+    tables={"validation": laws.table, "validation tried": laws.tried, "validation turns": turns.table},
     packages=("scipy",),
 )

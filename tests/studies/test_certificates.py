@@ -1,9 +1,8 @@
-"""The certificates of the fastest designs: of the robots of the table, kept, and told on the page."""
+"""The certificates of the best designs: of the robots of the tables, kept, and told on the page."""
 
 import json
 from dataclasses import replace
 from importlib.util import find_spec
-from pathlib import Path
 
 import pytest
 
@@ -12,13 +11,13 @@ if find_spec("pyarrow") is None:
 
 from seastar_gym.accuracy import Certificate, Setting
 from seastar_gym.accuracy.setting import physics
+from seastar_gym.scene import Contact
 from seastar_gym.version import __version__
 from studies.command import main
 from studies.designs import certificates
-from studies.designs.certificates import CLASS, NODES, STEPS, WINNERS, certificate_of, scene_of
+from studies.designs.certificates import CLASS, ENDS, NODES, ROBOTS, STEPS, WINNERS, certificate_of, rows, scene_of
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
-ROWS = json.loads((DOCS / "designs.json").read_text(encoding="utf-8"))
+ROWS = rows()
 
 
 def made(scene, samples):
@@ -42,6 +41,14 @@ def test_a_row_of_the_table_is_its_robot(name):
     assert root == pytest.approx(1e-3 * ROWS[name]["root_radius_mm"], rel=1e-3)
 
 
+@pytest.mark.parametrize("name", ENDS)
+def test_robots_of_the_front_are_certified_with_contact_and_their_radii(name):
+    scene = scene_of(ROWS[name])
+    (radius,) = {limb.radius for limb in scene.robot.limbs}
+    assert radius == pytest.approx([1e-3 * each for each in ROWS[name]["radius_mm"]])
+    assert scene.contact == Contact() and scene_of(ROWS["fastest"]).contact is None
+
+
 def test_a_certificate_is_made_once(tmp_path, monkeypatch):
     calls = []
 
@@ -58,21 +65,20 @@ def test_a_certificate_is_made_once(tmp_path, monkeypatch):
         certificate_of("fastest", scene_of(ROWS["fastest of them without taper"]), tmp_path, 3)
 
 
-def test_some_robots_leave_the_numbers_of_all_in_place(tmp_path, monkeypatch, capsys):
-    """The file is written when the last robot has its certificate, in the order of the winners."""
+def test_numbers_that_are_there_stay_and_others_are_added_or_made_anew(tmp_path, monkeypatch):
     monkeypatch.setattr(certificates, "certify", lambda scene, samples, progress: made(scene, samples))
     monkeypatch.setattr(certificates, "told", lambda certificate: {"samples": certificate.samples})
     monkeypatch.setattr(certificates, "STUDY", replace(certificates.STUDY, tables={}))
-    kept = tmp_path / "certificates.json"
-    kept.write_text("whole")
 
-    def run(*robots):
-        assert main(["designs.certificates", "--samples", "3", "--out", str(tmp_path), "--robots", *robots]) == 0
+    def run(samples, *robots):
+        folders = ["--out", str(tmp_path), "--folder", str(tmp_path / "kept")]
+        assert main(["designs.certificates", "--samples", str(samples), *folders, "--robots", *robots]) == 0
+        found = json.loads((tmp_path / "certificates.json").read_text(encoding="utf-8"))["robots"]
+        return {name: row["samples"] for name, row in found.items()}
 
-    run(*WINNERS[1:])
-    assert kept.read_text() == "whole" and "too: fastest." in capsys.readouterr().out
-    run("fastest")
-    assert list(json.loads(kept.read_text())["robots"]) == list(WINNERS)
+    assert run(3, *WINNERS) == dict.fromkeys(WINNERS, 3)
+    assert run(2, *ENDS) == dict.fromkeys(WINNERS, 3) | dict.fromkeys(ENDS, 2)
+    assert run(3, *ROBOTS) == dict.fromkeys(ROBOTS, 3)
 
 
 def test_errors_are_told_beside_speeds():
@@ -86,4 +92,4 @@ def test_errors_are_told_beside_speeds():
 def test_the_table_has_two_settings_of_every_robot():
     found = certificates.told(made(scene_of(ROWS["fastest"]), 3))
     lines = certificates.table({"robots": {"one": found}}).splitlines()
-    assert len(lines) == 4 and lines[2].startswith("| one | 7 nodes, 5 ms | 7 | 3.5 | 7 | 1 |")
+    assert len(lines) == 4 and lines[2].startswith("| one | 3 | 7 nodes, 5 ms | 7 | 3.5 | 7 | 1 |")

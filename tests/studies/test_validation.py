@@ -9,7 +9,7 @@ from scipy.stats import norm
 
 from seastar_gym.scene import MeasuredCurve
 from studies.command import main
-from studies.validation import follow, laws, simulate, study, swimmer
+from studies.validation import follow, laws, simulate, study, swimmer, turns
 from studies.validation.in_turn import LATE, InTurn
 from studies.validation.inference import LEVEL, SPREAD, effective, predict, quantiles, score, weights
 from studies.validation.luck import other_fours
@@ -233,6 +233,31 @@ def test_measured_speeds_go_with_other_powers_of_the_change_that_was_measured_th
     np.testing.assert_allclose(laws.powers(CONDITIONS, exact), [[0.5, 2.0], [0.0, 0.0]], atol=1e-9)
 
 
+def test_the_tracked_swimmer_turns_away_from_limbs_that_heat_in_the_first_stroke_of_a_letter():
+    letters = turns.read_letters()
+    turning = np.array([turns.turns_left(name) != 0.0 for name in letters.names])
+    assert turning.sum() == 11 and np.all(letters.turns[turning] > 0.28)
+    assert letters.first[turning].sum() / letters.turns[turning].sum() > 0.8
+    assert np.all(np.abs(letters.turns[~turning]) < 0.2) and np.all(letters.ways > 0.03)
+
+
+def test_letters_of_the_left_and_of_the_right_turn_samples_alike():
+    left, right = (turns.swum(letter, "all four", 10, samples(4)) for letter in "FE")
+    np.testing.assert_allclose(left, right, rtol=1e-3, atol=1e-6)
+    assert np.all(np.abs(turns.swum("B", "all four", 10, samples(4))[0]) < 1e-6)
+
+
+def test_the_committed_turns_are_those_that_were_tracked():
+    results = json.loads((DOCS / "validation.json").read_text(encoding="utf-8"))["turns"]
+    letters = turns.read_letters()
+    for found in results.values():
+        assert found["letters"] == "".join(letters.names)
+        assert found["way_mm"]["measured"] == pytest.approx(1e3 * letters.ways, rel=1e-3)
+        held = [low <= each <= high for low, each, high in
+                zip(*(found["turn_rad"][name] for name in ("low", "measured", "high")), strict=True)]  # fmt: skip
+        assert found["turn_rad"]["score"]["covered"] == pytest.approx(np.mean(held))
+
+
 def test_what_is_missing_is_added_to_results_that_are_there(tmp_path):
     kept = json.loads((DOCS / "validation.json").read_text(encoding="utf-8"))
     (tmp_path / "validation.json").write_text(json.dumps(kept | {"laws": []}), encoding="utf-8")
@@ -248,10 +273,12 @@ def test_the_command_writes_its_page(tmp_path, monkeypatch):
     for module in (simulate, study):
         monkeypatch.setattr(module, "speeds", invented)
     monkeypatch.setattr(follow, "speeds", lambda conditions, values, law: made_up(values))
+    monkeypatch.setattr(turns, "swum", lambda letter, second, material, values: np.full((3, 64), 0.1))
     arguments = ["validation", "--samples", "64", "--variants", "ramp", "--runs", str(tmp_path), "--out", str(tmp_path)]
     assert main(arguments) == 0
     found = json.loads((tmp_path / "validation.json").read_text(encoding="utf-8"))
     assert found["discretisation"] == 0.0 and len(found["laws"]) == 13
     assert set(found["followers"]) == set(follow.LAWS)
+    assert set(found["turns"]) == set(turns.SECOND)
     assert set(found["models"]) == {"full", study.SAME_SAMPLES, "ramp"} and len(found["speeds_mm_per_s"]) == 37
     assert (tmp_path / "validation.png").stat().st_size > 10_000
