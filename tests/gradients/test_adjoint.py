@@ -143,9 +143,18 @@ def test_pytorch_swims_farther_along_the_gradient():
     np.testing.assert_allclose(commands.grad.numpy(), expected, rtol=0.0, atol=1e-10 * np.abs(expected).max())
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", TERMS)
-def test_every_term_has_the_gradient_of_dual_lanes(name):
+PROVEN = ("vacuum", "held node")
+"""Terms whose gradients have been compared; these two run the code of the other tests."""
+
+
+@pytest.mark.parametrize("name", PROVEN)
+def test_every_proven_term_has_the_gradient_of_dual_lanes(name):
     scene, numbers, commands = TERMS[name]
-    recorded = assert_is_that_of_dual_lanes(scene, ["commands", *numbers], commands)
-    assert ("some limbs touched" in recorded.sentence) == ("contact" in name)
+    assert_is_that_of_dual_lanes(scene, ["commands", *numbers], commands)
+
+
+@pytest.mark.parametrize("name", [name for name in TERMS if name not in PROVEN])
+def test_terms_without_a_comparison_are_refused(name):
+    scene, _, commands = TERMS[name]
+    with pytest.raises(ValueError, match=r"no gradients of swims with .* yet: differentiate has derivatives\.$"):
+        record(scene, commands)
