@@ -19,8 +19,10 @@ from seastar_gym.scene import Scene, SmaPulse
 from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.configurations import Swim, configuration_with
 from seastar_gym.sweep.swimming import swim
+from studies.designs import study
 from studies.designs.space import MEASURED, SETTLING, Body
-from studies.frame import Results, Study, require_known
+from studies.frame import DOCS, Results, Study, require_known
+from studies.pages import numbers
 
 Table = dict[str, Any]
 WINNERS = (
@@ -32,7 +34,6 @@ NODES = (7, 19)
 """Nodes per limb of the certified settings that are told of: those of `fast`, and most."""
 STEPS = (5e-3, 1e-3)
 """Their steps [s]."""
-DESIGNS = Path(__file__).resolve().parents[2] / "docs" / "designs.json"
 
 
 def scene_of(row: Table) -> Scene:
@@ -121,7 +122,7 @@ class Options:
 
 def certify_all(options: Options, results: Results) -> None:
     """Certify robots, and tell their errors once all winners have certificates."""
-    rows = json.loads(DESIGNS.read_text(encoding="utf-8"))
+    rows = numbers(DOCS, study.STUDY)
     found: Table = {}
 
     def add(name: str) -> None:
@@ -139,5 +140,5 @@ def certify_all(options: Options, results: Results) -> None:
 
 
 STUDY = Study(
-    "designs.certificates", certify_all, Options, "certificates.json", tables={"certificates": table}
+    "designs.certificates", certify_all, Options, "designs/certificates.json", tables={"certificates": table}
 )

@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 from importlib.util import find_spec
-from pathlib import Path
 
 import pytest
 
@@ -16,9 +15,11 @@ from seastar_gym.version import __version__
 from studies.command import main
 from studies.designs import certificates
 from studies.designs.certificates import CLASS, NODES, STEPS, WINNERS, certificate_of, scene_of
+from studies.designs.study import STUDY
+from studies.frame import DOCS
+from studies.pages import numbers
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
-ROWS = json.loads((DOCS / "designs.json").read_text(encoding="utf-8"))
+ROWS = numbers(DOCS, STUDY)
 
 
 def made(scene, samples):
