@@ -56,7 +56,7 @@ def run(study: Study, given: Sequence[str], doc: str) -> int:
     prog = f"python -m studies.{study.name}"
     if {"-h", "--help"} & set(given):
         print(command_parser(prog, doc).description, end="\n\n")
-    options = tyro.cli(study.options, prog=prog, args=given)
+    options = tyro.cli(study.options, prog=prog, args=given, default=study.defaults())
     out = Path(getattr(options, "out", "."))
     file = study.place(out, study.file) if study.file else None
     command = prog if study.settings else shlex.join([*prog.split(), *given])
@@ -81,7 +81,7 @@ def told(study: Study, results: Results, out: Path, file: Path) -> None:
     for name, text in study.tables.items():
         show(f"{name}:\n\n{text(results)}")
     print(f"Written: {', '.join(map(str, files))}")
-    if file.resolve() == DOCS / study.home / study.file:
+    if file.resolve() == study.committed(DOCS, study.file):
         fill(DOCS, (study,))
 
 

@@ -7,20 +7,22 @@ its room, whose module is `study`.
 import json
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from studies.results_file import keep
 
 DOCS = Path(__file__).parents[1] / "docs"
+RESULTS = Path("results")
+"""Folder in docs/ of numbers and their pictures, in a folder for every claim that they support."""
 
 
 @dataclass(frozen=True)
 class InDocs:
-    """Options of a study that has no others."""
+    """Options of a study that writes where docs/ has its numbers. Alone, of a study that has no others."""
 
-    out: Path = Path("docs")
+    out: Path = Path("docs") / RESULTS
     """Folder of the files, or the file of the numbers."""
 
 
@@ -31,13 +33,12 @@ class Study:
     name: As the command has it: the module's without "studies." and ".study".
     run: Computes and fills the results; returns a sentence if something failed. None: there is nothing to run.
     options: Dataclass of the options. One of them may be `out`: the folder of the files, or the file of the numbers.
-    file: Name of the file of the numbers, which docs/ has as well; empty for none.
-    home: Folder in docs/ of what the study keeps there.
+    file: File of the numbers as docs/results/ has it, such as "learning/bound.json"; empty for none.
     settings: What all numbers of a file have in common. A study that tells it goes on with the file that is there.
-    pictures: By their names, how they are drawn from the numbers into a file.
+    pictures: By their names, how they are drawn from the numbers into a file beside them.
     tables: By the names that pages give them, tables in Markdown.
-    pages: By their names, whole pages in Markdown.
-    drawn: Names of pictures in docs/ that only a run draws.
+    pages: By their names in docs/, whole pages in Markdown.
+    drawn: Pictures in docs/results/ that only a run draws.
     packages: Packages whose versions count, beside those of every study.
     extra: What brings them, where a run needs more than the module does.
     """
@@ -46,7 +47,6 @@ class Study:
     run: Callable[[Any, "Results"], str | None] | None = None
     options: type[Any] = InDocs
     file: str = ""
-    home: str = ""
     settings: Callable[[Any], Mapping[str, Any]] | None = None
     pictures: Mapping[str, Callable[[Any, Path], None]] = field(default_factory=dict)
     tables: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
@@ -57,7 +57,17 @@ class Study:
 
     def place(self, out: Path, name: str) -> Path:
         """Where a file of the study goes: into the folder `out`, or beside the file `out`, by its name."""
-        return out.with_name(name.replace(Path(self.file).stem, out.stem)) if out.suffix else out / name
+        last = Path(name).name
+        return out.with_name(last.replace(Path(self.file).stem, out.stem)) if out.suffix else out / last
+
+    def committed(self, docs: Path, name: str) -> Path:
+        """File of the numbers, or picture, in a folder such as docs/."""
+        return self.place((docs / RESULTS / self.file).parent, name)
+
+    def defaults(self) -> Any:
+        """Options where none is given."""
+        found = self.options()
+        return replace(found, out=found.out / Path(self.file).parent) if isinstance(found, InDocs) else found
 
     def write(self, results: Any, out: Path) -> list[Path]:
         """Draw the pictures and write the whole pages; returns their files."""

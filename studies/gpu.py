@@ -395,5 +395,5 @@ def settings(options: Options) -> dict[str, Any]:
 
 
 STUDY = Study(
-    "gpu", run, Options, file="gpu.json", settings=settings, pictures={"gpu.png": draw}, tables={"gpu": speeds}
+    "gpu", run, Options, file="speed/gpu.json", settings=settings, pictures={"gpu.png": draw}, tables={"gpu": speeds}
 )

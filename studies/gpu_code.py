@@ -1,6 +1,6 @@
 """Registers that the code for GPUs needs, and what it spills into memory: no GPU is needed, NVIDIA's assembler is.
 
-`pip install -e ".[gpu-check]"` brings it (ptxas). Tests refuse code that needs more than docs/gpu_code.json has.
+`pip install -e ".[gpu-check]"` brings it (ptxas). Tests refuse code that needs more than `gpu_code.json` in docs/ has.
 """
 
 import re
@@ -111,4 +111,4 @@ def registers(results: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-STUDY = Study("gpu_code", run, Options, file="gpu_code.json", tables={"gpu_code": registers})
+STUDY = Study("gpu_code", run, Options, file="speed/gpu_code.json", tables={"gpu_code": registers})

@@ -237,5 +237,9 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
 
 
 STUDY = Study(
-    "gradients", run, file="gradients.json", pictures={"gradients.png": draw}, tables={"gradients growth": table}
+    "gradients",
+    run,
+    file="gradients/gradients.json",
+    pictures={"gradients.png": draw},
+    tables={"gradients growth": table},
 )

@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.markdown import Markdown
 
 from seastar_gym.files import write_atomically
-from studies.frame import Study
+from studies.frame import RESULTS, Study
 from studies.provenance import footer
 
 BLOCK = re.compile(r"(<!-- made: (.+?) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
@@ -34,12 +34,12 @@ def read(file: Path) -> Any:
 
 def numbers(docs: Path, study: Study) -> Any:
     """Numbers of a study, if it keeps any."""
-    return read(docs / study.home / study.file) if study.file else {}
+    return read(study.committed(docs, study.file)) if study.file else {}
 
 
 def told(docs: Path, studies: Sequence[Study]) -> list[Study]:
     """Studies whose numbers are in the folder, or that keep none."""
-    return [study for study in studies if (docs / study.home / study.file).exists()]
+    return [study for study in studies if not study.file or study.committed(docs, study.file).exists()]
 
 
 def show(text: str) -> None:
@@ -48,8 +48,8 @@ def show(text: str) -> None:
 
 
 def footer_of(docs: Path, names: str) -> str:
-    """Footer of numbers in files of the folder, whose names have spaces between them."""
-    return footer({name: read(docs / name) for name in names.split()})
+    """Footer of numbers in files of docs/results/, whose names have spaces between them."""
+    return footer({name: read(docs / RESULTS / name) for name in names.split()})
 
 
 def tables(docs: Path, studies: Sequence[Study]) -> dict[str, Callable[[], str]]:
@@ -96,7 +96,7 @@ def is_drawn_so(docs: Path, study: Study, name: str) -> bool:
     with tempfile.TemporaryDirectory() as folder:
         new = Path(folder) / name
         study.pictures[name](numbers(docs, study), new)
-        files = new, docs / study.home / name
+        files = new, study.committed(docs, name)
         one, other = (np.asarray(Image.open(file).convert("RGB"), dtype=float) for file in files)
     return one.shape == other.shape and bool(np.mean(np.abs(one - other).max(axis=2) > DIFFERENT) < TOLERANCE)
 
@@ -118,7 +118,7 @@ def draw(docs: Path, studies: Sequence[Study]) -> int:
     """Draw the pictures and fill the pages again; returns the exit code."""
     for study in told(docs, studies):
         for name, picture in study.pictures.items():
-            picture(numbers(docs, study), docs / study.home / name)
+            picture(numbers(docs, study), study.committed(docs, name))
     fill(docs, studies)
     return 0
 

@@ -346,6 +346,6 @@ def run(_: InDocs, results: Results) -> None:
 
 
 STUDY = Study(
-    "protocol", run, file="protocol.json", packages=("torch", "stable_baselines3"),
+    "protocol", run, file="plant/protocol.json", packages=("torch", "stable_baselines3"),
     tables={"protocol numbers": numbers_table, "protocol forecasts": forecasts, "protocol runs": times},
 )  # fmt: skip

@@ -40,13 +40,13 @@ def _processor() -> str:
 
 
 COMMANDS = {
-    "gaits.json": "python -m studies.gaits",
-    "heading.json": "python -m studies.learning.heading",
-    "hub.json": "python -m studies.designs.hub",
-    "limbs.json": "python -m studies.measurements.limbs --models --swims",
-    "promises.json": "python -m studies.accuracy.promises",
-    "tasks.json": "python -m studies.tasks",
-    "validation.json": "python -m studies.validation",
+    "gaits/gaits.json": "python -m studies.gaits",
+    "gaits/heading.json": "python -m studies.learning.heading",
+    "designs/hub.json": "python -m studies.designs.hub",
+    "validation/limbs.json": "python -m studies.measurements.limbs --models --swims",
+    "accuracy/promises.json": "python -m studies.accuracy.promises",
+    "tasks/tasks.json": "python -m studies.tasks",
+    "validation/validation.json": "python -m studies.validation",
 }
 """Commands of files that were written before studies recorded them."""
 
@@ -54,29 +54,31 @@ COMMANDS = {
 FINAL = {
     file: commit
     for commit, files in {
-        "0e818f3": "damping.json damping.png fidelities.json fidelities.png gaits.json gaits_directions.png "
-        "gaits_front.png gaits_lag.png pentagon_from_rest.json pentagon_reheated.json",
-        "9cd3be4": "ablations.json ablations.png ringing.json ringing.png",
-        "71299f4": "heading.json heading.png hub.json hub.png numerical_damping.json",
+        "0e818f3": "accuracy/damping.json accuracy/damping.png learning/fidelities.json learning/fidelities.png "
+        "gaits/gaits.json gaits/gaits_directions.png gaits/gaits_front.png gaits/gaits_lag.png "
+        "gaits/pentagon_from_rest.json gaits/pentagon_reheated.json",
+        "9cd3be4": "learning/ablations.json learning/ablations.png accuracy/ringing.json accuracy/ringing.png",
+        "71299f4": "gaits/heading.json gaits/heading.png designs/hub.json designs/hub.png "
+        "accuracy/numerical_damping.json",
     }.items()
     for file in files.split()
 }
-"""Files of docs/ that are final, and the last commit that has the code of their study."""
+"""Files of docs/results/ that are final, and the last commit that has the code of their study."""
 
 
 def made_by(results: Mapping[str, Any], file: str) -> str:
     """Words in Markdown that say how the results in a file were made, and what the run did not record.
 
-    file: Name of the file beside the page, which has the options, the versions and the machine.
+    file: The file in docs/results/, which has the options, the versions and the machine.
     """
     command = " ".join(str(results.get("command", COMMANDS.get(file))).split()[:3])
-    said = f"[{file}]({file}) by `{command}`"
+    said = f"[{Path(file).name}](results/{file}) by `{command}`"
     said += f" at commit {FINAL[file]}" if file in FINAL else ""
     missing = " and ".join(name for name in ("versions", "machine") if name not in results)
     return f"{said}{f' ({missing} not recorded)' if missing else ''}"
 
 
 def footer(files: Mapping[str, Mapping[str, Any]]) -> str:
-    """Line in Markdown below the numbers of a page. files: Results of files beside the page, by their names."""
+    """Line in Markdown below the numbers of a page. files: Results, by their files in docs/results/."""
     made = "; ".join(made_by(found, name) for name, found in files.items())
     return f"*Numbers, with options, versions and machine: {made}.*"

@@ -61,9 +61,8 @@ def parser() -> argparse.ArgumentParser:
     report = found.add_argument_group("what the report shows, too")
     report.add_argument("--runs", nargs="+", type=Path, default=[], help="trainings (default: those of learned agents)")
     report.add_argument("--trials", type=Path, help="CSV file that --sets wrote")
-    report.add_argument(
-        "--bound", type=Path, default=Path("docs/bound.json"), help=f"results of studies.learning.bound {default}"
-    )
+    bound = Path("docs/results/learning/bound.json")
+    report.add_argument("--bound", type=Path, default=bound, help=f"results of studies.learning.bound {default}")
     many = found.add_argument_group("many swims")
     many.add_argument("--sets", nargs="+", choices=SETS, help="named paths; random paths or the pentagon, disturbed")
     many.add_argument("--swims", type=int, default=1000, help=f"number of random paths of every set {default}")

@@ -140,5 +140,9 @@ def _percent(share: float | None) -> str:
 
 
 STUDY = Study(
-    "accuracy.contact", run, file="contact.json", settings=lambda _: {"sequences": 14}, tables={"contact": table}
+    "accuracy.contact",
+    run,
+    file="accuracy/contact.json",
+    settings=lambda _: {"sequences": 14},
+    tables={"contact": table},
 )

@@ -28,7 +28,7 @@ from seastar_gym.scene import Numerics, Scene, Seastar, Water, relaxation_time
 from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.error_bars import factor
-from studies.frame import Results, Study
+from studies.frame import InDocs, Results, Study
 from studies.style import FAINT, INK, PERCENT, subplots
 
 Floats = NDArray[np.float64]
@@ -218,15 +218,13 @@ def draw(rows: list[Row], path: Path) -> None:
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(InDocs):
     """Coverage and sharpness of error bars."""
 
     samples: int = SAMPLES
     """Sequences per class."""
     seeds: tuple[int, int] = (1000, 3000)
     """Of calibration and test."""
-    out: Path = Path("docs")
-    """Folder of the files, or the file of the numbers."""
 
 
 def run(options: Options, results: Results) -> str | None:
@@ -243,8 +241,8 @@ STUDY = Study(
     "accuracy.error_bars",
     run,
     Options,
-    "error_bars.json",
+    "accuracy/error_bars.json",
     pictures={"error_bars.png": lambda results, file: draw(rows_of(results), file)},
     tables={"error_bars robots": of_robots, "error_bars settings": of_settings},
-    drawn=("error_bars.png",),
+    drawn=("accuracy/error_bars.png",),
 )

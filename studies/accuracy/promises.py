@@ -33,7 +33,7 @@ from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 from studies.accuracy.error_bars import ROBOTS
-from studies.frame import Results, Study, require_known
+from studies.frame import InDocs, Results, Study, require_known
 
 Floats = NDArray[np.float64]
 
@@ -174,7 +174,7 @@ def _cells(found: dict[str, Any]) -> list[tuple[str, dict[tuple[str, str], int]]
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(InDocs):
     """Exceedances of certified errors."""
 
     samples: int = SAMPLES
@@ -183,8 +183,6 @@ class Options:
     """Robots."""
     certificates: Path = Path("runs/certificates")
     """Folder of certificates."""
-    out: Path = Path("docs")
-    """Folder of the files, or the file of the numbers."""
 
     def __post_init__(self) -> None:
         require_known("robot", self.robots, ROBOTS)
@@ -202,4 +200,4 @@ def run(options: Options, results: Results) -> None:
     print(summary(results))
 
 
-STUDY = Study("accuracy.promises", run, Options, "promises.json", tables={"promises": table})
+STUDY = Study("accuracy.promises", run, Options, "accuracy/promises.json", tables={"promises": table})

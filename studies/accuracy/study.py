@@ -114,5 +114,5 @@ STUDY = Study(
         name: lambda _, name=name: getattr(page, name)()  # type: ignore[misc]
         for name in ("errors", "choosing", "presets", "timed", "timed_paths")
     },
-    drawn=("convergence.png", "work_precision.png"),
+    drawn=("accuracy/convergence.png", "accuracy/work_precision.png"),
 )

@@ -128,7 +128,7 @@ def run(_: InDocs, results: Results) -> None:
 STUDY = Study(
     "accuracy.work_precision",
     run,
-    file="work_precision.json",
+    file="accuracy/work_precision.json",
     pictures={"work_precision_problems.png": draw},
     tables={"work_precision presets": of_presets, "work_precision": of_settings},
 )

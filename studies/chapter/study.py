@@ -96,7 +96,7 @@ STUDY = Study(
     "chapter",
     run,
     Options,
-    "chapter.json",
+    "chapter/chapter.json",
     pictures={
         "fig_13_2.png": lambda found, file: pictures.draw_pentagon_snapshots(*swims_of(found, "pentagon"), file),
         "fig_13_7a.png": lambda found, file: pictures.draw_pentagon(*swims_of(found, "pentagon"), file),

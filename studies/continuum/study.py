@@ -172,7 +172,7 @@ def run(options: InDocs, results: Results) -> str | None:
 STUDY = Study(
     "continuum",
     run,
-    file="continuum.json",
+    file="accuracy/continuum.json",
     pictures={"continuum.png": lambda results, file: draw(rows_of(results), file)},
     tables={"continuum": table},
 )

@@ -20,9 +20,11 @@ from seastar_gym.scene import Contact, Scene, Seastar, SmaPulse
 from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.configurations import Swim, configuration_with
 from seastar_gym.sweep.swimming import swim
+from studies.designs import front, study
 from studies.designs.front import AT_WORK, THRIFTIEST
 from studies.designs.space import MEASURED, SETTLING, Body
-from studies.frame import Results, Study, require_known
+from studies.frame import DOCS, Results, Study, require_known
+from studies.pages import numbers
 
 Table = dict[str, Any]
 WINNERS = (
@@ -37,13 +39,12 @@ NODES = (7, 19)
 """Nodes per limb of the certified settings that are told of: those of `fast`, and most."""
 STEPS = (5e-3, 1e-3)
 """Their steps [s]."""
-DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
 def rows() -> Table:
     """What designs.json and front.json say of the robots, by their names."""
-    designs, front = (json.loads((DOCS / f"{name}.json").read_text(encoding="utf-8")) for name in ("designs", "front"))
-    return {name: designs[name] for name in WINNERS} | {name: front["robots"][name] for name in ENDS}
+    designs, ends = (numbers(DOCS, each.STUDY) for each in (study, front))
+    return {name: designs[name] for name in WINNERS} | {name: ends["robots"][name] for name in ENDS}
 
 
 def scene_of(row: Table) -> Scene:
@@ -152,6 +153,6 @@ def certify_all(options: Options, results: Results) -> None:
 
 
 STUDY = Study(
-    "designs.certificates", certify_all, Options, "certificates.json", settings=lambda _: {"class": CLASS},
+    "designs.certificates", certify_all, Options, "designs/certificates.json", settings=lambda _: {"class": CLASS},
     tables={"certificates": table},
 )  # fmt: skip

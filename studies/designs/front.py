@@ -166,6 +166,6 @@ def draw(results: Table, file: Path) -> None:
 
 
 STUDY = Study(
-    "designs.front", run, Options, "front.json", pictures={"front.png": draw},
+    "designs.front", run, Options, "designs/front.json", pictures={"front.png": draw},
     tables={"front robots": robots, "front by_work": by_work}, packages=("pandas", "pyarrow"),
 )  # fmt: skip

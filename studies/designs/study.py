@@ -169,7 +169,7 @@ STUDY = Study(
     "designs",
     swim_all,
     Options,
-    "designs.json",
+    "designs/designs.json",
     pictures={"designs.png": draw},
     tables={"designs robots": robots},
     packages=("pandas", "pyarrow"),

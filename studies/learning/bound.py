@@ -34,7 +34,7 @@ from seastar_gym.evaluation.many import swim_many
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator, State
-from studies.frame import Results, Study
+from studies.frame import InDocs, Results, Study
 from studies.style import CYCLE, subplots
 
 Floats = NDArray[np.float64]
@@ -143,7 +143,7 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(InDocs):
     """Fastest swims found offline: the best gaits, the best speed in every direction, and the fastest pentagon."""
 
     fidelity: Fidelity = "fast"
@@ -153,8 +153,6 @@ class Options:
     only_pentagon: bool = False
     """Search only the pentagon, print the number of strokes found, and write nothing."""
     agents: Annotated[tuple[str, ...], tyro.conf.arg(help=HELP)] = ("learned",)
-    out: Path = Path("docs/bound.json")
-    """File of the results. The picture has the same name with the suffix .png."""
 
 
 def study_gaits(scene: Scene) -> tuple[list[dict[str, Any]], Floats]:
@@ -240,4 +238,4 @@ def run(options: Options, results: Results) -> None:
     print(f"Pentagon: {results['pentagon']['strokes']} strokes. All in {time.perf_counter() - began:.0f} s.")
 
 
-STUDY = Study("learning.bound", run, Options, "bound.json", pictures={"bound.png": draw})
+STUDY = Study("learning.bound", run, Options, "learning/bound.json", pictures={"bound.png": draw})

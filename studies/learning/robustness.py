@@ -179,6 +179,6 @@ def run(_: InDocs, results: Results) -> None:
 
 
 STUDY = Study(
-    "learning.robustness", run, file="robustness.json", tables={"robustness": table, "robustness seeds": seeds},
+    "learning.robustness", run, file="plant/robustness.json", tables={"robustness": table, "robustness seeds": seeds},
     packages=("torch",),
 )  # fmt: skip

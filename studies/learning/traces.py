@@ -69,4 +69,4 @@ def run(_: InDocs, results: Results) -> None:
     print(", ".join(f"{each.agent}: {each.result}" for each in from_data(results)))
 
 
-STUDY = Study("learning.traces", run, file="pentagon.json", pictures={"pentagon.png": draw})
+STUDY = Study("learning.traces", run, file="learning/pentagon.json", pictures={"pentagon.png": draw})

@@ -10,7 +10,6 @@ Prints tables and writes `limbs.json` and `limbs.png`. Takes about ten seconds o
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from rich.table import Table
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.pulse import pulse
-from studies.frame import Results, Study
+from studies.frame import InDocs, Results, Study
 from studies.measurements.curves import PHASES, Curve, read_curves
 from studies.measurements.fit import Fit, fit, predict
 from studies.measurements.model import MODELS
@@ -157,11 +156,9 @@ def study_policies(console: Console) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(InDocs):
     """Fits of measured limbs, and predictions."""
 
-    out: Path = Path("docs")
-    """Folder of the files, or the file of the numbers."""
     models: bool = False
     """Also compare the other models."""
     swims: bool = False
@@ -185,5 +182,5 @@ def run(options: Options, results: Results) -> None:
 
 
 STUDY = Study(
-    "measurements.limbs", run, Options, "limbs.json", pictures={"limbs.png": draw}, packages=("scipy",)
+    "measurements.limbs", run, Options, "validation/limbs.json", pictures={"limbs.png": draw}, packages=("scipy",)
 )

@@ -23,7 +23,7 @@ from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.limb import Limb
 from seastar_gym.scene.section import AnySection, Disc, Section
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study
+from studies.frame import InDocs, Results, Study
 from studies.style import INK, subplots
 
 Floats = NDArray[np.float64]
@@ -196,9 +196,9 @@ def _file_name(exhibit: Exhibit) -> str:
 
 def draw_all(out: Path, strokes: int = STROKES) -> None:
     """Write the pictures into a folder."""
-    (out / "gallery").mkdir(parents=True, exist_ok=True)
+    out.mkdir(parents=True, exist_ok=True)
     for exhibit in exhibits():
-        draw(exhibit, out / "gallery" / _file_name(exhibit), strokes)
+        draw(exhibit, out / _file_name(exhibit), strokes)
 
 
 def measured(rounds: int = ROUNDS, n_robots: int = ROBOTS) -> dict[str, Any]:
@@ -210,20 +210,20 @@ def measured(rounds: int = ROUNDS, n_robots: int = ROBOTS) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(InDocs):
     """Pictures and costs of scenes."""
 
-    out: Path = Path("docs")
-    """Folder of the files, or the file of the numbers."""
+    pictures: Path = Path("docs/gallery")
+    """Folder of the pictures."""
     draw_only: bool = False
     """Draw the pictures, measure nothing."""
 
 
 def run(options: Options, results: Results) -> None:
     """Draw the pictures, and measure the costs if they are asked for."""
-    draw_all(options.out)
+    draw_all(options.pictures)
     if not options.draw_only:
         results.update(measured())
 
 
-STUDY = Study("scenes.gallery", run, Options, "gallery.json", tables={"gallery": table})
+STUDY = Study("scenes.gallery", run, Options, "gallery/gallery.json", tables={"gallery": table})

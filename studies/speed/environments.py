@@ -119,6 +119,6 @@ def _two(number: float) -> str:
 
 
 STUDY = Study(
-    "speed.environments", run, Options, file="speed_environments.json", tables={"speed environments": table},
+    "speed.environments", run, Options, file="speed/speed_environments.json", tables={"speed environments": table},
     packages=("mujoco",), extra="mujoco",
 )  # fmt: skip

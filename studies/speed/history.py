@@ -1,8 +1,8 @@
 """History of the speed: ten fixed things, timed now and kept beside what they took before.
 
 Each is a processor time, as a multiple of that of one fixed loop, which is timed just before and just after it: runs on
-machines that are as busy as they please can be compared. A run adds a row with its date to docs/speed_history.json.
-Caches and memory are shared with other work of a machine, however, so what differs by less than 20 % is the same.
+machines that are as busy as they please can be compared. A run adds a row with its date to `speed_history.json`. Caches
+and memory are shared with other work of a machine, however, so what differs by less than 20 % is the same.
 """
 
 import os
@@ -149,6 +149,6 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
 
 
 STUDY = Study(
-    "speed.history", run, file="speed_history.json", settings=lambda _: UNIT,
+    "speed.history", run, file="speed/speed_history.json", settings=lambda _: UNIT,
     pictures={"speed_history.png": draw}, tables={"speed history": table},
 )  # fmt: skip

@@ -158,4 +158,4 @@ def run_cells(options: Options, results: Results) -> None:
     print(json.dumps(results, indent=1))
 
 
-STUDY = Study("speed.sweeps", run_cells, Options, "sweeps.json", tables={"sweeps": table})
+STUDY = Study("speed.sweeps", run_cells, Options, "speed/sweeps.json", tables={"sweeps": table})

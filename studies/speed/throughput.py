@@ -208,4 +208,4 @@ def run(options: Options, _: Results) -> None:
     print(f"Written: {options.out / 'throughput.csv'}, {options.out / 'throughput.png'}")
 
 
-STUDY = Study("speed.throughput", run, Options, drawn=("throughput.png",))
+STUDY = Study("speed.throughput", run, Options, drawn=("speed/throughput.png",))

@@ -209,7 +209,7 @@ STUDY = Study(
     "stability",
     run,
     Options,
-    "stability.json",
+    "stability/stability.json",
     pictures={f"stability_{name}.png": draw for name in ("needs", "iterations", "error")},
     tables={"stability": table},
 )

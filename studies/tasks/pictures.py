@@ -3,6 +3,8 @@
 python -m studies.tasks.pictures
 """
 
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from seastar_gym.evaluation.tasks import make_batch
-from studies.frame import InDocs, Results, Study
+from studies.frame import Results, Study
 from studies.tasks.controllers import make_controller
 from studies.tasks.episodes import rollout_of
 
@@ -35,13 +37,20 @@ def picture(id: str, controller: str, strokes: int, instance: int = 0) -> NDArra
     return np.asarray(drawn)
 
 
-def run(options: InDocs, _: Results) -> None:
-    """Draw the pictures into the folder tasks."""
-    folder = options.out / "tasks"
-    folder.mkdir(parents=True, exist_ok=True)
+@dataclass(frozen=True)
+class Options:
+    """Pictures of the tasks."""
+
+    out: Path = Path("docs/tasks")
+    """Folder of the pictures."""
+
+
+def run(options: Options, _: Results) -> None:
+    """Draw the pictures."""
+    options.out.mkdir(parents=True, exist_ok=True)
     for name, shown in SHOWN.items():
-        Image.fromarray(picture(*shown)).save(folder / f"{name}.png", optimize=True)
+        Image.fromarray(picture(*shown)).save(options.out / f"{name}.png", optimize=True)
         print(name, flush=True)
 
 
-STUDY = Study("tasks.pictures", run)
+STUDY = Study("tasks.pictures", run, Options)

@@ -11,7 +11,6 @@ import itertools
 import time
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.evaluation.measures import measure_of_challenge
 from seastar_gym.evaluation.rollout import Episodes
 from seastar_gym.scene.numerics import Fidelity
-from studies.frame import Results, Study, require_known
+from studies.frame import InDocs, Results, Study, require_known
 from studies.tasks import heading
 from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
 from studies.tasks.episodes import swim
@@ -41,7 +40,7 @@ DEFAULT_LEARNERS = ("PPO", "PPO, memory", "PPO, told the way", "PPO, memory, coa
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(InDocs):
     """Headroom of the tasks: what rules, planners, learners and a bound that knows everything make of them."""
 
     ids: tuple[str, ...] = tuple(IDS)
@@ -58,8 +57,6 @@ class Options:
     """Fidelity of the simulated swims."""
     num_threads: int | None = None
     """Threads of the simulator; all processors by default."""
-    out: Path = Path("docs/tasks.json")
-    """File of the results. The picture has the same name with the suffix .png."""
 
     def __post_init__(self) -> None:
         require_known("task", self.ids, IDS)
@@ -123,7 +120,7 @@ STUDY = Study(
     "tasks",
     study,
     Options,
-    "tasks.json",
+    "tasks/tasks.json",
     settings=lambda options: {name: getattr(options, name) for name in ("decisions", "fidelity")},
     pictures={"tasks.png": lambda results, file: draw(rows_of(results, IDS), file)},
     tables={

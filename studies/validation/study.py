@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.frame import Results, Study, require_known
+from studies.frame import InDocs, Results, Study, require_known
 from studies.validation import follow, laws, turns
 from studies.validation.inference import MODEL, SCATTER, effective, hindsight, one_speed, predict, score, weights
 from studies.validation.luck import other_fours, scores
@@ -117,7 +117,7 @@ def as_json(
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(InDocs):
     """Unknowns from four speeds, and predictions of the others."""
 
     samples: int = SAMPLES
@@ -128,8 +128,6 @@ class Options:
     """Keep the full model that is there, and add what is missing of the others; laws of one constant are new."""
     runs: Path = Path("runs/validation")
     """Folder of speeds."""
-    out: Path = Path("docs")
-    """Folder of the files, or the file of the numbers."""
 
 
 def run(options: Options, results: Results) -> None:
@@ -174,7 +172,7 @@ STUDY = Study(
     "validation",
     run,
     Options,
-    "validation.json",
+    "validation/validation.json",
     pictures={"validation.png": draw},
     tables={"validation": laws.table, "validation tried": laws.tried, "validation turns": turns.table},
     packages=("scipy",),

@@ -314,6 +314,6 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
 
 
 STUDY = Study(
-    "verification.mujoco", run, Options, file="mujoco.json", pictures={"mujoco.png": draw}, tables={"mujoco": table},
-    packages=("mujoco",), extra="mujoco",
+    "verification.mujoco", run, Options, file="verification/mujoco.json",
+    pictures={"mujoco.png": draw}, tables={"mujoco": table}, packages=("mujoco",), extra="mujoco",
 )  # fmt: skip

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -18,14 +17,15 @@ from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.statistics import mean_with_interval
 from seastar_gym.evaluation.swim import swim
 from studies.command import main
+from studies.frame import DOCS
 from studies.learning.timed import study, trainings
 from studies.learning.timed.shares import ChosenCommands, shares_of_pairs
 from studies.learning.timed.study import Options
 from studies.learning.timed.tables import as_markdown, pulses_per_metre
 from studies.learning.timed.trainings import TRAININGS, ReducedPolicy, Training, learn
+from studies.pages import numbers
 from symmetries import assert_equivariant
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
 TINY = (
     ("decision_period", 0.5), ("num_envs", 8), ("rollout", 8), ("batch_size", 32), ("epochs", 1), ("hidden", (8,)),
     ("max_episode_time", 10.0),
@@ -51,14 +51,14 @@ def test_the_trainings_of_the_study_are_valid_and_differ():
 
 
 def test_no_seed_is_left_out_of_the_committed_results():
-    runs = json.loads((DOCS / "in_time.json").read_text(encoding="utf-8"))["runs"]
+    runs = numbers(DOCS, study.STUDY)["runs"]
     assert all(list(found) == [str(seed) for seed in range(len(found))] for found in runs.values())
 
 
 @pytest.mark.parametrize("page", ["results.md", "training.md"])
 def test_pages_beside_the_study_quote_its_mean_of_ten_seeds(page):
     """The fastest training stands beside all ten, and each is named once."""
-    runs = json.loads((DOCS / "in_time.json").read_text(encoding="utf-8"))["runs"]["0.2 s, coasting"]
+    runs = numbers(DOCS, study.STUDY)["runs"]["0.2 s, coasting"]
     text = (DOCS / page).read_text(encoding="utf-8")
     seconds = {
         fidelity: np.array([run["pentagon"][fidelity]["seconds"] for run in runs.values()])

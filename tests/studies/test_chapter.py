@@ -1,9 +1,7 @@
 """The chapter's figures show the swims that they name, and its statements stand beside the computed numbers."""
 
 import csv
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +10,9 @@ from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse
 from seastar_gym.gaits import STRAIGHT, pentagon_gait
 from studies.chapter import cost, pictures, results, statements, swims
 from studies.chapter.study import STUDY, make_figures
+from studies.frame import DOCS
+from studies.pages import numbers
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
 COARSE = replace(swims.CHAPTER, numerics=Numerics("implicit-euler", 10e-3))
 PAIRS = list(statements.PAIRS.values())
 
@@ -127,7 +126,7 @@ def test_pairs_go_along_their_bisectors_1_4_farthest_and_1_2_least(converged):
 
 def test_the_committed_limit_of_the_pairs_is_that_of_37_nodes_too():
     """With 73 nodes, to 0.1 %; ten nodes of the same discretisation are up to 0.8 % off."""
-    pairs = json.loads((DOCS / "chapter.json").read_text(encoding="utf-8"))["pairs_mm"]
+    pairs = numbers(DOCS, STUDY)["pairs_mm"]
     few, limit = np.array(pairs[swims.CONTINUUM.label]), np.array(pairs[swims.LIMIT.label])
     np.testing.assert_allclose(limit, [28.19, 34.36, 39.36, 32.29], atol=0.01)
     assert 0.005 < np.abs(few / limit - 1.0).max() < 0.008

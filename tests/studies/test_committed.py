@@ -19,6 +19,7 @@ from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 from studies.accuracy.tables import two_digits
 from studies.command import all_studies
+from studies.frame import InDocs
 from studies.learning.bound import MEASURED, MM, SETTLING
 from studies.pages import BLOCK, check, draw, filled, is_drawn_so, pages, tables, told
 from studies.provenance import FINAL, footer, machine, provenance
@@ -26,11 +27,21 @@ from studies.scenes.page import UNIT, transitions
 
 DOCS = Path(__file__).parents[2] / "docs"
 STUDIES = list(all_studies())
-PICTURES = {name: study for study in told(DOCS, STUDIES) for name in study.pictures if not study.home}
+RESULTS = DOCS / "results"
+PICTURES = {
+    study.committed(DOCS, name).relative_to(RESULTS).as_posix(): study
+    for study in told(DOCS, STUDIES) for name in study.pictures
+}  # fmt: skip
+"""Studies of pictures that follow from numbers, by their files."""
 
 
 def read(name):
-    return json.loads((DOCS / name).read_text(encoding="utf-8"))
+    return json.loads((RESULTS / name).read_text(encoding="utf-8"))
+
+
+def committed(ending):
+    """Files in docs/results/ that have an ending."""
+    return [file.relative_to(RESULTS).as_posix() for file in RESULTS.rglob(f"*.{ending}")]
 
 
 def command(name):
@@ -43,7 +54,7 @@ def command(name):
 
 @pytest.mark.parametrize("period", [1, 2, 3])
 def test_the_fastest_gaits_swim_as_fast_as_bound_json_says(period):
-    results = read("bound.json")
+    results = read("learning/bound.json")
     gaits = [gait for gait in results["fastest_gaits"] if gait["period"] == period]
     commands = np.array([[command(name) for name in gait["gait"]] for gait in gaits])
     found = measure_gaits(make_scene(None, results["fidelity"]), commands, SETTLING, MEASURED)
@@ -54,16 +65,18 @@ def test_the_fastest_gaits_swim_as_fast_as_bound_json_says(period):
 @pytest.mark.parametrize("name", PICTURES)
 def test_pictures_are_those_of_their_numbers(name):
     """`python -m studies --draw` draws them again."""
-    assert is_drawn_so(DOCS, PICTURES[name], name)
+    assert is_drawn_so(DOCS, PICTURES[name], Path(name).name)
 
 
 def test_another_number_makes_another_picture(tmp_path):
     """The comparison tells a curve that moved by one per cent."""
-    shutil.copy(DOCS / "bound.png", tmp_path)
-    results = read("bound.json")
+    folder = tmp_path / "results" / "learning"
+    folder.mkdir(parents=True)
+    shutil.copy(RESULTS / "learning" / "bound.png", folder)
+    results = read("learning/bound.json")
     results["mm_per_stroke"]["learned"] = [1.01 * speed for speed in results["mm_per_stroke"]["learned"]]
-    (tmp_path / "bound.json").write_text(json.dumps(results), encoding="utf-8")
-    assert not is_drawn_so(tmp_path, PICTURES["bound.png"], "bound.png")
+    (folder / "bound.json").write_text(json.dumps(results), encoding="utf-8")
+    assert not is_drawn_so(tmp_path, PICTURES["learning/bound.png"], "bound.png")
 
 
 def test_pages_say_what_their_numbers_say():
@@ -81,14 +94,27 @@ def test_a_number_that_was_changed_by_hand_is_noticed():
 def test_every_picture_is_made_of_its_numbers_or_by_a_study_or_is_final():
     drawn = {name for study in STUDIES for name in study.drawn}
     final = {name for name in FINAL if name.endswith(".png")}
-    assert {file.name for file in DOCS.glob("*.png")} == PICTURES.keys() | drawn | final
-    assert len(PICTURES) == sum(len(study.pictures) for study in told(DOCS, STUDIES) if not study.home)
+    assert set(committed("png")) == PICTURES.keys() | drawn | final
+    assert len(PICTURES) == sum(len(study.pictures) for study in told(DOCS, STUDIES))
     assert not (PICTURES.keys() & drawn or (PICTURES.keys() | drawn) & final)
 
 
 def test_every_file_of_numbers_has_a_footer():
     text = "".join(file.read_text(encoding="utf-8") for file in DOCS.glob("*.md"))
-    assert [file.name for file in DOCS.glob("*.json") if f"[{file.name}]({file.name}) by `" not in text] == []
+    assert [name for name in committed("json") if f"[{Path(name).name}](results/{name}) by `" not in text] == []
+
+
+def test_numbers_and_pictures_stand_in_folders_of_claims():
+    assert [file.name for file in DOCS.iterdir() if file.suffix in {".json", ".png"}] == []
+    assert [file.name for file in RESULTS.iterdir() if file.is_file()] == []
+
+
+def test_a_run_writes_where_docs_has_the_numbers_if_nothing_else_is_asked():
+    found = {study.name: study.defaults().out for study in STUDIES if issubclass(study.options, InDocs) and study.run}
+    assert found["learning.bound"] == Path("docs/results/learning")
+    for study in STUDIES:
+        if study.name in found:
+            assert DOCS.parent / study.place(found[study.name], study.file) == study.committed(DOCS, study.file)
 
 
 def test_the_page_of_environments_holds_every_contract():
@@ -111,8 +137,8 @@ def test_a_table_of_no_study_is_refused():
 
 def test_stale_pages_are_named_and_filled(tmp_path, capsys):
     """A page with an empty block is stale, and is not after it was filled; blocks of other studies stay."""
-    for file in [*DOCS.glob("*.json"), DOCS / "designs.md"]:
-        shutil.copy(file, tmp_path)
+    shutil.copytree(RESULTS, tmp_path / "results")
+    shutil.copy(DOCS / "designs.md", tmp_path)
     page = tmp_path / "designs.md"
     page.write_text(BLOCK.sub(r"\1\4", page.read_text(encoding="utf-8")), encoding="utf-8")
     alone = [replace(study, pictures={}, pages={}) for study in STUDIES]
@@ -128,8 +154,9 @@ def test_footers_say_files_and_commands_and_what_is_not_known():
     made = provenance("python -m studies.luck", "scipy")
     assert made["versions"]["seastar-gym"] == __version__ and "scipy" in made["versions"]
     assert made["machine"] == machine()
-    line = footer({"luck.json": made, "hub.json": {"command": "x", "machine": "y"}})
-    assert "[luck.json](luck.json) by `python -m studies.luck`; [hub.json](hub.json) by `x` at commit 71299f4" in line
+    line = footer({"some/luck.json": made, "designs/hub.json": {"command": "x", "machine": "y"}})
+    assert "[luck.json](results/some/luck.json) by `python -m studies.luck`; [hub.json]" in line
+    assert "(results/designs/hub.json) by `x` at commit 71299f4" in line
     assert line.endswith("(versions not recorded).*")
 
 
@@ -159,7 +186,7 @@ def test_the_page_that_swims_has_the_strokes_of_the_simulator():
     np.testing.assert_allclose(hub, transitions("balanced")["hub"], atol=UNIT)
 
 
-@pytest.mark.parametrize("name", ["work_precision.json", "promises.json"])
+@pytest.mark.parametrize("name", ["accuracy/work_precision.json", "accuracy/promises.json"])
 def test_measured_errors_are_of_this_version(name):
     results = read(name)
     assert results.get("version", results.get("versions", {}).get("seastar-gym")) == __version__
@@ -167,7 +194,7 @@ def test_measured_errors_are_of_this_version(name):
 
 def test_the_page_compares_the_same_rule_with_strokes_and_wires():
     """In seconds and joules, beyond the way without a turn; other controllers are named."""
-    swims = read("heading.json")["swims"]
+    swims = read("gaits/heading.json")["swims"]
     said = " ".join((DOCS / "gaits.md").read_text(encoding="utf-8").split())
     for name, sentence in {
         "strokes": "takes {} s and {} J more than to swim straight with the chapter's strokes",
@@ -180,7 +207,7 @@ def test_the_page_compares_the_same_rule_with_strokes_and_wires():
 
 
 def test_the_page_of_designs_tells_what_mass_in_the_hub_does():
-    found = read("hub.json")
+    found = read("designs/hub.json")
     page = (DOCS / "designs.md").read_text(encoding="utf-8")
     straight = found["mm_per_s"]["fine"]["point"]["1-,3+"]["1"]
     for share in (0.0, 0.5, 0.9):

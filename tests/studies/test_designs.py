@@ -3,7 +3,6 @@
 import json
 import math
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,9 +18,9 @@ from seastar_gym.sweep.result_files import read_results
 from seastar_gym.sweep.run import run
 from studies.designs.pictures import COLOURS, draw, summary
 from studies.designs.space import BODIES, SPREADS, Body, all_designs, inner_half, masses, spread
-from studies.designs.study import scene_of
-
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+from studies.designs.study import STUDY, scene_of
+from studies.frame import DOCS
+from studies.pages import numbers
 
 
 def test_there_are_more_than_a_hundred_thousand_designs():
@@ -58,7 +57,7 @@ def test_density_is_simulated_side_by_side():
 
 
 def test_the_page_tells_what_was_measured():
-    found = json.loads((DOCS / "designs.json").read_text(encoding="utf-8"))
+    found = numbers(DOCS, STUDY)
     page = " ".join((DOCS / "designs.md").read_text(encoding="utf-8").split())
     assert f"{found['designs'] - found['count']:,} robots do not count" in page and found["failed"] == 0
     for name in ("the chapter's", "fastest", "fastest at the chapter's length and angle"):
@@ -86,7 +85,7 @@ def test_the_picture_is_drawn_from_what_is_written(tmp_path):
         "taper": rng.choice(list(COLOURS), rows), "n_limbs": rng.integers(3, 8, rows),
         "radius": rng.choice([0.8e-3, 2e-3], rows), "speed": 5e-3 * rng.gamma(4.0, 0.3, rows),
     })  # fmt: skip
-    found = json.loads((DOCS / "designs.json").read_text(encoding="utf-8"))
+    found = numbers(DOCS, STUDY)
     found["picture"] = json.loads(json.dumps(summary(table)))
     some = table[(table.taper == 0.5) & (table["actuator.peak_angle"] < 0.2 + 1.0 / 24.0)]
     expected = 1e3 * float(np.median(some.speed))

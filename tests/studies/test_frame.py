@@ -44,7 +44,7 @@ def draw(results, file):
 
 
 TOY = Study(
-    "toy", swim, Options, "toy.json", settings=lambda options: {"strokes": options.strokes},
+    "toy", swim, Options, "toys/toy.json", settings=lambda options: {"strokes": options.strokes},
     pictures={"toy.png": draw, "other.png": draw}, pages={"toy.md": lambda found: found["command"]},
     tables={"toy": lambda found: f"| {sum(found['runs']['one'].values())} |"}, packages=("scipy",),
 )  # fmt: skip

@@ -1,8 +1,6 @@
 """The front of speed over work: robots at all sizes, the best of them, and what the page says."""
 
-import json
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,12 +15,13 @@ from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.configurations import Swim, configuration_with
 from seastar_gym.sweep.swimming import swim
 from studies.designs import search
-from studies.designs.front import AT_WORK, CHAPTER, FASTEST, OWN, THRIFTIEST, draw, radii, scene_of
+from studies.designs.front import AT_WORK, CHAPTER, FASTEST, OWN, STUDY, THRIFTIEST, draw, radii, scene_of
 from studies.designs.search import CHILDREN, POWERS, Limit, children, fastest, first, grown, sizes, thriftiest
 from studies.designs.space import ANGLES, MEASURED, Body
+from studies.frame import DOCS
+from studies.pages import numbers
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
-FRONT = json.loads((DOCS / "front.json").read_text(encoding="utf-8"))
+FRONT = numbers(DOCS, STUDY)
 
 ROW = {
     "n_limbs": 5, "taper": 0.25, "radius": 1.6e-3, "robot.limb_length": 0.08, "robot.youngs_modulus": 4e5,

@@ -12,7 +12,7 @@ def test_the_gallery_has_a_picture_and_a_cost_of_every_scene(tmp_path):
     text = gallery.table(gallery.measured(rounds=1, n_robots=8))
     for exhibit in gallery.exhibits():
         assert f"**{exhibit.name}**" in text
-        picture = tmp_path / "gallery" / f"{exhibit.name.replace(' ', '_')}.png"
+        picture = tmp_path / f"{exhibit.name.replace(' ', '_')}.png"
         assert picture.stat().st_size > 1000
 
 

@@ -1,11 +1,11 @@
 """The studies of robots on a GPU, as far as they go without one."""
 
-import json
 
 import pytest
 
 from studies import gpu, gpu_code
 from studies.frame import DOCS
+from studies.pages import numbers
 
 TOLD = """ptxas info    : 0 bytes gmem
 ptxas info    : Compiling entry function 'swim_robots' for 'sm_90'
@@ -15,12 +15,8 @@ ptxas info    : Used 255 registers, used 0 barriers, 600 bytes cumulative stack 
 """
 
 
-def committed(name: str) -> dict:
-    return json.loads((DOCS / name).read_text(encoding="utf-8"))
-
-
 def test_all_scenes_had_the_bits_of_the_processor_on_the_gpu():
-    bits = committed("gpu.json")["bits"]
+    bits = numbers(DOCS, gpu.STUDY)["bits"]
     assert set(bits) == set(gpu.scenes()) and len(bits) >= 40
     assert all(found["same"] and not found["failed"] for found in bits.values())
 
@@ -66,7 +62,7 @@ def test_the_code_of_observations_spills_nothing(architecture):
 )
 def test_the_code_spills_no_more_than_before(name):
     code = gpu_code.code_of(gpu.scenes()[name])
-    for architecture, before in committed("gpu_code.json")["needs"][name].items():
+    for architecture, before in numbers(DOCS, gpu_code.STUDY)["needs"][name].items():
         now = gpu_code.needs(code, architecture, gpu_code.assembler())
         for what, number in now.items():
             assert number <= 1.1 * before[what] + 64, (architecture, what)

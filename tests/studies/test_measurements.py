@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 from itertools import chain
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,10 +10,12 @@ from scipy.integrate import solve_ivp
 
 from seastar_gym.scene.actuators.sma_limb import FREQUENCIES, MEASURED
 from studies.command import main
+from studies.frame import DOCS
 from studies.measurements import limbs
 from studies.measurements.curves import read_curves
 from studies.measurements.fit import fit, predict
 from studies.measurements.model import MODELS, curvature, lagging, pulsed
+from studies.pages import numbers
 
 CURVES = read_curves()
 
@@ -79,10 +80,8 @@ def test_the_study_writes_its_figures_and_picture(tmp_path):
 
 
 def test_the_page_has_the_strokes_of_the_policies_that_were_counted():
-    docs = Path(__file__).resolve().parents[2] / "docs"
-    counted = json.loads((docs / "limbs.json").read_text(encoding="utf-8"))["strokes_round_the_pentagon"]
-    page = (docs / "validation.md").read_text(encoding="utf-8")
-    for limb, strokes in counted.items():
+    page = (DOCS / "validation.md").read_text(encoding="utf-8")
+    for limb, strokes in numbers(DOCS, limbs.STUDY)["strokes_round_the_pentagon"].items():
         name = "the chapter's pulse" if limb == "pulse" else limb
         cells = ["-" if n is None else str(n) for n in (strokes["learned"], strokes["pentagon"])]
         assert f"| {' | '.join([name, *cells])} |" in page

@@ -2,7 +2,6 @@
 
 import itertools
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +14,8 @@ from seastar_gym.envs.tasks.obst_trap import draw_discs
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.evaluation.measures import SECONDS, measure_of_challenge
 from studies.command import main
+from studies.frame import DOCS
+from studies.pages import numbers
 from studies.tasks import heading, pictures
 from studies.tasks import study as module
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
@@ -309,8 +310,7 @@ def test_no_bound_is_below_a_learner():
 
 def test_no_rule_that_is_told_more_swims_worse():
     """Of the numbers of the page: who is told what is hidden is ahead of the planner, and no mean beats the bound."""
-    results = json.loads((Path(__file__).parents[2] / "docs" / "tasks.json").read_text(encoding="utf-8"))
-    for found in rows_of(results, module.IDS):
+    for found in rows_of(numbers(DOCS, module.STUDY), module.IDS):
         if {"informed", "planner"} <= found.agents.keys():
             assert found.is_ahead("informed", "planner", "greedy"), found.id
         assert not any(found.is_ahead(agent, found.bound) for agent in found.agents)
@@ -391,7 +391,7 @@ def test_the_page_has_a_row_of_means_for_every_task_with_a_greedy_agent():
 def test_a_picture_shows_an_episode_of_every_task(tmp_path, monkeypatch):
     monkeypatch.setattr(pictures, "SHOWN", {"prizes": ("SeastarPrizes-v0", "greedy", 2)})
     assert main(["tasks.pictures", "--out", str(tmp_path)]) == 0
-    with Image.open(tmp_path / "tasks" / "prizes.png") as drawn:
+    with Image.open(tmp_path / "prizes.png") as drawn:
         assert drawn.size == (960, 720)
 
 

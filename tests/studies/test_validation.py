@@ -1,7 +1,6 @@
 """Validation against a measured swimmer: data, scenes, weights, and intervals that are honest where truth is known."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +8,8 @@ from scipy.stats import norm
 
 from seastar_gym.scene import MeasuredCurve
 from studies.command import main
+from studies.frame import DOCS
+from studies.pages import numbers
 from studies.validation import follow, laws, simulate, study, swimmer, turns
 from studies.validation.in_turn import LATE, InTurn
 from studies.validation.inference import LEVEL, SPREAD, effective, predict, quantiles, score, weights
@@ -18,7 +19,6 @@ from studies.validation.separation import best_known, told
 from studies.validation.speeds import read_speeds, training
 from studies.validation.swimmer import FULL, VARIANTS, bending, cross_section, fitted_curve, measured_curve, scene
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
 CONDITIONS = read_speeds()
 MEASURED = np.array([condition.speed for condition in CONDITIONS])
 CHOSEN = training(CONDITIONS)
@@ -211,7 +211,7 @@ def test_a_law_that_the_speeds_follow_has_no_error_and_its_constant_is_a_geometr
 
 
 def test_the_committed_laws_are_those_of_the_committed_speeds():
-    kept = json.loads((DOCS / "validation.json").read_text(encoding="utf-8"))
+    kept = numbers(DOCS, study.STUDY)
     found = laws.law_scores(CONDITIONS, CHOSEN, other_fours(CONDITIONS, study.FOURS))
     assert len(found) == len(kept["laws"]) == 13
     for one, other in zip(found, kept["laws"], strict=True):
@@ -248,7 +248,7 @@ def test_letters_of_the_left_and_of_the_right_turn_samples_alike():
 
 
 def test_the_committed_turns_are_those_that_were_tracked():
-    results = json.loads((DOCS / "validation.json").read_text(encoding="utf-8"))["turns"]
+    results = numbers(DOCS, study.STUDY)["turns"]
     letters = turns.read_letters()
     for found in results.values():
         assert found["letters"] == "".join(letters.names)
@@ -259,7 +259,7 @@ def test_the_committed_turns_are_those_that_were_tracked():
 
 
 def test_what_is_missing_is_added_to_results_that_are_there(tmp_path):
-    kept = json.loads((DOCS / "validation.json").read_text(encoding="utf-8"))
+    kept = numbers(DOCS, study.STUDY)
     (tmp_path / "validation.json").write_text(json.dumps(kept | {"laws": []}), encoding="utf-8")
     assert main(["validation", "--more", "--out", str(tmp_path)]) == 0
     results = json.loads((tmp_path / "validation.json").read_text(encoding="utf-8"))

@@ -25,14 +25,14 @@ from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
-from studies.frame import Results, Study, require_known
+from studies.frame import InDocs, Results, Study, require_known
 from studies.learning.timed.pictures import draw
 from studies.learning.timed.tables import summary
 from studies.learning.timed.trainings import TRAININGS, learn
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(InDocs):
     """Policies learned for decisions of different length, by different learners, and at different prices of heat."""
 
     seeds: tuple[int, ...] = tuple(range(10))
@@ -49,8 +49,6 @@ class Options:
     """Number of held-out random paths."""
     networks: Path = Path("runs/in_time")
     """Folder of the trained networks."""
-    out: Path = Path("docs/in_time.json")
-    """File of the results. The picture has the same name with the suffix .png."""
 
     def __post_init__(self) -> None:
         require_known("training", self.trainings, TRAININGS)
@@ -113,7 +111,7 @@ STUDY = Study(
     "learning.timed",
     study,
     Options,
-    "in_time.json",
+    "learning/in_time.json",
     settings=lambda options: {name: getattr(options, name) for name in ("decisions", "fidelity", "paths")},
     pictures={"in_time.png": lambda results, file: draw(results["runs"], file)},
     tables={"in_time": lambda results: summary(results["runs"])},
