@@ -28,6 +28,7 @@ from seastar_gym import (
     SmaLimb,
     SmaPulse,
     Stiffening,
+    Strip,
     Uniform,
     Water,
 )
@@ -98,6 +99,16 @@ def test_intervals_are_as_wide_as_estimates_scatter():
     half = np.mean([0.5 * (fit.upper[0] - fit.lower[0]) for fit in fits])
     assert half / (1.96 * scatter) == pytest.approx(1.0, abs=0.3)
     assert np.mean([fit.lower[0] < 0.5 < fit.upper[0] for fit in fits]) >= 0.84
+
+
+def test_the_thickness_of_limbs_that_are_strips_is_recovered():
+    """Bending goes with its cube and drag with the width across, so the two are told apart."""
+    limbs = tuple(Limb(section=Strip(2.5e-3, 4e-3)) for _ in range(5))
+    scene = Scene(Seastar(nodes_per_limb=4, limbs=limbs), numerics=Numerics("implicit-midpoint", 0.02))
+    truth = {"robot.limbs.2.section.width": 3e-3, "robot.limbs.2.section.height": 5e-3}
+    estimate = identify(scene, list(truth), synthetic(scene, truth, n_strokes=2, noise=1e-4))
+    assert not estimate.untold
+    np.testing.assert_allclose(estimate.values, list(truth.values()), rtol=0.05)
 
 
 @pytest.mark.slow
