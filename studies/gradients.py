@@ -7,23 +7,29 @@ that after the first. "Shape" is the same of positions as the robot itself sees 
 heading. Newton's tolerance is 1e-12 limb lengths. A fourth robot, with pulses that are smaller by 1e-6, tells whether
 differences are tangents.
 
-Writes the growth as JSON and a picture.
+A cost is the processor time of derivatives over that of the swim, of one robot alone on one processor, once everything
+is compiled: the shortest of some trials.
+
+Writes growth and costs as JSON, and a picture of the growth. Run it again to fill in what is missing.
 """
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from seastar_gym.controllers.learned import bundled_file, load
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.gaits import PAIRS, STRAIGHT, lagged_gait, pentagon_gait, timed
+from seastar_gym.gradients import differentiate, record
 from seastar_gym.scene import Contact, Scene, SmaWires, Vortex, Water
+from seastar_gym.scene.per_robot import at, side_by_side, with_numbers
 from seastar_gym.simulator import Simulator
 from studies.frame import InDocs, Results, Study
 from studies.results_file import rounded
@@ -186,16 +192,95 @@ def as_data(found: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+SWUM, TRIALS = 20, 3
+"""Strokes of a swim whose derivatives are timed, and how often."""
+NUMBERS = [
+    "fluid.drag_coefficient", "robot.youngs_modulus", "robot.density", "fluid.density", "robot.rod_radius",
+    "robot.limb_length", "actuator.peak_angle",
+]  # fmt: skip
+UNKNOWNS: dict[str, list[str]] = {
+    "1 number": NUMBERS[:1],
+    "7 numbers": NUMBERS,
+    "100 commands": ["commands"],
+    "112 velocities": ["velocities"],
+    "all of these": [*NUMBERS, "commands", "velocities"],
+}
+"""Unknowns of swims of SWUM strokes."""
+
+
+def processor_time(run: Callable[[], Any]) -> float:
+    """Shortest processor time of some trials [s], after a first one that may compile."""
+    run()
+    found = []
+    for _ in range(TRIALS):
+        began = time.process_time()
+        run()
+        found.append(time.process_time() - began)
+    return min(found)
+
+
+def swim_alone(scene: Scene, commands: Floats) -> None:
+    """Swim with robots side by side. commands: Shape (n_strokes, n_robots, 5)."""
+    simulator = Simulator(scene, commands.shape[1], threads=1)
+    for command in commands:
+        simulator.stroke(command)
+
+
+def by_differences(scene: Scene, commands: Floats, names: list[str]) -> None:
+    """Central differences in numbers of the scene, or in all commands, by robots side by side."""
+    if names == ["commands"]:
+        told = np.repeat(commands[:, None], 2 * commands.size, axis=1)
+        for k, (stroke, limb) in enumerate(np.ndindex(*commands.shape)):
+            told[stroke, 2 * k : 2 * k + 2, limb] += [-1e-5, 1e-5]
+        swim_alone(scene, told)
+        return
+    factors = (1.0 - 1e-5, 1.0 + 1e-5)
+    pairs = [with_numbers(scene, {name: at(scene, name) * factor}) for name in names for factor in factors]
+    swim_alone(side_by_side(pairs), np.repeat(commands[:, None], len(pairs), axis=1))
+
+
+def cost(names: list[str]) -> dict[str, float]:
+    """Processor time of derivatives of the last place of the hub, in swims."""
+    scene, commands = Scene(), 0.99 * shares(SWUM, 1, np.random.default_rng(0))[:, 0]
+    alone = processor_time(lambda: swim_alone(scene, commands[:, None]))
+    slopes = np.zeros((SWUM + 1, 2))
+    slopes[-1, 0] = 1.0
+    found = {
+        "gradient": processor_time(lambda: record(scene, commands).gradient({"hub": slopes}, names)),
+        "dual lanes": processor_time(lambda: differentiate(scene, commands, names)),
+    }
+    if names == ["commands"] or set(names) <= set(NUMBERS):
+        found["differences"] = processor_time(lambda: by_differences(scene, commands, names))
+    return {"swim_ms": rounded(1e3 * alone, 3)} | {name: rounded(each / alone, 3) for name, each in found.items()}
+
+
+def cost_table(results: Mapping[str, Any]) -> str:
+    """Table of costs in Markdown."""
+    lines = ["| unknowns | gradient | dual lanes | differences |", "|---|---:|---:|---:|"]
+    for name, found in results["cost"].items():
+        cells = [f"{found[way]:.2g}" if way in found else "" for way in ("gradient", "dual lanes", "differences")]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def settings(options: InDocs) -> dict[str, float]:
+    """What all numbers have in common."""
+    return {"strokes": STROKES, "swims": SWIMS, "newton_tolerance": NEWTON_TOLERANCE, "timed_strokes": SWUM}
+
+
 def run(options: InDocs, results: Results) -> str | None:
-    """Measure all cases."""
-    for name, case in tqdm(CASES.items(), unit="case"):
-        results[name] = as_data(growth(case, STROKES, SWIMS))
+    """Measure all cases and costs that are missing."""
+    cases = {
+        ("growth", name): partial(lambda case: as_data(growth(case, STROKES, SWIMS)), CASES[name]) for name in CASES
+    }
+    costs = {("cost", name): partial(cost, names) for name, names in UNKNOWNS.items()}
+    results.fill(cases | costs, lambda found: f"{found.get('gradient', found.get('swims'))}")
     return None
 
 
 def cases_of(results: Mapping[str, Any]) -> dict[str, Any]:
-    """Results by the names of cases, without what heads the file."""
-    return {name: results[name] for name in CASES if name in results}
+    """Growth by the names of cases."""
+    return {name: results["growth"][name] for name in CASES if name in results["growth"]}
 
 
 def largest(case: Mapping[str, Any], of: str) -> Floats:
@@ -237,9 +322,6 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
 
 
 STUDY = Study(
-    "gradients",
-    run,
-    file="gradients/gradients.json",
-    pictures={"gradients.png": draw},
-    tables={"gradients growth": table},
-)
+    "gradients", run, file="gradients/gradients.json", settings=settings, pictures={"gradients.png": draw},
+    tables={"gradients growth": table, "gradients cost": cost_table},
+)  # fmt: skip

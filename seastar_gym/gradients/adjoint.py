@@ -255,17 +255,7 @@ class Record:
 
 def refuse_unproven(scene: Scene) -> None:
     """ValueError for terms whose gradients have not been compared with dual lanes."""
-    robot, fluid = scene.robot, scene.fluid
-    of_fluid = ("current", "added_mass_coefficient", "tangential_drag_coefficient")
-    terms = {
-        "hub hinges": robot.discretisation != "continuum",
-        "damping": robot.relaxation_time is not None,
-        "a current, added mass or drag along limbs": any(getattr(fluid, name, None) is not None for name in of_fluid),
-        "loads or gravity": bool(scene.loads) or scene.gravity is not None,
-        "contact": scene.contact is not None,
-        "a body": robot.has_body,
-        "actuators along the limbs": robot.along is not None or robot.stiffening is not None,
-    }
+    terms = {"hub hinges": scene.robot.discretisation != "continuum", "contact": scene.contact is not None}
     for name, is_there in terms.items():
         if is_there:
             raise ValueError(f"There are no gradients of swims with {name} yet: differentiate has derivatives.")
