@@ -62,8 +62,11 @@ def placeholders(root: Path = ROOT) -> list[str]:
         )
     if "OWNER" in (root / ".ci" / "release.md").read_text(encoding="utf-8"):
         wrong.append(".ci/release.md still says OWNER: write whose repository it is.")
-    if "repository-code:" not in (root / "CITATION.cff").read_text(encoding="utf-8"):
+    citation = (root / "CITATION.cff").read_text(encoding="utf-8")
+    if "repository-code:" not in citation:
         wrong.append("CITATION.cff has no repository-code: add the address of the repository.")
+    if "family-names:" not in citation:
+        wrong.append("CITATION.cff names no person: add family-names and given-names of the authors.")
     return wrong
 
 

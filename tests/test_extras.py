@@ -97,6 +97,15 @@ def test_a_sweep_without_its_extra_says_how_to_get_it(tmp_path):
     assert_says(python(tmp_path, ("pyarrow",), "-m", "seastar_gym.sweep", "--help"), "sweep", ("pyarrow",))
 
 
+def test_sweeps_need_no_optuna_and_searches_say_how_to_get_it(tmp_path):
+    pytest.importorskip("pyarrow")
+    sweep = "-m", "seastar_gym.sweep", "robot.limb_length=0.08:0.1:3", "--out", str(tmp_path / "out")
+    missing = ("optuna", "sqlalchemy")
+    counted = python(tmp_path, missing, *sweep, "--count")
+    assert counted.returncode == 0 and counted.stdout.startswith("3 designs in "), counted.stderr
+    assert_says(python(tmp_path, missing, *sweep, "--optuna", "2"), "search", missing)
+
+
 @pytest.mark.parametrize("command", sorted(COMMANDS))
 def test_help_of_every_command_needs_no_extra_or_says_which(command, tmp_path):
     """With the base dependencies alone."""

@@ -120,7 +120,7 @@ def test_every_extra_is_in_the_table_of_the_guide():
 @pytest.mark.parametrize(
     ("folders", "extras"),
     [
-        (["seastar_gym"], ["render", "studies", "train", "ray", "slurm", "data", "export", "gpu"]),
+        (["seastar_gym"], ["render", "studies", "train", "search", "ray", "slurm", "data", "export", "gpu"]),
         (["studies"], ["train", "sweep", "test", "data", "mujoco"]),
         (["agents", "train.py"], ["train", "rllib"]),
         (["tests"], ["test", "browser", "ray", "learners"]),
@@ -178,6 +178,13 @@ def test_names_of_the_package_are_those_of_its_modules():
 )
 def test_tested_version_lies_in_the_declared_range(requirement):
     assert pins("constraints.txt")[canonicalize_name(requirement.name)] in requirement.specifier
+
+
+def test_upper_bounds_are_those_with_a_reason():
+    """Which pyproject.toml says beside them; constraints.txt has the versions that were tested."""
+    every = requirements(*PROJECT["optional-dependencies"])
+    bounded = {one.name for one in every if any(part.operator != ">=" for part in one.specifier)}
+    assert bounded == {"gymnasium", "numba"}
 
 
 def test_constraints_pin_all_that_gets_installed():
@@ -290,10 +297,14 @@ def test_a_release_without_an_address_is_refused_with_sentences(tmp_path):
     ):
         text = (ROOT / name).read_text(encoding="utf-8")
         (tmp_path / name).write_text(text.replace(without, filled), encoding="utf-8")
+    (no_person,) = contents["placeholders"](tmp_path)
+    assert "names no person" in no_person
+    citation = (tmp_path / "CITATION.cff").read_text(encoding="utf-8")
+    (tmp_path / "CITATION.cff").write_text(citation.replace("  - name: The", "  - family-names: The"), "utf-8")
     assert contents["placeholders"](tmp_path) == []
     project = (tmp_path / "pyproject.toml").read_text(encoding="utf-8")
     (tmp_path / "pyproject.toml").write_text(project.replace(ADDRESS, ""), encoding="utf-8")
     (tmp_path / ".ci" / "release.md").write_text("https://github.com/OWNER/seastar-gym", encoding="utf-8")
     (tmp_path / "CITATION.cff").write_text("title: seastar-gym", encoding="utf-8")
-    address, owner, citation = contents["placeholders"](tmp_path)
-    assert "fill in repository" in address and "OWNER" in owner and "repository-code" in citation
+    address, owner, citation, person = contents["placeholders"](tmp_path)
+    assert "fill in repository" in address and "OWNER" in owner and "repository-code" in citation and "person" in person

@@ -141,7 +141,7 @@ def run_sweep(sweep: Sweep, options: argparse.Namespace) -> int:
 
 def search(sweep: Sweep, options: argparse.Namespace) -> int:
     """Search with Optuna; returns the exit code."""
-    require_extra("Searches", "sweep", "optuna")
+    require_extra("Searches", "search", "optuna", "sqlalchemy")
     from seastar_gym.sweep.proposals import Search, explore
 
     work = work_of(options)

@@ -80,6 +80,7 @@ def test_counting_simulates_nothing(tmp_path, capsys):
 
 
 def test_a_search_from_words_to_its_best(tmp_path, capsys):
+    pytest.importorskip("optuna")
     words = "robot.limb_length=0.05:0.15", "--optuna", "4", "--robots", "2", "--out", str(tmp_path)
     assert main([*words, *QUICK]) == 0
     assert "Best speed: 0.0" in capsys.readouterr().out
@@ -87,6 +88,7 @@ def test_a_search_from_words_to_its_best(tmp_path, capsys):
 
 
 def test_a_search_does_not_write_through_a_link(tmp_path, capsys):
+    pytest.importorskip("optuna")
     (tmp_path / "somebody's").touch()
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "study.db").symlink_to(tmp_path / "somebody's")
@@ -125,6 +127,8 @@ def test_a_scene_comes_from_a_file(ending, tmp_path):
     ],
 )
 def test_bad_input_is_one_sentence(words, sentence, tmp_path, capsys):
+    if "--optuna" in words:
+        pytest.importorskip("optuna")
     try:
         code = main([*words, "--out", str(tmp_path / "out"), "--settling", "0", "--measured", "1"])
         told = capsys.readouterr().err

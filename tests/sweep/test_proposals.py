@@ -184,7 +184,7 @@ def test_a_design_without_the_objective_is_the_worst_and_not_tried_for_ever(is_l
     search = Search(is_largest_best=is_largest_best)
     study = study_of(SWEEP, search, sqlite)
     proposals = Proposals(SWEEP, study, search, 2)
-    monkeypatch.setattr(proposals, "_waiting", {"cell": [study.ask(), study.ask()]})
+    monkeypatch.setattr(proposals, "_waiting", {"batch": [study.ask(), study.ask()]})
     proposals.tell(Outcome(type("Batch", (), {"name": "batch"})(), b"part"))
     assert states(study) == [TrialState.COMPLETE] * 2 and study.best_value == 1.0
     assert list(proposals.batches()) == []

@@ -15,7 +15,8 @@ The limb rotates by the peak angle times share_+ - share_-. A measured limb is b
 from the rest curvature by curvature_change * share.
 
 `python -m studies.measurements.limbs` fits the numbers to 48 measured curves of limbs in water and says how far each
-curve is from its fit. The repeated pulse of any period follows from them, warm wires included.
+curve is from its fit. The repeated pulse of any period follows from them, warm wires included. The curves are of the
+repository `softmachineslab/frog`, which states no licence; the package has the fitted numbers alone.
 """
 
 import math
