@@ -56,7 +56,7 @@ def run(study: Study, given: Sequence[str], doc: str) -> int:
     prog = f"python -m studies.{study.name}"
     if {"-h", "--help"} & set(given):
         print(command_parser(prog, doc).description, end="\n\n")
-    options = tyro.cli(study.options, prog=prog, args=given, default=study.defaults())
+    options = study.with_folder(tyro.cli(study.options, prog=prog, args=given))
     out = Path(getattr(options, "out", "."))
     file = study.place(out, study.file) if study.file else None
     command = prog if study.settings else shlex.join([*prog.split(), *given])

@@ -23,7 +23,7 @@ class InDocs:
     """Options of a study that writes where docs/ has its numbers. Alone, of a study that has no others."""
 
     out: Path = Path("docs") / RESULTS
-    """Folder of the files, or the file of the numbers."""
+    """Folder of the files, or the file of the numbers; by default the study's folder there."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +64,10 @@ class Study:
         """File of the numbers, or picture, in a folder such as docs/."""
         return self.place((docs / RESULTS / self.file).parent, name)
 
-    def defaults(self) -> Any:
-        """Options where none is given."""
-        found = self.options()
-        return replace(found, out=found.out / Path(self.file).parent) if isinstance(found, InDocs) else found
+    def with_folder(self, options: Any) -> Any:
+        """The options, with the study's folder where they name that of all studies."""
+        is_of_all = isinstance(options, InDocs) and options.out == InDocs.out
+        return replace(options, out=options.out / Path(self.file).parent) if is_of_all else options
 
     def write(self, results: Any, out: Path) -> list[Path]:
         """Draw the pictures and write the whole pages; returns their files."""
