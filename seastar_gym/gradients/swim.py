@@ -127,6 +127,8 @@ def checked_swim(scene: Scene, commands: ArrayLike, duration: float | None) -> t
     require_kind("scene", scene, Scene, "a Scene")
     if scene.n_robots is not None:
         raise ValueError("Derivatives need the scene of one robot, such as scene.of_robot(0).")
+    if scene.contact is not None:  # which differences of swims did not confirm where limbs touched
+        raise ValueError("There are no derivatives of swims with contact yet.")
     told = as_finite("commands", commands, (None, scene.robot.n_limbs))
     length = scene.actuator.period if duration is None else duration
     require_duration(length, scene.numerics.step)

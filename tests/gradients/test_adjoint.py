@@ -143,7 +143,7 @@ def test_pytorch_swims_farther_along_the_gradient():
     np.testing.assert_allclose(commands.grad.numpy(), expected, rtol=0.0, atol=1e-10 * np.abs(expected).max())
 
 
-UNPROVEN = ("hub hinges", "contact")
+UNPROVEN = ("hub hinges",)
 
 
 @pytest.mark.parametrize(
