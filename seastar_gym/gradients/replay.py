@@ -14,12 +14,11 @@ from typing import Any
 from numba.core.compiler_lock import global_compiler_lock
 
 from seastar_gym.der import potential
-from seastar_gym.der.body.body import carry_roots, gather_roots, move_roots, place_roots
-from seastar_gym.der.contact.contact import PRESSED, SLOT_ROWS, add_gap_gradient, gap, n_listed
+from seastar_gym.der.body.body import move_roots, place_roots
 from seastar_gym.der.energy import fill_moments
 from seastar_gym.der.linear import rigid_hub, star_matrix
 from seastar_gym.der.linear.star_matrix import eliminate_node, eliminate_root, store_root
-from seastar_gym.der.linear.star_solution import solve_again, substitute_star
+from seastar_gym.der.linear.star_solution import substitute_star
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.stepping import steps
 from seastar_gym.der.stepping.momentum import correct_momentum
@@ -36,10 +35,9 @@ from seastar_gym.gradients.history import (
     SIZE,
     START,
 )
-from seastar_gym.gradients.implicit import share_contact
 from seastar_gym.simd import compilation, tape_lanes
 from seastar_gym.simd.compilation import entry_point, kernel
-from seastar_gym.simd.lanes import any_lane, borrow, load, load_number, splat, store, store_number, subtract_product
+from seastar_gym.simd.lanes import any_lane, borrow, load, load_number, splat, store, store_number
 from seastar_gym.simd.modules import COMPILATION, LANES, KernelModules
 from seastar_gym.simd.tape_lanes import (
     begin_tape,
@@ -72,7 +70,6 @@ def correct_on_tape(rods, work, scheme, k, stage, q_0, v_0, h, robots):
     resume_tape()
     factorise(rods, work, stage, None)
     substitute_star(rods, work, work.step)
-    solve_contact(rods, work)
     for row in range(2 * rods.n_nodes):
         store(work.q, row, less_step(load(work.q, row), load(work.step, row)))
     if rods.body is not None:
@@ -80,39 +77,6 @@ def correct_on_tape(rods, work, scheme, k, stage, q_0, v_0, h, robots):
         arc = load(rods.body.scale, 0) * load(work.step, row)
         store(work.q, row, less_step(load(work.q, row), arc))
     place_roots(rods, work.q)
-
-
-@kernel
-def solve_contact(rods, work):
-    """From x = H^-1 g of the star, in work.step, to the solution with contact's part of the Hessian, see coupled.py.
-
-    That is x - sum over the pairs of (H + C K C^T)^-1 c k (c x), c the gradient of a pair's gap.
-    """
-    if work.contact is None or n_listed(work) == 0:
-        return
-    if not any_lane(load(work.contact.touching, 0) > 0.0):
-        return
-    rows, star, x, c = 2 * rods.n_free, work.contact.x, work.contact.ends, work.contact.seen
-    carry_roots(rods, work, work.step)
-    for row in range(2 * rods.n_points):
-        store(star, row, load(work.step, row))
-        store(x, row, load(work.step, row))
-    for slot in range(n_listed(work)):
-        k = load(work.contact.slots, SLOT_ROWS * slot + PRESSED)
-        if any_lane(k > 0.0):
-            y = k * gap(rods, work, slot, star)
-            pause_tape()
-            for row in range(2 * rods.n_points):
-                store(c, row, 0.0)
-            add_gap_gradient(rods, work, slot, splat(1.0), c)
-            gather_roots(rods, work, c)
-            solve_again(rods, work, c, work.step)
-            share_contact(rods, work)
-            resume_tape()
-            for row in range(rows):
-                store(x, row, subtract_product(load(x, row), y, load(work.step, row)))
-    for row in range(rows):
-        store(work.step, row, load(x, row))
 
 
 @kernel
