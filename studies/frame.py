@@ -37,7 +37,6 @@ class Study:
     settings: What all numbers of a file have in common. A study that tells it goes on with the file that is there.
     pictures: By their names, how they are drawn from the numbers into a file beside them.
     tables: By the names that pages give them, tables in Markdown.
-    pages: By their names in docs/, whole pages in Markdown.
     drawn: Pictures in docs/results/ that only a run draws.
     packages: Packages whose versions count, beside those of every study.
     extra: What brings them, where a run needs more than the module does.
@@ -50,7 +49,6 @@ class Study:
     settings: Callable[[Any], Mapping[str, Any]] | None = None
     pictures: Mapping[str, Callable[[Any, Path], None]] = field(default_factory=dict)
     tables: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
-    pages: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
     drawn: tuple[str, ...] = ()
     packages: tuple[str, ...] = ()
     extra: str = ""
@@ -70,12 +68,10 @@ class Study:
         return replace(options, out=options.out / Path(self.file).parent) if is_of_all else options
 
     def write(self, results: Any, out: Path) -> list[Path]:
-        """Draw the pictures and write the whole pages; returns their files."""
+        """Draw the pictures; returns their files."""
         for name, draw in self.pictures.items():
             draw(results, self.place(out, name))
-        for name, text in self.pages.items():
-            self.place(out, name).write_text(text(results), encoding="utf-8")
-        return [self.place(out, name) for name in (*self.pictures, *self.pages)]
+        return [self.place(out, name) for name in self.pictures]
 
 
 class Results(dict[str, Any]):

@@ -1,6 +1,6 @@
 """Pictures, tables and footers of docs/ and README.md that follow from numbers which are committed there.
 
-A page has tables and footers between lines `<!-- made: NAME -->` and `<!-- end -->`; some pages are made as a whole.
+A page has tables and footers between lines `<!-- made: NAME -->` and `<!-- end -->`.
 """
 
 import json
@@ -78,10 +78,7 @@ def filled(text: str, blocks: dict[str, Callable[[], str]], of_all: bool = True)
 
 
 def pages(docs: Path, studies: Sequence[Study]) -> Iterator[tuple[Path, str]]:
-    """Pages that these studies make or fill, and what they should be."""
-    for study in told(docs, studies):
-        for name, page in study.pages.items():
-            yield docs / name, page(numbers(docs, study))
+    """Pages that these studies fill, and what they should be."""
     blocks = tables(docs, studies)
     for file in sorted([*docs.glob("*.md"), *docs.parent.glob("README.md")]):
         text = file.read_text(encoding="utf-8")
@@ -124,6 +121,6 @@ def draw(docs: Path, studies: Sequence[Study]) -> int:
 
 
 def fill(docs: Path, studies: Sequence[Study]) -> None:
-    """Write the pages that these studies make, and fill those that have blocks of theirs."""
+    """Fill the pages that have blocks of these studies."""
     for file, text in list(pages(docs, studies)):
         write_atomically(file, text.encode())

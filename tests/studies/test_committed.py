@@ -142,7 +142,7 @@ def test_stale_pages_are_named_and_filled(tmp_path, capsys):
     shutil.copy(DOCS / "designs.md", tmp_path)
     page = tmp_path / "designs.md"
     page.write_text(BLOCK.sub(r"\1\4", page.read_text(encoding="utf-8")), encoding="utf-8")
-    alone = [replace(study, pictures={}, pages={}) for study in STUDIES]
+    alone = [replace(study, pictures={}) for study in STUDIES]
     assert check(tmp_path, alone) == 1 and capsys.readouterr().out == "designs.md\n"
     draw(tmp_path, [study for study in alone if study.name == "designs.certificates"])
     assert "made: designs robots -->\n<!-- end" in page.read_text(encoding="utf-8") and check(tmp_path, alone) == 1

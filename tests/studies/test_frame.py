@@ -45,7 +45,7 @@ def draw(results, file):
 
 TOY = Study(
     "toy", swim, Options, "toys/toy.json", settings=lambda options: {"strokes": options.strokes},
-    pictures={"toy.png": draw, "other.png": draw}, pages={"toy.md": lambda found: found["command"]},
+    pictures={"toy.png": draw, "other.png": draw},
     tables={"toy": lambda found: f"| {sum(found['runs']['one'].values())} |"}, packages=("scipy",),
 )  # fmt: skip
 
@@ -67,7 +67,7 @@ def test_a_study_goes_on_where_it_was_broken_off_and_seeds_stand_in_their_order(
     kept = json.loads((tmp_path / "toy.json").read_text())
     assert list(kept["runs"]["one"].items()) == [("1", 1.0), ("2", 2.0), ("10", 10.0)]
     assert list(kept)[:4] == ["command", "machine", "versions", "settings"] and kept["versions"]["scipy"]
-    assert kept["command"] == "python -m studies.toy" == (tmp_path / "toy.md").read_text()
+    assert kept["command"] == "python -m studies.toy"
     assert (tmp_path / "toy.png").read_text() == f"3 of {kept['machine']}"
 
 
@@ -85,7 +85,7 @@ def test_a_file_of_something_else_is_not_written_over(toy, tmp_path, capsys, tex
 
 def test_a_file_may_be_named_and_gives_its_name_to_what_is_beside_it(toy, tmp_path):
     assert toy(out=tmp_path / "mine.json") == 0
-    assert {file.name for file in tmp_path.iterdir()} == {"mine.json", "mine.png", "mine.md", "other.png"}
+    assert {file.name for file in tmp_path.iterdir()} == {"mine.json", "mine.png", "other.png"}
 
 
 def test_a_failure_is_said_once_the_files_are_written(toy, tmp_path, capsys):
