@@ -13,6 +13,7 @@ import gymnasium as gym
 import numpy as np
 
 from seastar_gym import Numerics, Scene, Sight, Simulator, SmaWires
+from seastar_gym.controllers.learned import bundled_file
 from symmetries import symmetry_for
 
 PAGE = Path(__file__).parents[1] / "docs" / "reference.md"
@@ -28,7 +29,7 @@ MOTIVE = (
 MADE_BY_THE_PACKAGE = {
     "Setting", "Episode", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Progress",
     "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
-    "Plant", "PlantError", "Sighting", "Derivatives", "Motion",
+    "Plant", "PlantError", "Sighting", "Derivatives", "Motion", "Gradient", "Record",
 }  # fmt: skip
 """Records that functions return, protocols, and bases of classes of one's own."""
 UNCALLED = {*MADE_BY_THE_PACKAGE, "Here", "RayTasks", "SlurmArrays", "chapters_certificate",
@@ -44,6 +45,11 @@ def documented() -> dict[str, str]:
 def named(name: str) -> Any:
     """What is documented by this name."""
     return getattr(import_module(documented()[name]), name)
+
+
+def of_work(swim: Any) -> Any:
+    """Work of a swim, and its slopes."""
+    return swim.work.sum(), {"work": np.ones_like(swim.work)}
 
 
 @cache
@@ -185,8 +191,8 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "GreedyPolicy": dict(scene=FAST, waypoint_radius=0.01, decision_period=None),
         "LearnedPolicy": dict(description=learned().description, weights=learned().weights, training=None, rng=None),
         "Planner": dict(scene=FAST, waypoint_radius=0.01, budget=None, threads=1, decision_period=None, headings=None),
-        "bundled_file": dict(decision_period=None, task=None),
-        "load": dict(path=named("bundled_file")(None)),
+        "pretrained": dict(name="strokes"),
+        "load": dict(path=bundled_file(None)),
         "load_agent": dict(name="straight", env=env(), seed=0),
         "load_agents": dict(names=["straight"], seed=0, fidelity="fast", decision_period=None, scene=FAST),
         "scripted": dict(name="straight", actions=None, n_limbs=5, rng=None, decision_period=None),
@@ -236,6 +242,9 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     yield "identify", lambda scene: named("identify")(scene, ["x"], measurement()), dict(scene=FAST)
     yield "differentiate", named("differentiate"), dict(
         scene=FAST, commands=np.zeros((1, 5)), by=["commands"], state=None, duration=0.1)  # fmt: skip
+    yield "gradient", lambda **others: named("gradient")(objective=of_work, **others), dict(
+        scene=FAST, commands=np.zeros((1, 5)), by=["commands"], state=None, duration=0.1)  # fmt: skip
+    yield "record", named("record"), dict(scene=FAST, commands=np.zeros((1, 5)), state=None, duration=0.1)
     yield "Measurement", named("Measurement").from_csv, dict(trajectory="a.csv", commands="b.csv")
     yield "Measurement", measurement().to_csv, dict(trajectory=folder() / "a.csv", commands=folder() / "b.csv")
     yield "film", filmed, dict(file=folder() / "swim.gif", fps=10.0)
