@@ -81,4 +81,4 @@ def made_by(results: Mapping[str, Any], file: str) -> str:
 def footer(files: Mapping[str, Mapping[str, Any]]) -> str:
     """Line in Markdown below the numbers of a page. files: Results, by their files in docs/results/."""
     made = "; ".join(made_by(found, name) for name, found in files.items())
-    return f"*Numbers, with options, versions and machine: {made}.*"
+    return f"*Numbers: {made}.*"
