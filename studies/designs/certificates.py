@@ -23,7 +23,7 @@ from seastar_gym.sweep.swimming import swim
 from studies.designs import front, study
 from studies.designs.front import AT_WORK, THRIFTIEST
 from studies.designs.space import MEASURED, SETTLING, Body
-from studies.frame import DOCS, Results, Study, require_known
+from studies.frame import DOCS, InDocs, Results, Study, require_known
 from studies.pages import numbers
 
 Table = dict[str, Any]
@@ -108,26 +108,20 @@ def told(certificate: Certificate) -> Table:
 def table(found: Table) -> str:
     """Table in Markdown of all robots and settings."""
     lines = [
-        "| robot | sequences | setting | repeated [%] | median [%] | all [%] | energy |",
-        "|---|---:|---|---:|---:|---:|---:|",
+        f"| robot | sequences | {' | '.join(f'{n} nodes, repeated [%] | all [%] | energy' for n in NODES)} |",
+        f"|---|---:|{'---:|' * 3 * len(NODES)}",
     ]
     for name, robot in found["robots"].items():
-        for nodes, step in zip(NODES, STEPS, strict=True):
-            setting = f"{nodes} nodes, {1e3 * step:g} ms"
-            row = robot[setting]
-            lines.append(
-                f"| {name} | {robot['samples']} | {setting} | {row['repeated_percent']:g} "
-                f"| {row['typical_percent']:g} | {row['promised_percent']:g} | {row['energy_growth']:g} |"
-            )
+        rows = (robot[f"{nodes} nodes, {1e3 * step:g} ms"] for nodes, step in zip(NODES, STEPS, strict=True))
+        cells = [f"{row[key]:g}" for row in rows for key in ("repeated_percent", "promised_percent", "energy_growth")]
+        lines.append(f"| {name} | {robot['samples']} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(InDocs):
     """Certificates of the robots that won."""
 
-    out: Path = Path("docs")
-    """Folder of the files, or the file of the numbers."""
     folder: Path = Path("runs/certificates")
     """Folder of the certificates."""
     samples: int = SAMPLES
