@@ -93,7 +93,9 @@ def leaderboard() -> str:
     lines = [SAID.sub("", line) for line in page.table(entries).splitlines()]
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     chosen = [cells[0].index(name) for name in ("task", "measure", "learned", "greedy")]
-    return "\n".join(f"| {' | '.join(row[k] for k in chosen)} |".replace(", `fast`", "") for row in cells)
+    shown = [[row[k] for k in chosen] for row in cells if set(row[chosen[2]]) != {"–"}]
+    table = "\n".join(f"| {' | '.join(row)} |" for row in shown)
+    return table.replace(", `fast`", "").replace("time until done", "time").replace("Seastar", "").replace("-v0", "")
 
 
 STUDY = Study(
