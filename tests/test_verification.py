@@ -194,7 +194,7 @@ def test_a_row_is_written_with_its_unit_and_difference():
 
 def beside_mujoco() -> dict:
     """The committed errors and times: by case, setting and code."""
-    return json.loads(PAGE.with_name("mujoco.json").read_text(encoding="utf-8"))
+    return json.loads((PAGE.parent / "results" / "verification" / "mujoco.json").read_text(encoding="utf-8"))
 
 
 def test_our_error_beside_mujoco_is_that_of_the_page():
