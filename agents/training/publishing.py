@@ -24,7 +24,7 @@ def publish(options: Options, folder: Path) -> int:
         return 1
     file = bundled_file(options.ppo.decision_period, BUNDLED)
     save_policy(policy, file)
-    print(f"In the box: {file}, with its card {write_card(file, options.num_threads).name}")
+    print(f"Bundled: {file}, with its card {write_card(file, options.num_threads).name}")
     return 0
 
 

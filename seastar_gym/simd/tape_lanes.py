@@ -10,8 +10,7 @@ constant. An entry has two parents, three numbers in a row: both places as int32
 dual lanes, what robots do is decided by values alone, and where a slope does not exist it is zero.
 
 There is one tape in a process at a time. Beside the functions of lanes.py there are `begin_tape`, `end_of_tape`,
-`pause_tape`, `resume_tape`, `tape_is_full`, `constant`
-and `less_step`.
+`pause_tape`, `resume_tape`, `tape_is_full`, `constant` and `less_step`.
 """
 
 import operator
