@@ -69,7 +69,7 @@ def errors() -> str:
     rows = [
         [f"`{name}`", *cells(preset(name)), *cells(in_time(name)), f"{preset(name).speed:,.0f}"] for name in IN_README
     ]
-    return markdown(["fidelity", *ERRORS, "x real time"], rows)
+    return markdown(["fidelity", *ERRORS, "× real time"], rows)
 
 
 def choosing() -> str:
@@ -78,7 +78,7 @@ def choosing() -> str:
         [why, f'`fidelity="{name}"`', *cells(preset(name)), *cells(in_time(name)), f"{preset(name).speed:,.0f}"]
         for name, why in PURPOSES.items()
     ]
-    return markdown(["you are", "take", *ERRORS, "x real time"], rows, 2)
+    return markdown(["you are", "take", *ERRORS, "× real time"], rows, 2)
 
 
 def presets() -> str:

@@ -31,7 +31,7 @@ def summary(found: Study) -> list[tuple[str, Row]]:
 
 COLUMNS = (
     "preset", "N", "scheme and step", "Newton tolerance", "space", "time", "path error", "any gait", "slow", "straight",
-    "x real time",
+    "× real time",
 )  # fmt: skip
 
 

@@ -104,8 +104,8 @@ def run(given: Options, results: Results) -> str | None:
 def table(results: Mapping[str, Any]) -> str:
     """Decisions per second, and simulated time per processor time, by environment."""
     lines = [
-        "| environment | simulated time of a decision [s] | one robot: decisions per second | x real time | "
-        "batch: robots | decisions per second | x real time |",
+        "| environment | simulated time of a decision [s] | one robot: decisions per second | × real time | "
+        "batch: robots | decisions per second | × real time |",
         "|---|---:|---:|---:|---:|---:|---:|",
     ]
     for id, row in results["decisions_per_second"].items():
