@@ -66,9 +66,9 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     `SeastarSwimHeading-v0` asks for headings, along the legs of the path.
 
     ## Headings
-    With `headings`, a waypoint is reached when the hub is within its radius and the robot's heading is the asked one to
-    a tolerance, `HeadingTargets.tolerance`, by default 10 degrees. The heading is the direction of the body frame, that
-    of limb 1 at rest. It repeats after a whole turn: limb 1 is told from the others, as if it carried a camera.
+    With `headings`, a waypoint is reached when the hub is within its radius and the robot's heading is within
+    `HeadingTargets.tolerance`, by default 10 degrees, of the target heading. The heading is the direction of the body
+    frame, that of limb 1 at rest: limb 1 is distinguished from the others, as if it carried a camera.
 
     ## Masks
     Some wires cannot be heated now: those of `SmaWires(refractory=True)` until their limb is cold, those of a
@@ -97,8 +97,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | 182..183 | current waypoint relative to the hub: x, y                           | 0.1 m     | (-inf, inf) |
     | 184..185 | next waypoint relative to the hub: x, y; on the last leg the current | 0.1 m     | (-inf, inf) |
 
-    A robot of other than five limbs has as many times nine stations. If a scene's actuators have a memory, it stands
-    before the waypoints, limb after limb, unless `observe_actuators` is False:
+    A robot with n limbs has 9 n stations. If a scene's actuators have a memory, it comes before the waypoints, limb
+    after limb, unless `observe_actuators` is False:
 
     | actuator     | numbers of a limb                                          | unit              | range      |
     |--------------|------------------------------------------------------------|-------------------|------------|
@@ -106,7 +106,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `ThermalSma` | temperatures of wires +, - above the water, then austenite | A_f - T_water; 1  | 0..; 0..1  |
     | `Limited`    | rotation                                                   | the largest one   | -1..1      |
 
-    If headings are asked for, the turns to them stand after the memory, before the waypoints, anti-clockwise positive:
+    With `headings`, the turns to them come after the memory, before the waypoints, anti-clockwise positive:
 
     | numbers                                                     | unit | range |
     |-------------------------------------------------------------|------|-------|
@@ -117,9 +117,9 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     shorter than heating pulses. `seastar_gym.envs.layout.Layout` names all these places.
 
     ## Sight and delays
-    A camera sees less, and late. With `sight`, a `Sight`, an observation follows from the last two pictures that were
-    seen when decisions were made: places and waypoints are relative to the hub and the heading of the last one, and
-    velocities are differences of the two. Further entries stand after all others, before the waypoints:
+    A camera sees less, and late. With `sight`, a `Sight`, an observation is computed from the last two pictures that
+    were available when a decision was made: positions and waypoints are relative to the hub and heading of the last
+    one, and velocities are differences of the two. Further entries come last, before the waypoints:
 
     | `Sight.sees`                 | stations and hub, index          | further entries, in this order                |
     |------------------------------|----------------------------------|-----------------------------------------------|
@@ -135,8 +135,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | age of the last picture                                                       | s         | 0..         |
 
     The frame is that of the last picture; k = 10 for five limbs. The memory of the actuators follows from the commands
-    and is not late. `action_delay` is the time from a decision to the heating. Rewards and the end of an episode are by
-    the true place. `info` has `sight_age`, and drawn numbers, such as `sight.delay` and `action_delay`.
+    and is not delayed. `action_delay` is the time from a decision to the heating. Rewards and the end of an episode use
+    the true position. `info` has `sight_age`, and drawn numbers, such as `sight.delay` and `action_delay`.
 
     ## Reward
     The sum of these terms, with the weights of `RewardWeights`; each term is in `info`, too:
@@ -148,12 +148,12 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `reward_effort`   | minus the time for which wires were heated, in pulses        | 0.01 per pulse |
     | `reward_heading`  | decrease of what is left to turn [rad], only with `headings` | 8 per radian   |
 
-    A pulse is 0.1 s of one wire, what a stroke takes of a limb. Where an actuator does not say how long it is heated, a
-    command counts as its share of a pulse.
+    A pulse heats one wire for 0.1 s, as a full command of a stroke does. Where an actuator does not say how long it is
+    heated, a command counts as its share of a pulse.
 
     The route is the shortest one that passes the current waypoint within 0.7 of its radius (`RewardWeights.aim`) on the
-    way to the next, and leads from centre to centre after that. What is left to turn is, by the shortest way round each
-    time, the turn to the current waypoint's heading and those from one asked heading to the next.
+    way to the next, and leads from centre to centre after that. What is left to turn is the sum of the turn to
+    the current waypoint's heading and of those from each heading to the next, each the shorter way round.
 
     ## Info
     A reset gives the same entries as a step, with zeros for counts and an empty message.
@@ -198,16 +198,16 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     `batch_real_time_factor`. One robot alone is slower than a batch (docs/speed.md).
     `error_estimate` is of the current run, of any robot: the true error since the reset, of space and time, lies below
     it in about 95 % of strokes (docs/numerics.md); NaN after a failure.
-    `energy_growth` is 1 in the first 20 strokes; well above 1, time stepping gathers energy (docs/numerics.md). The
-    chapter's scene at a fidelity, which gathers none, has no such entry.
-    With `randomization`, `info` has the drawn numbers by their names, too.
+    `energy_growth` is 1 in the first 20 strokes; a value well above 1 means that the time stepping adds energy
+    (docs/numerics.md). The chapter's scene at a fidelity has no such entry.
+    With `randomization`, `info` also has the drawn numbers, by name.
 
     ## Starting state
     The robot rests with its hub at the origin and limb 1 along +x, or in a random direction with `random_heading`.
 
     ## Episode end
     `terminated`: the last waypoint is reached, or the solver failed, which has never been seen within a scene's limits;
-    the observation is then of the last good state. `truncated`: the time limit of `gym.make`, see the table of ids.
+    the observation then shows the last valid state. `truncated`: the time limit of `gym.make`, see the table of ids.
 
     ## Arguments
     path: Name of a path - "pentagon", "square", "triangle", "line", "figure-eight", "random", or one that
@@ -215,37 +215,36 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         `reset(options={"path": ...})` chooses another path for one episode.
     actions: How commands are written: "limbs", "joint", "pairs" or "continuous", see above.
     fidelity: Accuracy of the simulation: "fast", "balanced" (default), "accurate", "reference" or "chapter". It chooses
-        nodes per limb, discretisation and numerics, as far as `scene` names none, see `Scene.at`. A fidelity other than
-        the numerics that `scene` names is refused.
+        nodes per limb, discretisation and numerics, as far as `scene` names none, see `Scene.at`. It is refused if
+        it contradicts the numerics that `scene` names.
     scene: Robot, actuators, fluid and numerics; by default the chapter's robot in water.
     reward: Weights of the reward's terms.
     waypoint_radius: Distance of the hub [m] within which a waypoint is reached.
     random_heading: Whether the robot is turned at random at the start of every episode.
     randomization: Distributions of numbers of the scene that are drawn at the start of every episode.
-    certificate: Measured errors of the scene for `info`: a `Certificate`, or the file of one that
-        `python -m seastar_gym.certify` wrote. Refused where it is of another scene or version, or decisions are no
-        strokes, of which its errors are.
-    error_bars: Whether `info` has `error_estimate`, by a finer copy of the robot that runs alongside. No bit of a
-        trajectory changes, and a step takes four to five times as long.
-    decision_period: Time between decisions [s]. None means a stroke, the period of the actuator. Other than 1 s, and
-        without a `scene`, the chapter's robot has `SmaWires`. A time in which limbs would not come to rest is refused
-        for actuators without memory.
+    certificate: Measured errors of the scene for `info`: a `Certificate`, or a file of `seastar certify`. Refused if it
+        belongs to another scene or version, or if decisions are not strokes.
+    error_bars: Whether `info` has `error_estimate`, from a finer copy of the robot that is simulated alongside. The
+        trajectory stays bit-identical; a step takes four to five times as long.
+    decision_period: Time between decisions [s]. None means a stroke, the period of the actuator. If no `scene` is given
+        and the time is not 1 s, the robot has `SmaWires`. Actuators without memory refuse a time in which limbs would
+        not come to rest.
     observe_actuators: Whether observations have the memory of the actuators.
-    headings: Headings that are asked for at the waypoints, a `HeadingTargets`: along the legs, at random, or given
-        angles. None asks for none.
-    device: Where robots swim: "cpu", or "cuda" for an NVIDIA GPU, to the same bits, see `Simulator`. It is for
-        batches of thousands.
+    headings: Target headings at the waypoints, a `HeadingTargets`: along the legs, at random, or given angles. None
+        means none.
+    device: Where robots are simulated: "cpu", or "cuda" for an NVIDIA GPU, which is bit-identical and pays for batches
+        of thousands, see `Simulator`.
     sight: Camera through which robots are seen, a `Sight`. None means that all nodes are seen, without delay.
-    action_delay: Time from a decision to when wires are heated by it [s], or a distribution of it, which is drawn at
-        the start of every episode and rounded up to 0.01 s. Other actuators than wires take whole decisions only.
+    action_delay: Time from a decision to the heating [s], or a distribution of it, drawn at the start of every episode
+        and rounded up to 0.01 s. Actuators other than wires need a multiple of the decision period.
     render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
         `frames_per_stroke` pictures of the decision. "human": a window shows as many;
-        without a display nobody sees them, and a warning says so.
+        without a display, a warning says so.
     frames_per_stroke: Number of pictures of a decision, at equal intervals; the last shows its end. None means ten per
         second of simulated time, and one at least.
 
-    `scene`, `reward`, `randomization`, `headings` and `sight` may be given as plain data, as `Scene.to_dict` and
-    `seastar_gym.scene.serial.to_dict` write them. `env.spec` has them so:
+    `scene`, `reward`, `randomization`, `headings` and `sight` may be given as plain data, as written by
+    `Scene.to_dict` and `seastar_gym.scene.serial.to_dict`. `env.spec` stores this form, so
     `gym.make(EnvSpec.from_json(env.spec.to_json()))` is the same environment.
     """
 

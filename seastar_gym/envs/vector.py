@@ -31,9 +31,9 @@ Flags = NDArray[np.bool_]
 class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, Any, Any]):
     """Environment of `num_envs` robots side by side; `SeastarSwimEnv` documents spaces, rewards, info and arguments.
 
-    Robot i has the seed `seed + i` and does to the last bit what `SeastarSwimEnv` does with that seed and the same
-    actions. Arrays of actions, observations, rewards and flags have a first axis of length `num_envs`, and so have the
-    entries of `info`; `info["_name"]` is the mask of the robots for which `info["name"]` is valid.
+    Robot i has the seed `seed + i` and is bit-identical to a `SeastarSwimEnv` with that seed and the same actions.
+    Arrays of actions, observations, rewards and flags have a first axis of length `num_envs`, and so have the entries
+    of `info`; `info["_name"]` is the mask of the robots for which `info["name"]` is valid.
 
     ## Arguments besides those of `SeastarSwimEnv`
     num_envs: Number of robots.
@@ -45,17 +45,17 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         before the next step.
     threads: Number of threads of the simulator; by default one for every processor.
     on_device: Whether observations are made on the `device` and stay there: arrays of CuPy on "cuda", which
-        `torch.from_dlpack` takes without a copy. Rewards, flags and info are numpy's. No bit differs.
+        `torch.from_dlpack` takes without a copy. Rewards, flags and info are NumPy arrays. Results are bit-identical.
     render_mode: "rgb_array": `render` returns a picture of every robot, the smaller the more there are;
         `render_robots` draws some of them.
 
     ## Memory
-    Nothing is copied for safety: the arrays of a step are fresh, and the environment keeps none of them, so a learner
-    may keep them as they are. With `step(actions, out=Buffers(...))` observations, rewards and flags are written into
-    arrays that are given, such as rows of a learner's memory, see `seastar_gym.envs.buffers`.
+    Arrays that a step returns are new, and the environment keeps no reference to them, so a learner may keep them as
+    they are. With `step(actions, out=Buffers(...))` observations, rewards and flags are written into the given arrays,
+    such as rows of a learner's memory, see `seastar_gym.envs.buffers`.
 
-    `call`, `get_attr` and `set_attr` are those of Gymnasium's `SyncVectorEnv`. What each robot has for itself
-    (`waypoints`, `scene`, `np_random`, `render`, ..) they give robot by robot; everything else is common to all robots.
+    `call`, `get_attr` and `set_attr` are those of Gymnasium's `SyncVectorEnv`. They give what each robot has of its own
+    (`waypoints`, `scene`, `np_random`, `render`, ..) robot by robot; everything else is common to all robots.
     """
 
     on_device = False
