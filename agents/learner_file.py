@@ -134,12 +134,6 @@ def resume(path: str | os.PathLike[str], env: BatchVecEnv, device: str = "cpu") 
     return model
 
 
-def begin_with(model: PPO, path: str | os.PathLike[str]) -> None:
-    """Give a new learner the network, policy and values, of one that `save` wrote; its decisions may be others."""
-    with opened(path) as archive:
-        model.policy.load_state_dict(_part(safetensors.torch.load(archive.read(LEARNER)), "network"))
-
-
 def _part(tensors: Mapping[str, torch.Tensor], kind: str) -> dict[str, torch.Tensor]:
     """Tensors whose names begin with a kind, under the rest of their names."""
     return {name.removeprefix(f"{kind}."): one for name, one in tensors.items() if name.startswith(f"{kind}.")}

@@ -60,6 +60,7 @@ FINAL = {
         "9cd3be4": "learning/ablations.json learning/ablations.png accuracy/ringing.json accuracy/ringing.png",
         "71299f4": "gaits/heading.json gaits/heading.png designs/hub.json designs/hub.png "
         "accuracy/numerical_damping.json",
+        "60498ae": "learning/in_time.json learning/in_time.png",
     }.items()
     for file in files.split()
 }

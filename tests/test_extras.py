@@ -141,7 +141,7 @@ def test_train_without_a_part_of_its_extra_says_how_to_get_it(missing, tmp_path)
 
 def test_trainings_side_by_side_need_torch(tmp_path):
     missing = ("torch", "stable_baselines3")
-    assert_says(python(tmp_path, missing, "-m", "studies.learning.timed", "--help"), "train", missing)
+    assert_says(python(tmp_path, missing, "-m", "studies.learning.robustness", "--help"), "train", missing)
 
 
 def test_a_picture_of_a_fit_says_what_it_needs_before_it_fits(tmp_path):

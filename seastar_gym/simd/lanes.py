@@ -20,20 +20,16 @@ numpy_lanes.py lists all that kernels may ask of lanes, and does the same on num
 here are those there.
 """
 
-import operator
-from collections.abc import Callable
-
 from llvmlite import ir
 from numba.core import cgutils, config, types
 from numba.core.datamodel import models
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, register_model
+from numba.extending import intrinsic, register_model
 
 from seastar_gym.simd import numpy_lanes
+from seastar_gym.simd.kind import F64, I1, I32, I64, Kind, function_of, negated, teach_masks
 from seastar_gym.simd.width import N_LANES as N_LANES
 from seastar_gym.simd.width import WIDTH as WIDTH
 
-I1, I32, F64 = ir.IntType(1), ir.IntType(32), ir.DoubleType()
 VECTOR = ir.VectorType(F64, WIDTH)
 MASK = ir.VectorType(I1, WIDTH)
 
@@ -62,88 +58,6 @@ class _LanesModel(models.PrimitiveModel):
 class _MaskModel(models.PrimitiveModel):
     def __init__(self, dmm, fe_type):
         super().__init__(dmm, fe_type, MASK)
-
-
-def _broadcast(builder, vector_type, value):
-    undefined = ir.Constant(vector_type, ir.Undefined)
-    first = builder.insert_element(undefined, value, ir.Constant(I32, 0))
-    return builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(I32, WIDTH), [0] * WIDTH))
-
-
-def _as_vector(builder, numba_type, value):
-    return value if numba_type == lanes else _broadcast(builder, VECTOR, value)
-
-
-def _lanes_signature(result, args):
-    """`result(args)` with plain numbers taken as float64, or None where an argument is neither lanes nor number."""
-    if lanes in args and all(a == lanes or isinstance(a, types.Number) for a in args):
-        return signature(result, *(a if a == lanes else types.float64 for a in args))
-    return None
-
-
-def _define_binary(op: Callable, result: types.Type, build: Callable) -> None:
-    """Teach numba `op` on lanes and numbers; `build(builder, a, b)` emits the instruction."""
-
-    @infer_global(op)
-    class Typing(AbstractTemplate):
-        def generic(self, args, kws):
-            return _lanes_signature(result, args) if len(args) == 2 else None
-
-    def lower(context, builder, sig, args):
-        return build(builder, *(_as_vector(builder, t, a) for t, a in zip(sig.args, args, strict=True)))
-
-    for operands in ((Lanes, Lanes), (Lanes, types.float64), (types.float64, Lanes)):
-        lower_builtin(op, *operands)(lower)
-
-
-for _op, _instruction in (
-    (operator.add, "fadd"),
-    (operator.iadd, "fadd"),
-    (operator.sub, "fsub"),
-    (operator.isub, "fsub"),
-    (operator.mul, "fmul"),
-    (operator.imul, "fmul"),
-    (operator.truediv, "fdiv"),
-    (operator.itruediv, "fdiv"),
-):
-    _define_binary(_op, lanes, lambda builder, a, b, name=_instruction: getattr(builder, name)(a, b))
-
-# Ordered comparisons: a NaN compares false with everything, so it never passes a test for being good.
-for _op, _symbol in (
-    (operator.lt, "<"),
-    (operator.le, "<="),
-    (operator.gt, ">"),
-    (operator.ge, ">="),
-    (operator.eq, "=="),
-):
-    _define_binary(_op, mask, lambda builder, a, b, symbol=_symbol: builder.fcmp_ordered(symbol, a, b))
-
-
-@infer_global(operator.neg)
-class _Negation(AbstractTemplate):
-    def generic(self, args, kws):
-        return signature(lanes, lanes) if args == (lanes,) else None
-
-
-@lower_builtin(operator.neg, Lanes)
-def _lower_negation(context, builder, sig, args):
-    return builder.fsub(ir.Constant(VECTOR, [-0.0] * WIDTH), args[0])
-
-
-def _define_mask_operator(op: Callable, n_args: int, build: Callable) -> None:
-    @infer_global(op)
-    class Typing(AbstractTemplate):
-        def generic(self, args, kws):
-            return signature(mask, *args) if args == (mask,) * n_args else None
-
-    @lower_builtin(op, *(Mask,) * n_args)
-    def lower(context, builder, sig, args):
-        return build(builder, *args)
-
-
-_define_mask_operator(operator.and_, 2, lambda builder, a, b: builder.and_(a, b))
-_define_mask_operator(operator.or_, 2, lambda builder, a, b: builder.or_(a, b))
-_define_mask_operator(operator.invert, 1, lambda builder, a: builder.not_(a))
 
 
 class Rows(types.Type):
@@ -251,27 +165,6 @@ def borrow(typing_context, bundle):
     return result(bundle), codegen
 
 
-def _vector_pointer(builder, pointer, row):
-    element = builder.gep(pointer, [builder.mul(row, ir.Constant(row.type, N_LANES))])
-    return builder.bitcast(element, VECTOR.as_pointer())
-
-
-@intrinsic
-def load(typing_context, rows, row):
-    """Row `row`: one number per robot, or one number for all robots if the rows are shared."""
-    if not (isinstance(rows, Rows) and isinstance(row, types.Integer)):
-        return None
-
-    def codegen(context, builder, sig, args):
-        if sig.args[0].shared:
-            return _broadcast(builder, VECTOR, builder.load(builder.gep(args[0], [args[1]])))
-        value = builder.load(_vector_pointer(builder, *args))
-        value.align = 8
-        return value
-
-    return lanes(rows, types.intp), codegen
-
-
 def _holds_numbers(rows):
     return isinstance(rows, Rows) and (rows.shared or WIDTH == 1)
 
@@ -306,130 +199,73 @@ def store_number(typing_context, rows, row, value):
     return types.void(rows, types.intp, types.float64), codegen
 
 
-@intrinsic
-def load_at(typing_context, rows, row):
-    """From shared rows, for every robot the number at its own row (lanes, whole numbers)."""
-    if not (isinstance(rows, Rows) and rows.shared and row == lanes):
-        return None
+class Registers(Kind):
+    """Numbers are vectors."""
 
-    def codegen(context, builder, sig, args):
+    def plain(self, builder, value):
+        undefined = ir.Constant(VECTOR, ir.Undefined)
+        first = builder.insert_element(undefined, value, ir.Constant(I32, 0))
+        return builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(I32, WIDTH), [0] * WIDTH))
+
+    def add(self, builder, a, b):
+        return builder.fadd(a, b)
+
+    def subtract(self, builder, a, b):
+        return builder.fsub(a, b)
+
+    def multiply(self, builder, a, b):
+        return builder.fmul(a, b)
+
+    def divide(self, builder, a, b):
+        return builder.fdiv(a, b)
+
+    def minus(self, builder, x):
+        return negated(builder, x)
+
+    def root(self, builder, x):
+        return function_of("sqrt", builder, x)
+
+    def magnitude(self, builder, x):
+        return function_of("fabs", builder, x)
+
+    def whole(self, builder, x):
+        return function_of("floor", builder, x)
+
+    def product_sum(self, builder, c, a, b, negate):
+        return function_of("fma", builder, negated(builder, a) if negate else a, b, c)
+
+    def chosen(self, builder, condition, when_true, when_false):
+        return builder.select(condition, when_true, when_false)
+
+    def pointer(self, builder, rows, row):
+        """Pointer to the vector of a row that robots do not share."""
+        element = builder.gep(rows, [builder.mul(row, ir.Constant(row.type, N_LANES))])
+        return builder.bitcast(element, VECTOR.as_pointer())
+
+    def read(self, builder, rows, row):
+        value = builder.load(self.pointer(builder, rows, row))
+        value.align = 8
+        return value
+
+    def write(self, builder, rows, row, number):
+        builder.store(number, self.pointer(builder, rows, row)).align = 8
+
+    def gathered(self, builder, rows, value):
         result = ir.Constant(VECTOR, ir.Undefined)
-        indices = builder.fptosi(args[1], ir.VectorType(ir.IntType(64), WIDTH))
+        indices = builder.fptosi(value, ir.VectorType(I64, WIDTH))
         for k in range(WIDTH):
             index = builder.extract_element(indices, ir.Constant(I32, k))
-            number = builder.load(builder.gep(args[0], [index]))
+            number = builder.load(builder.gep(rows, [index]))
             result = builder.insert_element(result, number, ir.Constant(I32, k))
         return result
 
-    return lanes(rows, lanes), codegen
 
-
-@intrinsic
-def store(typing_context, rows, row, value):
-    """Write `value` (lanes, or one number for all robots) to row `row` of rows that are not shared."""
-    if not (isinstance(rows, Rows) and not rows.shared and isinstance(row, types.Integer)):
-        return None
-    if not (value == lanes or isinstance(value, types.Number)):
-        return None
-
-    def codegen(context, builder, sig, args):
-        pointer = _vector_pointer(builder, args[0], args[1])
-        builder.store(_as_vector(builder, sig.args[2], args[2]), pointer).align = 8
-        return context.get_dummy_value()
-
-    return types.void(rows, types.intp, lanes if value == lanes else types.float64), codegen
-
-
-@intrinsic
-def splat(typing_context, value):
-    """One number for all robots, as lanes."""
-    if not isinstance(value, types.Number):
-        return None
-
-    def codegen(context, builder, sig, args):
-        return _broadcast(builder, VECTOR, args[0])
-
-    return lanes(types.float64), codegen
-
-
-@intrinsic
-def select(typing_context, condition, when_true, when_false):
-    """`when_true` for the robots in the mask `condition`, `when_false` for the others; no mask (None): no robot."""
-    if condition not in (mask, types.none) or lanes not in (when_true, when_false):
-        return None
-
-    def codegen(context, builder, sig, args):
-        if condition == types.none:
-            return _as_vector(builder, sig.args[2], args[2])
-        chosen = (_as_vector(builder, t, a) for t, a in zip(sig.args[1:], args[1:], strict=True))
-        return builder.select(args[0], *chosen)
-
-    choices = (lanes if a == lanes else types.float64 for a in (when_true, when_false))
-    return lanes(condition, *choices), codegen
-
-
-def _vector_function(name, n_args):
-    """An intrinsic that calls LLVM's vector function `name`, exact or correctly rounded for every lane."""
-
-    def build(builder, args):
-        function_type = ir.FunctionType(VECTOR, [VECTOR] * n_args)
-        function_name = f"llvm.{name}.v{WIDTH}f64"
-        function = builder.module.globals.get(function_name)
-        if function is None:
-            function = ir.Function(builder.module, function_type, name=function_name)
-        return builder.call(function, args)
-
-    return build
-
-
-@intrinsic
-def sqrt(typing_context, x):
-    """Square root, correctly rounded."""
-    if x != lanes:
-        return None
-    return lanes(lanes), lambda context, builder, sig, args: _vector_function("sqrt", 1)(builder, args)
-
-
-@intrinsic
-def floor(typing_context, x):
-    """Largest whole number not above x."""
-    if x != lanes:
-        return None
-    return lanes(lanes), lambda context, builder, sig, args: _vector_function("floor", 1)(builder, args)
-
-
-@intrinsic
-def absolute(typing_context, x):
-    """|x|."""
-    if x != lanes:
-        return None
-    return lanes(lanes), lambda context, builder, sig, args: _vector_function("fabs", 1)(builder, args)
-
-
-def _product_sum(typing_args, negate):
-    sig = _lanes_signature(lanes, typing_args)
-    if sig is None:
-        return None
-
-    def codegen(context, builder, sig, args):
-        c, a, b = (_as_vector(builder, t, x) for t, x in zip(sig.args, args, strict=True))
-        if negate:
-            a = builder.fsub(ir.Constant(VECTOR, [-0.0] * WIDTH), a)
-        return _vector_function("fma", 3)(builder, [a, b, c])
-
-    return sig, codegen
-
-
-@intrinsic
-def add_product(typing_context, c, a, b):
-    """c + a b, rounded once."""
-    return _product_sum((c, a, b), negate=False)
-
-
-@intrinsic
-def subtract_product(typing_context, c, a, b):
-    """c - a b, rounded once."""
-    return _product_sum((c, a, b), negate=True)
+teach_masks(mask)
+registers = Registers(lanes, mask, Rows)
+load, load_at, store = intrinsic(registers.load), intrinsic(registers.load_at), intrinsic(registers.store)
+splat, select = intrinsic(registers.splat), intrinsic(registers.select)
+sqrt, absolute, floor = intrinsic(registers.sqrt), intrinsic(registers.absolute), intrinsic(registers.floor)
+add_product, subtract_product = intrinsic(registers.add_product), intrinsic(registers.subtract_product)
 
 
 @intrinsic

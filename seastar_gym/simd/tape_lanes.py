@@ -13,17 +13,15 @@ There is one tape in a process at a time. Beside the functions of lanes.py there
 `pause_tape`, `resume_tape`, `tape_is_full`, `constant` and `less_step`.
 """
 
-import operator
-
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.datamodel import models
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, register_model
+from numba.extending import intrinsic, register_model
 
-from seastar_gym.simd.lanes import F64, I1, I32, Rows
+from seastar_gym.simd.kind import F64, I1, I32, I64, Kind, function_of, negated, teach_masks
 from seastar_gym.simd.lanes import N_LANES as N_LANES
 from seastar_gym.simd.lanes import WIDTH as WIDTH
+from seastar_gym.simd.lanes import Rows
 from seastar_gym.simd.lanes import borrow as borrow
 from seastar_gym.simd.lanes import load_number as load_number
 from seastar_gym.simd.lanes import store_number as store_number
@@ -32,8 +30,8 @@ ROW = 2
 """Numbers in a row of memory that robots do not share."""
 ENTRY = 3
 """Numbers in an entry of the tape."""
-I64 = ir.IntType(64)
-NOWHERE, ONE, MINUS_ONE = ir.Constant(I64, 0), ir.Constant(F64, 1.0), ir.Constant(F64, -1.0)
+NOWHERE = ir.Constant(I64, 0)
+ZERO, ONE, MINUS_ONE = (ir.Constant(F64, number) for number in (0.0, 1.0, -1.0))
 TAPE, RECORD, RECORD_THREE = "seastar_tape", "seastar_record", "seastar_record_three"
 COUNT, LIMIT, CAPACITY, BEGIN, FULL = range(5)
 """State of the tape: place of the next entry; where it ends, 0 while it is paused; where it ends otherwise; its memory;
@@ -149,275 +147,86 @@ def _place(builder, *parents):
     return place
 
 
-def _pair(context, builder, value, place):
-    """Lanes of a value and its place; None: it is constant."""
-    made = cgutils.create_struct_proxy(lanes)(context, builder)
-    made.value, made.place = value, NOWHERE if place is None else place
-    return made._getvalue()
+class Recorded(Kind):
+    """Numbers are (value, place), scalars; a place of None is constant."""
 
-
-def _parts(context, builder, numba_type, x):
-    """(value, place) of lanes, or of a plain number, whose place is None."""
-    if numba_type == lanes:
-        found = cgutils.create_struct_proxy(lanes)(context, builder, value=x)
+    def opened(self, context, builder, value):
+        found = cgutils.create_struct_proxy(lanes)(context, builder, value=value)
         return found.value, found.place
-    return x, None
 
+    def closed(self, context, builder, number):
+        made = cgutils.create_struct_proxy(lanes)(context, builder)
+        made.value, made.place = number[0], NOWHERE if number[1] is None else number[1]
+        return made._getvalue()
 
-def _add(builder, a, b):
-    return builder.fadd(a[0], b[0]), _place(builder, (a[1], ONE), (b[1], ONE))
+    def plain(self, builder, value):
+        return value, None
 
+    def value(self, number):
+        return number[0]
 
-def _subtract(builder, a, b):
-    return builder.fsub(a[0], b[0]), _place(builder, (a[1], ONE), (b[1], MINUS_ONE))
+    def add(self, builder, a, b):
+        return builder.fadd(a[0], b[0]), _place(builder, (a[1], ONE), (b[1], ONE))
 
+    def subtract(self, builder, a, b):
+        return builder.fsub(a[0], b[0]), _place(builder, (a[1], ONE), (b[1], MINUS_ONE))
 
-def _multiply(builder, a, b):
-    return builder.fmul(a[0], b[0]), _place(builder, (a[1], b[0]), (b[1], a[0]))
+    def multiply(self, builder, a, b):
+        return builder.fmul(a[0], b[0]), _place(builder, (a[1], b[0]), (b[1], a[0]))
 
+    def divide(self, builder, a, b):
+        quotient, inverse = builder.fdiv(a[0], b[0]), builder.fdiv(ONE, b[0])
+        return quotient, _place(builder, (a[1], inverse), (b[1], builder.fmul(negated(builder, quotient), inverse)))
 
-def _divide(builder, a, b):
-    quotient, inverse = builder.fdiv(a[0], b[0]), builder.fdiv(ONE, b[0])
-    return quotient, _place(builder, (a[1], inverse), (b[1], builder.fmul(_minus(builder, quotient), inverse)))
+    def minus(self, builder, x):
+        return negated(builder, x[0]), _place(builder, (x[1], MINUS_ONE))
 
+    def root(self, builder, x):
+        root = function_of("sqrt", builder, x[0])
+        partial = builder.fdiv(ONE, builder.fadd(root, root))
+        partial = builder.select(builder.fcmp_ordered("==", root, ZERO), ZERO, partial)
+        return root, _place(builder, (x[1], partial))
 
-def _minus(builder, x):
-    return builder.fsub(ir.Constant(F64, -0.0), x)
+    def magnitude(self, builder, x):
+        negative = builder.fcmp_ordered("<", x[0], ZERO)
+        partial = builder.select(negative, MINUS_ONE, ONE)
+        return function_of("fabs", builder, x[0]), _place(builder, (x[1], partial))
 
+    def whole(self, builder, x):
+        return function_of("floor", builder, x[0]), None
 
-def _are_operands(args):
-    return lanes in args and all(a == lanes or isinstance(a, types.Number) for a in args)
+    def product_sum(self, builder, c, a, b, negate):
+        x, y = (negated(builder, a[0]), negated(builder, b[0])) if negate else (a[0], b[0])
+        return function_of("fma", builder, x, b[0], c[0]), _place(builder, (c[1], ONE), (a[1], y), (b[1], x))
 
+    def chosen(self, builder, condition, when_true, when_false):
+        places = (NOWHERE if place is None else place for place in (when_true[1], when_false[1]))
+        return builder.select(condition, when_true[0], when_false[0]), builder.select(condition, *places)
 
-def _signature(result, args):
-    if _are_operands(args):
-        return signature(result, *(a if a == lanes else types.float64 for a in args))
-    return None
+    def pointers(self, builder, rows, row):
+        """Pointers to the value and to the place of a row that robots do not share."""
+        element = builder.gep(rows, [builder.mul(row, ir.Constant(row.type, ROW))])
+        behind = builder.gep(element, [ir.Constant(row.type, 1)])
+        return element, builder.bitcast(behind, I64.as_pointer())
 
+    def read(self, builder, rows, row):
+        return [builder.load(pointer) for pointer in self.pointers(builder, rows, row)]
 
-def _define(op, result, build):
-    """Teach numba `op` on two of these lanes and numbers; `build(context, builder, a, b)` gets (value, place) twice."""
+    def write(self, builder, rows, row, number):
+        of_value, of_place = self.pointers(builder, rows, row)
+        builder.store(number[0], of_value)
+        builder.store(NOWHERE if number[1] is None else number[1], of_place)
 
-    @infer_global(op)
-    class Typing(AbstractTemplate):
-        def generic(self, args, kws):
-            return _signature(result, args) if len(args) == 2 else None
+    def gathered(self, builder, rows, value):
+        return builder.load(builder.gep(rows, [builder.fptosi(value, I64)])), None
 
-    def lower(context, builder, sig, args):
-        return build(context, builder, *(_parts(context, builder, t, a) for t, a in zip(sig.args, args, strict=True)))
 
-    for operands in ((Lanes, Lanes), (Lanes, types.float64), (types.float64, Lanes)):
-        lower_builtin(op, *operands)(lower)
-
-
-for _ops, _rule in (
-    ((operator.add, operator.iadd), _add),
-    ((operator.sub, operator.isub), _subtract),
-    ((operator.mul, operator.imul), _multiply),
-    ((operator.truediv, operator.itruediv), _divide),
-):
-    for _op in _ops:
-        _define(_op, lanes, lambda context, builder, a, b, rule=_rule: _pair(context, builder, *rule(builder, a, b)))
-
-for _op, _symbol in (
-    (operator.lt, "<"),
-    (operator.le, "<="),
-    (operator.gt, ">"),
-    (operator.ge, ">="),
-    (operator.eq, "=="),
-):
-    _define(_op, mask, lambda context, builder, a, b, symbol=_symbol: builder.fcmp_ordered(symbol, a[0], b[0]))
-
-
-def _define_mask_operator(op, n_args, build):
-    @infer_global(op)
-    class Typing(AbstractTemplate):
-        def generic(self, args, kws):
-            return signature(mask, *args) if args == (mask,) * n_args else None
-
-    @lower_builtin(op, *(Mask,) * n_args)
-    def lower(context, builder, sig, args):
-        return build(builder, *args)
-
-
-_define_mask_operator(operator.and_, 2, lambda builder, a, b: builder.and_(a, b))
-_define_mask_operator(operator.or_, 2, lambda builder, a, b: builder.or_(a, b))
-_define_mask_operator(operator.invert, 1, lambda builder, a: builder.not_(a))
-
-
-@infer_global(operator.neg)
-class _Negation(AbstractTemplate):
-    def generic(self, args, kws):
-        return signature(lanes, lanes) if args == (lanes,) else None
-
-
-@lower_builtin(operator.neg, Lanes)
-def _lower_negation(context, builder, sig, args):
-    value, place = _parts(context, builder, lanes, args[0])
-    return _pair(context, builder, _minus(builder, value), _place(builder, (place, MINUS_ONE)))
-
-
-def _pointers(builder, rows, row):
-    """Pointers to the value and to the place of a row that robots do not share."""
-    element = builder.gep(rows, [builder.mul(row, ir.Constant(row.type, ROW))])
-    behind = builder.gep(element, [ir.Constant(row.type, 1)])
-    return element, builder.bitcast(behind, I64.as_pointer())
-
-
-@intrinsic
-def load(typing_context, rows, row):
-    """Row `row`: the robot's number with its place, or one number for all robots, constant."""
-    if not (isinstance(rows, Rows) and isinstance(row, types.Integer)):
-        return None
-
-    def codegen(context, builder, sig, args):
-        if sig.args[0].shared:
-            return _pair(context, builder, builder.load(builder.gep(args[0], [args[1]])), None)
-        value, place = _pointers(builder, *args)
-        return _pair(context, builder, builder.load(value), builder.load(place))
-
-    return lanes(rows, types.intp), codegen
-
-
-@intrinsic
-def load_at(typing_context, rows, row):
-    """From shared rows the number at the robot's own row (lanes, a whole number), constant."""
-    if not (isinstance(rows, Rows) and rows.shared and row == lanes):
-        return None
-
-    def codegen(context, builder, sig, args):
-        value, _ = _parts(context, builder, lanes, args[1])
-        number = builder.load(builder.gep(args[0], [builder.fptosi(value, I64)]))
-        return _pair(context, builder, number, None)
-
-    return lanes(rows, lanes), codegen
-
-
-@intrinsic
-def store(typing_context, rows, row, value):
-    """Write `value` (lanes, or a number, which is constant) to a row that robots do not share."""
-    if not (isinstance(rows, Rows) and not rows.shared and isinstance(row, types.Integer)):
-        return None
-    if not (value == lanes or isinstance(value, types.Number)):
-        return None
-
-    def codegen(context, builder, sig, args):
-        number, place = _parts(context, builder, sig.args[2], args[2])
-        of_value, of_place = _pointers(builder, args[0], args[1])
-        builder.store(number, of_value)
-        builder.store(NOWHERE if place is None else place, of_place)
-        return context.get_dummy_value()
-
-    return types.void(rows, types.intp, lanes if value == lanes else types.float64), codegen
-
-
-@intrinsic
-def splat(typing_context, value):
-    """A number as lanes, constant."""
-    if not isinstance(value, types.Number):
-        return None
-    return lanes(types.float64), lambda context, builder, sig, args: _pair(context, builder, args[0], None)
-
-
-@intrinsic
-def select(typing_context, condition, when_true, when_false):
-    """`when_true` if the mask `condition` holds, else `when_false`; no mask (None): it does not hold."""
-    if condition not in (mask, types.none) or lanes not in (when_true, when_false):
-        return None
-
-    def codegen(context, builder, sig, args):
-        true, false = (_parts(context, builder, t, a) for t, a in zip(sig.args[1:], args[1:], strict=True))
-        if condition == types.none:
-            return _pair(context, builder, *false)
-        places = (NOWHERE if place is None else place for place in (true[1], false[1]))
-        return _pair(context, builder, builder.select(args[0], true[0], false[0]), builder.select(args[0], *places))
-
-    choices = (lanes if a == lanes else types.float64 for a in (when_true, when_false))
-    return lanes(condition, *choices), codegen
-
-
-def _function_of(name, builder, *args):
-    """LLVM's function `name` of numbers."""
-    full = f"llvm.{name}.f64"
-    function = builder.module.globals.get(full)
-    if function is None:
-        function = ir.Function(builder.module, ir.FunctionType(F64, [F64] * len(args)), name=full)
-    return builder.call(function, args)
-
-
-def _one_argument(rule):
-    """An intrinsic of one argument; `rule(builder, value, place)` gives the value and the place of the result."""
-
-    def typed(typing_context, x):
-        if x != lanes:
-            return None
-
-        def codegen(context, builder, sig, args):
-            return _pair(context, builder, *rule(builder, *_parts(context, builder, lanes, args[0])))
-
-        return lanes(lanes), codegen
-
-    return typed
-
-
-def _root(builder, value, place):
-    root, zero = _function_of("sqrt", builder, value), ir.Constant(F64, 0.0)
-    partial = builder.fdiv(ONE, builder.fadd(root, root))
-    partial = builder.select(builder.fcmp_ordered("==", root, zero), zero, partial)
-    return root, _place(builder, (place, partial))
-
-
-def _magnitude(builder, value, place):
-    negative = builder.fcmp_ordered("<", value, ir.Constant(F64, 0.0))
-    return _function_of("fabs", builder, value), _place(builder, (place, builder.select(negative, MINUS_ONE, ONE)))
-
-
-def _whole(builder, value, place):
-    return _function_of("floor", builder, value), None
-
-
-@intrinsic
-def sqrt(typing_context, x):
-    """Square root; at zero its slope is zero."""
-    return _one_argument(_root)(typing_context, x)
-
-
-@intrinsic
-def absolute(typing_context, x):
-    """|x|."""
-    return _one_argument(_magnitude)(typing_context, x)
-
-
-@intrinsic
-def floor(typing_context, x):
-    """Largest whole number not above x, a constant."""
-    return _one_argument(_whole)(typing_context, x)
-
-
-def _product_sum(typing_args, negate):
-    sig = _signature(lanes, typing_args)
-    if sig is None:
-        return None
-
-    def codegen(context, builder, sig, args):
-        c, a, b = (_parts(context, builder, t, x) for t, x in zip(sig.args, args, strict=True))
-        x, y = (_minus(builder, a[0]), _minus(builder, b[0])) if negate else (a[0], b[0])
-        value = _function_of("fma", builder, x, b[0], c[0])
-        return _pair(context, builder, value, _place(builder, (c[1], ONE), (a[1], y), (b[1], x)))
-
-    return sig, codegen
-
-
-@intrinsic
-def add_product(typing_context, c, a, b):
-    """c + a b, whose value is rounded once."""
-    return _product_sum((c, a, b), negate=False)
-
-
-@intrinsic
-def subtract_product(typing_context, c, a, b):
-    """c - a b, whose value is rounded once."""
-    return _product_sum((c, a, b), negate=True)
+teach_masks(mask)
+recorded = Recorded(lanes, mask, Rows)
+load, load_at, store = intrinsic(recorded.load), intrinsic(recorded.load_at), intrinsic(recorded.store)
+splat, select = intrinsic(recorded.splat), intrinsic(recorded.select)
+sqrt, absolute, floor = intrinsic(recorded.sqrt), intrinsic(recorded.absolute), intrinsic(recorded.floor)
+add_product, subtract_product = intrinsic(recorded.add_product), intrinsic(recorded.subtract_product)
 
 
 @intrinsic
@@ -431,26 +240,15 @@ def any_lane(typing_context, condition):
 @intrinsic
 def constant(typing_context, x):
     """The value of x, as a constant."""
-    if x != lanes:
-        return None
-
-    def codegen(context, builder, sig, args):
-        return _pair(context, builder, _parts(context, builder, lanes, args[0])[0], None)
-
-    return lanes(lanes), codegen
+    return recorded.function((x,), lambda builder, number: (number[0], None))
 
 
 @intrinsic
 def less_step(typing_context, x, step):
     """x as x - step is differentiated, with the value of x, which is taken for a constant."""
-    if (x, step) != (lanes, lanes):
-        return None
-
-    def codegen(context, builder, sig, args):
-        (value, _), (_, place) = (_parts(context, builder, lanes, a) for a in args)
-        return _pair(context, builder, value, _place(builder, (place, MINUS_ONE)))
-
-    return lanes(lanes, lanes), codegen
+    return recorded.function(
+        (x, step), lambda builder, number, other: (number[0], _place(builder, (other[1], MINUS_ONE)))
+    )
 
 
 def _memory_of(context, builder, array_type, array):

@@ -10,16 +10,22 @@ The error is the hub's distance from the other path at the ends of strokes, as a
 are processor times of one thread, the best of several rounds, for a batch of random commands.
 """
 
+import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seastar_gym.accuracy.chapter import STROKES
 from seastar_gym.accuracy.command import progress_bar
+from seastar_gym.accuracy.measure import Progress
 from seastar_gym.accuracy.setting import at
-from seastar_gym.gaits import PAIRS
+from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene import Scene
+from seastar_gym.simulator import Simulator
 from studies.accuracy import page
 from studies.accuracy.cases import Cases, gaits, joined, pentagon, random_gaits, random_sequences, slow_sequences, swims
 from studies.accuracy.convergence import measured, rows_of, second_opinion
@@ -27,7 +33,6 @@ from studies.accuracy.pictures import draw_all
 from studies.accuracy.rows import Row, promised
 from studies.accuracy.rows import Study as Found
 from studies.accuracy.settings import QUICK, Plan, presets, settings
-from studies.accuracy.speeds import measure_speeds
 from studies.accuracy.tables import as_markdown, store, store_typical, write_csv
 from studies.frame import Results, Study
 from studies.pages import show
@@ -116,3 +121,37 @@ STUDY = Study(
     },
     drawn=("accuracy/convergence.png", "accuracy/work_precision.png"),
 )
+
+
+# Real-time factors of settings.
+
+
+Floats = NDArray[np.float64]
+
+
+def measure_speeds(scenes: Sequence[Scene], rounds: int, progress: Progress, n_robots: int = 32) -> Floats:
+    """Real-time factors on one core for mixed commands and for the straight swim, shape (len(scenes), 2).
+
+    Every round times all settings once, after the first stroke from rest. The best round counts, because other work of
+    the machine can only add time.
+    """
+    mixed = random_sequences(n_robots, np.random.default_rng(1)).commands[:3]
+    workloads = [mixed, np.broadcast_to(STRAIGHT, mixed.shape)]
+    best = np.full((len(scenes), 2), np.inf)
+    simulators: dict[tuple[int, int], tuple[Simulator, Any]] = {}
+    for turn in range(rounds):
+        for k, scene in enumerate(scenes):
+            for w, commands in enumerate(workloads):
+                if (k, w) not in simulators:
+                    simulator = Simulator(scene, n_robots, threads=1)
+                    simulator.stroke(commands[0])
+                    simulators[k, w] = simulator, simulator.get_state()
+                simulator, state = simulators[k, w]
+                simulator.set_state(state)
+                start = time.thread_time()
+                for command in commands[1:]:
+                    simulator.stroke(command)
+                best[k, w] = min(best[k, w], time.thread_time() - start)
+            progress((turn + (k + 1) / len(scenes)) / rounds)
+    simulated = n_robots * (len(mixed) - 1) * Scene().actuator.period
+    return simulated / best

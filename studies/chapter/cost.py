@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator
-from studies.speed.timing import repeat
+from studies.speed.strokes import repeat
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from seastar_gym.simd.compilation import entry_point
 from seastar_gym.simd.lanes import N_LANES, add_product, borrow, load, store
-from studies.speed.timing import repeat
+from studies.speed.strokes import repeat
 
 
 @entry_point

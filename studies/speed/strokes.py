@@ -1,5 +1,7 @@
 """Speed of the simulator's strokes: real-time factors, threads, and cost over resolution."""
 
+import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -9,7 +11,6 @@ from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import Simulator
-from studies.speed.timing import repeat
 
 NODES_PER_LIMB = (5, 10, 20, 40, 80, 160, 320, 640)
 """Nodes per limb on the curve of cost."""
@@ -63,3 +64,17 @@ def iteration_seconds(scene: Scene, seconds: float) -> list[float]:
     commands = np.tile(STRAIGHT, (simulator.n_robots, 1))
     iterations = int(simulator.stroke(commands).newton_iterations.sum())
     return [d / iterations for d in repeat(lambda: simulator.stroke(commands), seconds)]
+
+
+# Timing of repeated runs on this machine.
+
+
+def repeat(run: Callable[[], object], seconds: float, at_least: int = 5) -> list[float]:
+    """Durations of repeated runs [s], after a first run that does not count, for about `seconds` [s]."""
+    run()
+    durations: list[float] = []
+    while len(durations) < at_least or sum(durations) < seconds:
+        start = time.perf_counter()
+        run()
+        durations.append(time.perf_counter() - start)
+    return durations

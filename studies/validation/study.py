@@ -20,11 +20,23 @@ from numpy.typing import NDArray
 
 from studies.frame import InDocs, Results, Study, require_known
 from studies.validation import follow, laws, turns
-from studies.validation.inference import MODEL, SCATTER, effective, hindsight, one_speed, predict, score, weights
-from studies.validation.luck import other_fours, scores
+from studies.validation.inference import (
+    MODEL,
+    SCATTER,
+    best_known,
+    effective,
+    hindsight,
+    one_speed,
+    other_fours,
+    predict,
+    score,
+    scores,
+    sweeps_told,
+    told,
+    weights,
+)
 from studies.validation.pictures import draw
 from studies.validation.priors import samples
-from studies.validation.separation import best_known, sweeps_told, told
 from studies.validation.simulate import all_speeds, speeds
 from studies.validation.speeds import Condition, read_speeds, training
 from studies.validation.swimmer import ADDED, FULL, LEFT_OUT, VARIANTS

@@ -4,12 +4,34 @@ import numpy as np
 import pytest
 
 import oracle
-from hubs import HUBS
+from hubs import HUBS, TEN
 from oracle import Star
-from seastar_gym import Contact, Scene, SmaPulse
+from seastar_gym import Contact, Scene, Seastar, SmaPulse
+from seastar_gym.der.contact.broad_phase import freeze_contact, share_of_edge
+from seastar_gym.der.contact.contact import (
+    SLOT_ROWS,
+    STIFFNESS,
+    add_contact,
+    add_contact_energy,
+    add_gap_gradient,
+    contact_force,
+    gap,
+    members,
+    n_listed,
+    not_touching,
+)
+from seastar_gym.der.contact.coupled import add_contact_product, dot, solve_coupled, solver_iterations
+from seastar_gym.der.contact.crossing import edges_cross, on_their_sides, without_new_crossings
+from seastar_gym.der.linear.star_solution import solve_again, substitute_star
+from seastar_gym.der.potential import factorise
+from seastar_gym.der.rods import make_work
+from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.numpy_lanes import Lanes, Mask
+from slopes import NO_RODS, NO_WORK, nodes, plain, rotated, rows, slope
 from stages import RandomStages, robot_and_star
+from touching import touching_limbs
 
 ANGLE = 0.3
 
@@ -92,3 +114,298 @@ def test_a_tip_at_a_root_edge_of_its_neighbour_is_met(nodes_per_limb, side):
         at_tip = gradients.reshape(len(gradients), -1, 2)[:, tip].any(axis=1)
         assert (depths[at_tip] > 1e-4).any()
         np.testing.assert_allclose(found.phi[lane], stages.phi(lane) + 0.5 * stiffnesses @ depths**2, rtol=1e-9)
+
+
+# Contact between limbs: its forces are the slopes of its energy, cancel, and come from those alone that touch.
+
+
+EVERYONE = Mask(np.ones(N_LANES, bool))
+
+
+def energy(touching, q=None) -> np.ndarray:
+    work, own = touching.work, touching.work.q.copy()
+    work.q[:] = own if q is None else q
+    found = plain(add_contact.plain(touching.rods, work, touching.stage, None, Lanes(0.0)))
+    work.q[:] = own
+    return found
+
+
+@pytest.mark.parametrize("ahead", [False, True])
+def test_forces_are_the_slopes_of_the_energy(ahead):
+    touching = touching_limbs(ahead)
+    assert np.all(energy(touching) > 0.0)
+    force = touching.work.contact.force.copy()
+    q, direction = touching.work.q.copy(), np.random.default_rng(1).standard_normal(force.shape)
+    along = slope(lambda s: energy(touching, q + s * direction), 0.0, 1e-7)
+    np.testing.assert_allclose(-(force * direction).sum(axis=0), along, rtol=1e-5)
+
+
+def test_forces_neither_push_nor_turn_the_robot():
+    touching = touching_limbs()
+    energy(touching)
+    force, q = (x.T.reshape(N_LANES, -1, 2) for x in (touching.work.contact.force, touching.work.q))
+    size = np.abs(force).max()
+    np.testing.assert_allclose(force.sum(axis=1), 0.0, atol=1e-12 * size)
+    spin = q[..., 0] * force[..., 1] - q[..., 1] * force[..., 0]
+    assert np.all(np.abs(spin.sum(axis=1)) <= 1e-12 * np.abs(spin).sum(axis=1))
+    assert np.abs(force[:, 7:]).max() == 0.0  # nodes of the limbs that touch nobody
+
+
+def listed_stiffness(touching, q) -> np.ndarray:
+    """Stiffness of all listed pairs of every node at positions q [N/m], shape (n_nodes, N_LANES)."""
+    rods, work = touching.rods, touching.work
+    work.q[:] = rows(q)
+    freeze_contact.plain(rods, work, touching.stage, rows(q))
+    total = np.zeros((rods.n_nodes, N_LANES))
+    for slot in range(n_listed.plain(work)):
+        total[members.plain(rods, work, slot)[0]] += work.contact.slots[SLOT_ROWS * slot + STIFFNESS]
+    return total
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.04, 0.2, 0.25, 0.5, 0.7, 0.75, 0.97])
+def test_a_node_counts_once_wherever_along_a_limb_it_stands(shift):
+    """Limb 2 lies beside limb 1, so many edges nearer to the hub; both of its nodes meet edges of limb 1."""
+    touching = touching_limbs()
+    q = nodes(touching.q_0)[0]
+    length = 0.1 / 3.0
+    q[1:4] = np.outer([1.0, 2.0, 3.0], [length, 0.0])
+    q[4:7] = q[1:4] + [-shift * length, 3e-3]
+    found = listed_stiffness(touching, q)
+    whole = touching.rods.contact.stiffness
+    np.testing.assert_allclose(found[5:7], np.broadcast_to(whole[5:7, None], (2, N_LANES)), rtol=1e-9)
+
+
+def test_edges_of_a_hinge_share_a_node_and_a_limb_ends_beyond_its_ends():
+    rods = touching_limbs().rods
+
+    def share(edge, s):
+        return max(0.0, float(plain(share_of_edge.plain(rods, edge, Lanes(s)))))
+
+    for s in np.linspace(-0.5, 0.5, 21):
+        assert share(0, 1.0 + s) + share(1, s) == pytest.approx(1.0)
+    assert [share(2, 1.0), share(2, 1.125), share(2, 1.25)] == pytest.approx([1.0, 0.5, 0.0])
+    assert [share(0, 0.0), share(0, -0.125), share(0, -0.25)] == pytest.approx([1.0, 0.5, 0.0])
+
+
+def test_a_gap_is_linear_and_its_gradient_what_is_added_to_rows():
+    touching = touching_limbs()
+    rods, work = touching.rods, touching.work
+    direction = np.random.default_rng(2).standard_normal(work.q.shape)
+    assert n_listed.plain(work) > 0
+    for slot in range(n_listed.plain(work)):
+        gradient = np.zeros_like(work.q)
+        add_gap_gradient.plain(rods, work, slot, Lanes(1.0), gradient)
+        one, two = (plain(gap.plain(rods, work, slot, work.q + share * direction)) for share in (1.0, 2.0))
+        start = plain(gap.plain(rods, work, slot, work.q))
+        np.testing.assert_allclose(two - start, 2.0 * (one - start), rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(one - start, (gradient * direction).sum(axis=0), rtol=1e-9, atol=1e-12)
+        i, j, k = members.plain(rods, work, slot)
+        assert len({i, j, k}) == 3 and set(np.flatnonzero(gradient.any(axis=1)) // 2) <= {i, j, k}
+
+
+def test_robots_apart_have_no_forces_whoever_touches_beside_them():
+    touching = touching_limbs(apart=2)
+    found = energy(touching)
+    assert not found[:2].any() and np.all(found[2:] > 0.0)
+    assert not touching.work.contact.force[:, :2].any()
+    np.testing.assert_array_equal(plain(not_touching.plain(touching.work, EVERYONE)), np.arange(N_LANES) < 2)
+
+
+def test_where_the_stage_is_asked_and_where_the_state_ends_is_the_same_energy_without_looking_ahead():
+    touching = touching_limbs()
+    args = touching.rods, touching.work, touching.work.q, Lanes(0.0)
+    np.testing.assert_allclose(plain(add_contact_energy.plain(*args)), energy(touching), rtol=1e-9)
+
+
+def test_edges_cross_where_each_cuts_the_other_and_not_at_their_ends():
+    rods = make_rods(Scene(TEN))
+    q = np.zeros((46, 2))
+    q[1], q[2], q[10] = [0.0, 0.0], [1.0, 0.0], [0.5, 1.0]
+    for y, crossing in ((-0.5, True), (0.5, False), (0.0, False)):
+        q[11] = [0.5, y]
+        found = plain(edges_cross.plain(rods, rows(q), 1, 10))
+        assert np.all(found == crossing)
+
+
+def test_without_contact_nothing_is_added():
+    assert add_contact.plain(NO_RODS, NO_WORK, None, None, 3.0) == 3.0
+    assert add_contact_energy.plain(NO_RODS, NO_WORK, None, 3.0) == 3.0
+    assert plain(contact_force.plain(NO_WORK, 1)) == (0.0, 0.0)
+    assert not_touching.plain(NO_WORK, EVERYONE) is EVERYONE
+
+
+# Limbs that came to cross: told from limbs that touch, that part, or that crossed before.
+
+
+ROBOT = Seastar(5, 4)
+RODS = make_rods(Scene(ROBOT, actuator=SmaPulse(0.1), contact=Contact()))
+REST = ROBOT.nodes()
+RNG = np.random.default_rng(0)
+ODD = np.arange(N_LANES) % 2 == 1
+
+
+def crossed(away: float = 0.0, limbs: tuple[int, int] = (0, 1)) -> np.ndarray:
+    """The robot away from the origin, with the tip of one limb beyond the middle of the next."""
+    turn = 0.4 * np.pi * limbs[0]
+    q = rotated(REST, turn)  # the first of the two limbs lies along x
+    q[3 * limbs[0] + 3] = 0.05 * np.array([np.cos(1.75), np.sin(1.75)])
+    return rotated(q, -turn) + away
+
+
+def found(q_1: np.ndarray, q_0: np.ndarray, ahead: bool = False, robots=None, missed=False) -> np.ndarray:
+    """Who is uncrossed after a step from q_0 to q_1."""
+    work = make_work(RODS, 1)
+    work.q[:], work.q_hat[:] = rows(0.5 * (q_0 + q_1) if ahead else q_1), rows(q_0)
+    work.contact.missed[:] = 1.0 * np.asarray(missed)
+    stage = Stage(work.q_hat, work.v_hat, Lanes(1e-3), Lanes(1e3), ahead)
+    asked = Mask(np.ones(N_LANES, bool) if robots is None else robots)
+    return plain(without_new_crossings.plain(RODS, work, stage, rows(q_0), asked))
+
+
+@pytest.mark.parametrize("ahead", [False, True])
+@pytest.mark.parametrize("limbs", [(0, 1), (2, 3), (4, 0)])
+@pytest.mark.parametrize("away", [0.0, 0.3])
+def test_limbs_that_came_to_cross_are_seen_in_their_own_robot_alone(limbs, away, ahead):
+    q_1 = np.where(ODD[:, None, None], crossed(away, limbs), REST + away)
+    np.testing.assert_array_equal(found(q_1, REST + away, ahead), ~ODD)
+    assert not found(q_1, REST + away, ahead, robots=ODD).any()
+
+
+def test_limbs_that_crossed_before_may_part_again():
+    assert found(crossed(), crossed()).all() and found(REST, crossed()).all()
+
+
+def test_robots_whose_pairs_were_not_all_listed_are_left_out():
+    np.testing.assert_array_equal(found(REST, REST, missed=ODD), ~ODD)
+
+
+def test_without_contact_nobody_is_left_out():
+    everyone = Mask(np.ones(N_LANES, bool))
+    assert without_new_crossings.plain(NO_RODS, None, None, None, everyone) is everyone
+
+
+def test_limbs_are_on_their_sides_of_a_line_across_the_difference_of_their_roots():
+    """Of bent robots away from the origin, some with limbs that come near to each other."""
+    q_0 = REST + 0.2 + 2e-3 * RNG.standard_normal((N_LANES, *REST.shape))
+    q_1 = q_0 + 0.02 * RNG.standard_normal(q_0.shape)
+    seen = plain(on_their_sides.plain(RODS, rows(q_1), rows(q_0), 1, 2))
+    for lane in range(N_LANES):
+        a, b = (root / np.linalg.norm(root) for root in q_0[lane, [4, 7]] - q_0[lane, 0])
+        across = b - a + rotated(a + b, 0.5 * np.pi)
+        right, left = ((q_1[lane, 3 * limb + 1 : 3 * limb + 4] - q_1[lane, 0]) @ across for limb in (1, 2))
+        assert seen[lane] == (right.max() < 0.0 < left.min())
+    assert 0 < seen.sum() < N_LANES
+
+
+def test_edges_cross_where_the_lines_through_them_meet_within_both():
+    q = RNG.standard_normal((40, N_LANES, ROBOT.n_nodes, 2))
+    for each in q:
+        seen = plain(edges_cross.plain(RODS, rows(each), 1, 5))
+        for lane in range(N_LANES):
+            (i, k), (j, m) = each[lane, [1, 2]], each[lane, [5, 6]]
+            shares = np.linalg.solve(np.stack([k - i, j - m], axis=1), j - i)
+            assert seen[lane] == np.all((shares > 0.0) & (shares < 1.0))
+
+
+# The Newton step where limbs touch solves the star's matrix plus that of contact.
+
+
+ALL_OF_THEM = np.ones(N_LANES, bool)
+
+
+def steps(touching, robots=ALL_OF_THEM):
+    """(the star's step, the coupled one, their decrements)."""
+    rods, work = touching.rods, touching.work
+    _, alone, _ = factorise.plain(rods, work, touching.stage, None)
+    star = np.zeros_like(work.q)
+    substitute_star.plain(rods, work, star)
+    together = solve_coupled.plain(rods, work, Mask(robots), alone)
+    return star, work.contact.x.copy(), plain(alone), plain(together)
+
+
+@pytest.mark.parametrize("discretisation", ["chapter", "continuum"])
+def test_the_step_solves_the_star_and_contact_together(discretisation):
+    """H x + C K C^T x = H x_star: what contact takes, solved by the star, is where the two steps differ."""
+    touching = touching_limbs(discretisation=discretisation)
+    star, x, _, _ = steps(touching)
+    taken, moved = np.zeros_like(x), np.zeros_like(x)
+    add_contact_product.plain(touching.rods, touching.work, x, -1.0, taken)
+    solve_again.plain(touching.rods, touching.work, taken, moved)
+    assert np.abs(x - star).max() > 1e-2 * np.abs(star).max()
+    np.testing.assert_allclose(x - star, moved, rtol=0.0, atol=1e-5 * np.abs(moved).max())
+    assert not touching.work.contact.missed.any()
+
+
+def test_contact_makes_the_matrix_stiffer_so_its_decrement_is_smaller():
+    _, _, alone, together = steps(touching_limbs())
+    assert np.all((together > 0.0) & (together < alone))
+
+
+def test_robots_that_do_not_touch_or_are_not_asked_keep_the_stars_step_to_the_last_bit():
+    asked = np.arange(N_LANES) != N_LANES - 1
+    star, x, alone, together = steps(touching_limbs(apart=1), asked)
+    kept = [0, N_LANES - 1]
+    np.testing.assert_array_equal(x[:, kept], star[:, kept])
+    np.testing.assert_array_equal(together[kept], alone[kept])
+    assert np.all(together[1:-1] != alone[1:-1])
+
+
+def test_contacts_matrix_is_symmetric_and_never_negative():
+    touching = touching_limbs()
+    steps(touching)
+    a, b = np.random.default_rng(0).standard_normal((2, *touching.work.q.shape))
+    of_a, of_b = np.zeros_like(a), np.zeros_like(b)
+    add_contact_product.plain(touching.rods, touching.work, a, 1.0, of_a)
+    add_contact_product.plain(touching.rods, touching.work, b, 1.0, of_b)
+    np.testing.assert_allclose((a * of_b).sum(axis=0), (b * of_a).sum(axis=0), rtol=1e-9)
+    assert np.all((a * of_a).sum(axis=0) > 0.0)
+
+
+def test_dot_is_the_product_of_rows_robot_by_robot():
+    touching = touching_limbs()
+    a, b = np.random.default_rng(0).standard_normal((2, *touching.work.q.shape))
+    np.testing.assert_allclose(plain(dot.plain(touching.rods, a, b)), (a * b).sum(axis=0), rtol=1e-12)
+
+
+def test_without_contact_the_decrement_is_the_stars():
+    one = Lanes(1.0)
+    assert solve_coupled.plain(None, NO_WORK, None, one) is one
+    assert not plain(solver_iterations.plain(NO_WORK)).any()
+
+
+def test_few_iterations_solve_it_as_exactly_as_a_step_of_5_ms_allows(monkeypatch):
+    """To 1e-10 of the decrement: about what rounding leaves where edges are that much stiffer than inertia.
+
+    Of convex matrices, since at such a step those of these robots are not positive definite.
+    """
+    touching, left, product_of = touching_limbs(gamma=5e-3), [], dot.plain
+    rods, work = touching.rods, touching.work
+    _, alone, _ = factorise.plain(rods, work, touching.stage, Mask(ALL_OF_THEM))
+
+    def noted(rods, a, b):
+        product = product_of(rods, a, b)
+        if a is work.contact.r:
+            left.append(plain(product))
+        return product
+
+    monkeypatch.setitem(solve_coupled.plain.__globals__, "dot", noted)
+    decrement = plain(solve_coupled.plain(rods, work, Mask(ALL_OF_THEM), alone))
+    assert not work.contact.missed.any() and len(left) < 20
+    assert np.any(left[-2] > 1e-10 * decrement)
+    assert 1e-11 < (left[-1] / decrement).max() < 1e-10
+
+
+def test_whoever_does_not_arrive_in_200_iterations_is_missed(monkeypatch):
+    touching, iterations = touching_limbs(), []
+    rods, work = touching.rods, touching.work
+    _, alone, _ = factorise.plain(rods, work, touching.stage, None)
+
+    def never_less(rods, a, b):
+        if a is work.contact.r:
+            iterations.append(1.0)
+        return Lanes(1.0)
+
+    monkeypatch.setitem(solve_coupled.plain.__globals__, "dot", never_less)
+    solve_coupled.plain(rods, work, Mask(ALL_OF_THEM), alone)
+    assert work.contact.missed.all() and len(iterations) == 1 + 200
+    assert np.all(plain(solver_iterations.plain(work)) == 200.0)

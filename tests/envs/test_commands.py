@@ -2,11 +2,18 @@
 
 import itertools
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium import spaces
 
+from refusals import assert_refused
+from seastar_gym import RewardWeights, Sight
 from seastar_gym.envs.commands import LIMB_COMMANDS, action_space, command_table, to_commands
+from seastar_gym.envs.goal import GoalForm
+from seastar_gym.envs.layout import Layout
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.scene.serial import from_dict, to_dict
 
 
 def test_a_limb_is_left_alone_actuated_anticlockwise_or_actuated_clockwise():
@@ -100,3 +107,91 @@ def test_actions_beyond_the_last_are_refused_with_a_sentence(actions, largest):
         action[1] = bad
         with pytest.raises(ValueError, match=rf'^With actions="{actions}" an action is from 0 to {largest}, .*\.$'):
             to_commands(actions, 5, action, 2)
+
+
+# The rewarded route keeps to the aim of the weights, which are checked and have a plain form.
+
+
+HUB, CORNER, FOLLOWING = np.array([[-0.1, 0.0], [0.0, 0.0], [0.0, 0.1]])
+
+
+@pytest.mark.parametrize("aim", [0.0, 0.4, 0.7, 1.0])
+def test_the_route_round_a_corner_is_reflected_at_the_aim(aim):
+    """By symmetry it touches the circle on the diagonal of a right angle."""
+    touch = aim * 0.01 * np.array([-1.0, 1.0]) / np.sqrt(2.0)
+    length = 2.0 * np.linalg.norm(HUB - touch)
+    assert RewardWeights(aim=aim).way_to_next(HUB, CORNER, FOLLOWING, 0.01) == pytest.approx(length, abs=1e-8)
+
+
+@pytest.mark.parametrize("aim", [0.0, 0.7, 1.0])
+def test_the_route_of_the_last_leg_ends_in_the_centre_of_the_waypoint(aim):
+    hub, last = np.random.default_rng(0).normal(size=(2, 100, 2))
+    ways = RewardWeights(aim=aim).way_to_next(hub, last, last, 0.01)
+    np.testing.assert_array_equal(ways, np.hypot(*(last - hub).T))
+
+
+def test_environments_reward_the_route_of_their_aim():
+    def progress(aim: float) -> float:
+        env = SeastarSwimEnv([[0.05, 0.0], [0.05, 0.1]], fidelity="fast", reward=RewardWeights(aim=aim))
+        env.reset(seed=0)
+        return env.step([0, 0, 1, 2, 0])[4]["reward_progress"]
+
+    assert abs(progress(0.0) - progress(1.0)) > 1e-3
+
+
+def test_weights_written_before_they_had_an_aim_are_read_with_the_default():
+    data = to_dict(RewardWeights(progress=3.0))
+    del data["aim"]
+    assert from_dict(data, RewardWeights) == RewardWeights(progress=3.0)
+
+
+# The goal form says where the robot is and where it should be, and rewards as it says for any goals.
+
+
+STRAIGHT = np.array([0, 1, 0, 0, 2])
+
+
+@pytest.fixture
+def env():
+    return GoalForm(gym.make("SeastarSwim-v0", path=[[0.03, 0.0], [0.06, 0.0]], fidelity="fast", random_heading=True))
+
+
+def test_an_observation_has_the_goals_in_the_world_and_the_robot_without_waypoints(env):
+    plain = gym.make("SeastarSwim-v0", path=[[0.03, 0.0], [0.06, 0.0]], fidelity="fast", random_heading=True)
+    seen, _ = plain.reset(seed=3)
+    observed, info = env.reset(seed=3)
+    assert env.observation_space.contains(observed)
+    np.testing.assert_allclose(observed["achieved_goal"], 10.0 * info["hub_position"])
+    np.testing.assert_allclose(observed["desired_goal"], [0.3, 0.0])
+    at = Layout.of(plain.unwrapped.scene)
+    np.testing.assert_array_equal(observed["observation"][:182], seen[:182])
+    cosine, sine = observed["observation"][-2:]
+    x, y = observed["desired_goal"] - observed["achieved_goal"]
+    in_body = [cosine * x + sine * y, cosine * y - sine * x]
+    np.testing.assert_allclose(in_body, seen[at.current_waypoint], atol=1e-6)
+
+
+def test_the_reward_is_that_of_the_goal_of_the_decision_and_goals_move_on():
+    env = GoalForm(gym.make("SeastarSwim-v0", path=[[0.03, 0.0], [0.06, 0.0]], fidelity="fast"))
+    observed, _ = env.reset(seed=0)
+    rewards, goals, over = [], [observed["desired_goal"]], False
+    while not over:
+        observed, reward, over, _, info = env.step(STRAIGHT)
+        rewards.append(reward)
+        goals.append(observed["desired_goal"])
+        assert reward == env.compute_reward(observed["achieved_goal"], goals[-2], info)
+    assert sum(reward == 0.0 for reward in rewards) == 2 and rewards[-1] == 0.0
+    np.testing.assert_allclose(goals[-1], [0.6, 0.0])
+
+
+def test_rewards_of_many_goals_at_once(env):
+    achieved = np.array([[0.0, 0.0], [0.0, 0.09], [0.3, 0.11]])
+    desired = np.array([[0.0, 0.0], [0.0, 0.0], [0.3, 0.0]])
+    np.testing.assert_array_equal(env.compute_reward(achieved, desired, [{}] * 3), [0.0, 0.0, -1.0])
+
+
+def test_other_environments_are_refused():
+    with assert_refused("GoalForm needs an environment of waypoints"):
+        GoalForm(gym.make("CartPole-v1"))
+    with assert_refused("which no camera knows"):
+        GoalForm(gym.make("SeastarSwim-v0", fidelity="fast", sight=Sight()))

@@ -1,19 +1,44 @@
 """Every number of an observation is what the table in envs/layout.py says, whichever way the robot points."""
 
+from dataclasses import replace
+
+import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode
 from scipy.interpolate import CubicSpline
 
+from episodes import assert_same, both, swim_together, swum
 from hubs import TEN
-from seastar_gym import Attachment, Body, Numerics, Scene, Seastar, Simulator, SmaPulse, ThermalSma
+from refusals import assert_refused
+from seastar_gym import (
+    Attachment,
+    Body,
+    DomainRandomization,
+    Numerics,
+    Scene,
+    Seastar,
+    Sight,
+    Simulator,
+    SmaPulse,
+    SmaWires,
+    SymmetryReduction,
+    ThermalSma,
+    Uniform,
+)
+from seastar_gym.envs.commands import command_table
+from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
 from seastar_gym.envs.observation import at_station, layout, observe, to_float32
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.stations import at_stations, stations, stations_of
+from seastar_gym.envs.stations import at_stations, heading_of, stations, stations_of
+from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
+from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import State
+from symmetries import matrix, reduced_swim
 
 SCENES = [
     Scene(TEN, numerics=Numerics.preset("fast")),
@@ -108,7 +133,7 @@ def test_limbs_on_a_body_are_seen_from_their_roots(nodes_per_limb):
     scene = Scene(Seastar(3, nodes_per_limb, body=body), numerics=Numerics.preset("fast"))
     simulator, rng = Simulator(scene, 3), np.random.default_rng(0)
     simulator.reset(heading=rng.uniform(-np.pi, np.pi, 3))
-    for swum in range(2):
+    for stroke in range(2):
         found = observations_of(simulator, np.zeros((3, 4)))
         q, v, roots = simulator.positions, simulator.velocities, simulator.root_positions()
         arms = roots - q[:, :1]
@@ -119,7 +144,7 @@ def test_limbs_on_a_body_are_seen_from_their_roots(nodes_per_limb):
         expected = np.concatenate([seen[0] * axis / 0.1, seen[1] * axis / 0.025], axis=1)
         expected = np.stack([expected.real, expected.imag], axis=-1).reshape(3, -1)
         np.testing.assert_allclose(found[:, : expected.shape[1]], expected, rtol=0.0, atol=1e-11)
-        if swum == 0:
+        if stroke == 0:
             simulator.advance(0.1, rng.uniform(-1.0, 1.0, (3, 3)))
             assert np.abs(simulator.spin()).max() > 1e-3
 
@@ -225,3 +250,349 @@ def test_velocities_are_of_order_one_after_strokes_of_random_commands():
     seen = np.array([env.step(rng.integers(0, 3, 5))[0] for _ in range(50)])
     for part in (seen[:, :90], seen[:, 90:180], seen[:, 180:182]):
         assert 0.1 < np.sqrt(np.mean(part**2)) < 3.0
+
+
+# Robots seen through a camera, and commands that come late: exact times, the same bits in batches, and refusals.
+
+
+TIMED = "SeastarSwimTimed-v0"
+PERIOD = 0.5
+BAD = Sight(
+    delay=Uniform(0.05, 0.15), jitter=0.03, dropout=0.2, noise=Uniform(0.0, 2e-3), turn_noise=0.02, sees="pose"
+)
+SEEN = ("pose", 1, 3, 9, "nodes")
+SHORT = [[0.004, 0.0], [0.009, 0.0]]
+
+
+def env_of(id=TIMED, **arguments):
+    return gym.make(id, **({"fidelity": "fast"} | arguments), disable_env_checker=True)
+
+
+def seen_by(sees):
+    return replace(BAD, sees=sees)
+
+
+def seen_through(env):
+    return [entry for entry in swum(env) if np.shape(entry) == env.observation_space.shape]
+
+
+# In time
+
+
+@pytest.mark.parametrize(
+    ("id", "rate"),
+    [(TIMED, 2.0), ("SeastarSwim-v0", 1.0), ("SeastarSwimHeading-v0", 2.0), ("SeastarSwimTimedHard-v0", 10.0),
+     ("SeastarPrizes-v0", 1.0), ("SeastarObstTrapTimed-v0", 4.0), ("SeastarMiswired-v0", 1.0)],
+)  # fmt: skip
+def test_a_camera_without_delay_shows_the_present_observation_to_the_last_bit(id, rate):
+    plain, seen = env_of(id), env_of(id, sight=Sight(rate, sees="nodes"))
+    age = seen.unwrapped.layout.further.stop - 1
+    for ours, theirs in zip(*map(seen_through, (seen, plain)), strict=True):
+        assert ours[age] == 0.0
+        np.testing.assert_array_equal(np.delete(ours, age), theirs)
+
+
+def test_a_camera_changes_no_bit_of_the_swim():
+    plain, seen = env_of(), env_of(sight=BAD)
+    plain.reset(seed=0), seen.reset(seed=0)
+    for action in (3, 0, 7, 12):
+        plain.step(action), seen.step(action)
+    np.testing.assert_array_equal(plain.unwrapped.simulator.q, seen.unwrapped.simulator.q)
+
+
+def test_pictures_change_no_bit_of_what_is_seen():
+    late = {"sight": BAD, "action_delay": 0.2}
+    found = [swum(env_of(render_mode=mode, **late)) for mode in (None, "rgb_array_list")]
+    assert_same(*found)
+    env = env_of(render_mode="rgb_array_list", frames_per_stroke=4, **late)
+    env.reset(seed=0), env.step(3)
+    assert len(env.render()) == 5
+
+
+# Late
+
+
+def test_a_late_picture_shows_the_robot_as_it_was():
+    env = env_of(sight=Sight(rate=10.0, delay=0.1, sees="pose"), path=[[0.5, 0.0]])
+    env.reset(seed=0)
+    simulator, layout = Simulator(env.unwrapped.scene), env.unwrapped.layout
+    commands = command_table("pairs", 5)
+    for action in (3, 8):
+        seen = env.step(action)[0]
+        for since in simulator.advance_in_parts(PERIOD, commands[[action]], 5):
+            if since == pytest.approx(PERIOD - 0.1):
+                hub, heading = simulator.hub_position()[0], heading_of(simulator)[0]
+        x, y = np.array([0.5, 0.0]) - hub
+        c, s = np.cos(heading), np.sin(heading)
+        expected = np.array([c * x + s * y, c * y - s * x]) / 0.1
+        np.testing.assert_allclose(seen[layout.current_waypoint], expected, atol=1e-6)
+        assert seen[layout.further][-1] == pytest.approx(0.1)
+
+
+def test_the_age_is_that_of_the_newest_picture_that_was_seen():
+    env = env_of(sight=Sight(rate=8.0, delay=0.2))
+    first, info = env.reset(seed=0)
+    at = env.unwrapped.layout.further.stop - 1
+    assert first[at] == info["sight_age"] == pytest.approx(0.25)  # the last before -0.2 s
+    observation, *_, info = env.step(0)
+    assert observation[at] == pytest.approx(0.5 - 0.25) and info["sight_age"] == pytest.approx(0.25)
+
+
+def test_velocities_are_differences_of_what_two_decisions_saw():
+    env = env_of(sight=Sight(rate=2.0, sees="pose"), path=[[0.5, 0.0]])
+    env.reset(seed=0)
+    layout, simulator = env.unwrapped.layout, env.unwrapped.simulator
+    places = [(simulator.hub_position()[0], heading_of(simulator)[0])]
+    for action in (3, 8):
+        seen = env.step(action)[0][layout.further]
+        places.append((simulator.hub_position()[0], heading_of(simulator)[0]))
+        (before, old), (after, new) = places[-2:]
+        c, s = np.cos(new), np.sin(new)
+        velocity = np.array([[c, s], [-s, c]]) @ (after - before) / PERIOD / VELOCITY_SCALE
+        np.testing.assert_allclose(seen, [*velocity, (new - old) / PERIOD, 0.0], atol=1e-6)
+
+
+@pytest.mark.parametrize("n", [1, 3, 9])
+def test_markers_are_stations_and_their_velocities_are_differences(n):
+    all_seen, some = (env_of(sight=Sight(2.0, sees=sees)) for sees in ("nodes", n))
+    histories = []
+    for env in (all_seen, some):
+        at = env.unwrapped.layout
+        rows = [env.reset(seed=0)[0], *(env.step(action)[0] for action in (3, 8))]
+        histories.append([row[at.positions].reshape(5, -1, 2) for row in rows])
+    velocities = rows[-1][at.velocities].reshape(5, -1, 2)
+    for whole, ours in zip(*histories, strict=True):
+        np.testing.assert_array_equal(ours, whole[:, 9 // n - 1 :: 9 // n])
+    moved = (histories[1][2] - histories[1][1]) * 0.1 / PERIOD / VELOCITY_SCALE
+    np.testing.assert_allclose(velocities, moved, atol=1e-6)
+    assert np.abs(moved).max() > 0.1
+
+
+def test_who_is_lost_from_sight_is_seen_where_it_was_and_ever_older():
+    env = env_of(sight=Sight(dropout=1.0), path=[[0.5, 0.0]])
+    first, _ = env.reset(seed=0)
+    layout = env.unwrapped.layout
+    for k in (1, 2):
+        observation = env.step(3)[0]
+        np.testing.assert_array_equal(observation[layout.waypoints], first[layout.waypoints])
+        np.testing.assert_allclose(observation[layout.further], [0.0, 0.0, 0.0, k * PERIOD], atol=1e-6)
+
+
+def test_noise_has_its_standard_deviation():
+    batch = gym.make_vec(TIMED, 2000, "vector_entry_point", fidelity="fast", path=[[0.5, 0.0]],
+                         sight=Sight(noise=3e-3, turn_noise=0.05, sees=1))  # fmt: skip
+    seen, at = batch.reset(seed=0)[0].astype(float), Layout(5, 2, ("pseudoscalar", "scalar"), stations=1)
+    to_goal = seen[:, at.current_waypoint]
+    headings = -np.arctan2(to_goal[:, 1], to_goal[:, 0])
+    assert headings.std() == pytest.approx(np.hypot(0.05, 3e-3 / 0.5), rel=0.06)
+    assert np.hypot(*to_goal.T).std() * 0.1 == pytest.approx(3e-3, rel=0.06)
+    radial = np.hypot(seen[:, 0], seen[:, 1]) * 0.1  # of limb 1's tip, hub and tip with errors of their own
+    assert radial.std() == pytest.approx(np.sqrt(2) * 3e-3, rel=0.06)
+
+
+# Commands on their way
+
+
+def test_commands_that_are_late_by_whole_decisions_are_those_of_earlier_ones():
+    late, plain = env_of(action_delay=2 * PERIOD), env_of()
+    for env in (late, plain):
+        env.reset(seed=0)
+    for action, arriving in zip((3, 8, 0, 5), (0, 0, 3, 8), strict=True):
+        ours, theirs = late.step(action)[0], plain.step(arriving)[0]
+        np.testing.assert_array_equal(ours, theirs)
+
+
+def test_commands_reach_the_wires_after_their_delay():
+    env = env_of(action_delay=PERIOD + 0.2)
+    env.reset(seed=0)
+    simulator, nothing = Simulator(env.unwrapped.scene), np.zeros((1, 5))
+    commands = command_table("pairs", 5)
+    infos = [env.step(action)[4] for action in (3, 8, 2)]
+    for command in (nothing, commands[[3]], commands[[8]]):
+        simulator.advance(0.2, nothing)
+        report = simulator.advance(PERIOD - 0.2, command)
+    np.testing.assert_array_equal(env.unwrapped.simulator.q, simulator.q)
+    assert infos[0]["heating_time"] == 0.0 and infos[2]["heating_time"] == report.heating_time[0] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("actuator", [None, SmaPulse()])
+def test_strokes_can_only_be_late_by_whole_decisions(actuator):
+    strokes = {} if actuator is None else {"scene": Scene(actuator=actuator)}
+    with assert_refused("action_delay", "whole decisions of 1 s", "SmaWires"):
+        SeastarSwimEnv(action_delay=0.1, **strokes)
+    SeastarSwimEnv(action_delay=3.0, **strokes)
+
+
+# Batches, seeds, draws
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+@pytest.mark.parametrize("sees", ["pose", 3, "nodes"])
+def test_a_batch_gives_the_bits_of_single_environments_across_resets(sees, mode):
+    arguments = {"sight": seen_by(sees), "action_delay": Uniform(0.0, 0.7), "path": SHORT, "max_episode_steps": 4}
+    swim_together(*both(TIMED, 5, mode, waypoint_radius=0.003, **arguments), 9)
+
+
+@pytest.mark.parametrize(
+    "id", ["SeastarSwim-v0", "SeastarSwimHeading-v0", "SeastarFailBlind-v0", "SeastarPrizesTimed-v0",
+           "SeastarObstTrap-v0", "SeastarMiswiredTimed-v0", "SeastarPreyTimed-v0", "SeastarStation-v0"],
+)  # fmt: skip
+def test_every_task_can_be_seen_through_a_camera(id):
+    period = env_of(id).unwrapped.decision_period
+    swim_together(*both(id, 2, sight=BAD, action_delay=period), 3)
+
+
+def test_every_seed_is_one_episode_and_the_next_episode_another():
+    env = env_of(sight=BAD, action_delay=Uniform(0.0, 0.3))
+    assert_same(swum(env), swum(env))
+    names = ("sight.delay", "sight.noise", "action_delay")
+    drawn = [tuple(env.reset(seed=seed)[1][name] for name in names) for seed in (1, None, None)]
+    assert len(set(drawn)) == 3
+    assert all(0.05 <= delay <= 0.15 and noise <= 2e-3 and late <= 0.3 for delay, noise, late in drawn)
+
+
+def test_domain_randomization_draws_the_numbers_of_the_sight():
+    draws = DomainRandomization({"sight.delay": Uniform(0.1, 0.2), "robot.density": Uniform(990.0, 1010.0),
+                                 "action_delay": Uniform(0.1, 0.3)})  # fmt: skip
+    env = env_of(sight=Sight(delay=0.01), randomization=draws)
+    info = env.reset(seed=0)[1]
+    assert 0.1 <= info["sight.delay"] <= 0.2 and 0.1 <= info["action_delay"] <= 0.3 and info["robot.density"] != 1000.0
+    swim_together(*both(TIMED, 3, sight=Sight(sees=1), randomization=draws), 3)
+
+
+@pytest.mark.parametrize("element", [0, 2, 5])
+@pytest.mark.parametrize("sees", SEEN)
+def test_what_is_seen_is_carried_by_symmetry(sees, element):
+    scene, sight = Scene(actuator=SmaWires()), Sight(rate=7.0, delay=0.1, sees=sees)
+    rewards, seen = zip(
+        *(reduced_swim(scene, None, matrix(k, 5), [3, 9, 14, 5], decision_period=PERIOD, sight=sight)
+          for k in (0, element)), strict=True,
+    )  # fmt: skip
+    np.testing.assert_allclose(*rewards, atol=1e-4)
+    np.testing.assert_allclose(*seen, atol=2e-4)
+    assert isinstance(SymmetryReduction(env_of(sight=sight)), SymmetryReduction)
+
+
+# Refusals
+
+
+@pytest.mark.parametrize(
+    ("numbers", "words"),
+    [({"rate": 0.0}, "Sight.rate"), ({"rate": 2e3}, "at most 1000 Hz"), ({"delay": -0.1}, "Sight.delay"),
+     ({"delay": Uniform(-0.1, 0.1)}, "Sight.delay"), ({"delay": 6.0}, "at most 5 s"), ({"dropout": 1.1}, "at most 1 1"),
+     ({"noise": "1"}, "Sight.noise"), ({"sees": "hub"}, "Sight.sees"), ({"sees": 2}, "1, 3 or 9 markers"),
+     ({"sees": True}, "Sight.sees"), ({"turn_noise": Sight()}, "Sight.turn_noise")],
+)  # fmt: skip
+def test_a_camera_that_there_cannot_be_is_refused(numbers, words):
+    with assert_refused(words):
+        Sight(**numbers)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [({"sight": 30.0}, "a Sight or None"), ({"action_delay": -1.0}, "action_delay"),
+     ({"action_delay": Sight()}, "action_delay"), ({"action_delay": "late"}, "action_delay"),
+     ({"randomization": DomainRandomization({"sight.delay": Uniform(0.0, 1.0)})}, "sight.delay"),
+     ({"randomization": DomainRandomization({"sight.rate": Uniform(0.0, 1.0)}), "sight": Sight()}, "sight.rate"),
+     ({"randomization": DomainRandomization({"sight.delay": Uniform(0.0, 9.0)}), "sight": Sight()}, "at most 5 s"),
+     ({"randomization": DomainRandomization({"action_delay": Uniform(-1.0, 1.0)})}, "action_delay")],
+)  # fmt: skip
+def test_an_environment_refuses_what_is_no_sight_and_no_delay(arguments, words):
+    with assert_refused(words):
+        SeastarSwimEnv(decision_period=PERIOD, fidelity="fast", **arguments)
+
+
+# Memory of past observations: in the same limbs throughout, and for one episode.
+
+
+def batch(task, n=6, **arguments):
+    return SeastarTaskVectorEnv(n, 400, task, fidelity="fast", threads=1, **arguments)
+
+
+@pytest.mark.parametrize(
+    "task, period",
+    [("miswired", 1.0), ("station", 0.5), ("prey", 1.0), ("fail-blind", 1.0), ("obst-trap", 0.5), ("sim-to-real", 0.2)],
+)
+def test_memory_shows_the_reduced_observation_and_the_past_in_the_same_limbs(task, period):
+    def new():
+        return batch(task, actions="joint", decision_period=period)
+
+    memory, reduced = VectorFrameStack(new(), 2), VectorSymmetryReduction(new())
+    (shown, _), (ours, _) = memory.reset(seed=1), reduced.reset(seed=1)
+    assert shown.shape == memory.observation_space.shape
+    rng, size, past = np.random.default_rng(0), ours.shape[1], [memory._latest, memory._latest]
+    for _ in range(4):
+        np.testing.assert_array_equal(shown[:, :size], ours)
+        past, actions = [memory._latest, past[0]], rng.integers(0, 243, 6)
+        shown, ours = memory.step(actions)[0], reduced.step(actions)[0]
+        seen = memory.frame_stack
+        for before, told in zip(past, np.moveaxis(shown[:, size:].reshape(6, 2, -1), 1, 0), strict=True):
+            carried = seen.symmetry.carry(before, memory._elements)
+            np.testing.assert_array_equal(told, carried[:, seen.features])
+
+
+def test_memory_ends_with_the_episode_and_the_last_observation_still_has_it():
+    inner = SeastarTaskVectorEnv(2, 2, "prey", fidelity="fast", threads=1, autoreset_mode=AutoresetMode.SAME_STEP)
+    memory = VectorFrameStack(inner, 3)
+    memory.reset(seed=0)
+    memory.step(np.array([3, 4]))
+    shown, _, _, truncated, info = memory.step(np.array([5, 6]))
+    assert truncated.all() and info["final_obs"][0].shape == shown[0].shape
+    now = shown[:, :186][:, memory.frame_stack.features]
+    np.testing.assert_array_equal(shown[:, 186:].reshape(2, 3, -1), np.repeat(now[:, None], 3, axis=1))
+    last = info["final_obs"][1]
+    assert not np.array_equal(last[186:].reshape(3, -1)[0], last[:186][memory.frame_stack.features])
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_no_memory_goes_from_one_episode_into_the_next(mode):
+    """Robots whose episodes end at different times: the past of a new one is its first observation."""
+    memory = VectorFrameStack(batch("prey", 3, autoreset_mode=mode), 2)
+    memory.unwrapped.max_episode_steps = 3
+    memory.reset(seed=0)
+    seen, size = memory.frame_stack, memory.frame_stack.layout.size
+    began, ended = 0, np.zeros(3, bool)
+    for step in range(9):
+        shown, _, terminated, truncated, _ = memory.step(np.full(3, step % 21))
+        over = terminated | truncated
+        begun = over if mode == AutoresetMode.SAME_STEP else ended
+        for robot in np.flatnonzero(begun):
+            now, past = shown[robot, :size][seen.features], shown[robot, size:].reshape(2, -1)
+            np.testing.assert_array_equal(past, np.stack([now, now]))
+            began += 1
+        ended = over
+    assert began >= 3
+
+
+def test_a_reset_of_some_robots_leaves_the_others_memory():
+    memory = VectorFrameStack(batch("prey", 2, autoreset_mode=AutoresetMode.DISABLED), 2)
+    memory.reset(seed=0)
+    for action in (3, 4, 5):
+        shown = memory.step(np.array([action, action]))[0]
+    again, _ = memory.reset(seed=1, options={"reset_mask": np.array([True, False])})
+    np.testing.assert_array_equal(again[1], shown[1])
+    now = again[0, : memory.frame_stack.layout.size][memory.frame_stack.features]
+    np.testing.assert_array_equal(again[0, memory.frame_stack.layout.size :].reshape(2, -1), np.stack([now, now]))
+
+
+def test_masks_are_those_of_the_robots_that_are_shown():
+    """Wires that are still hot may not be heated again; robots with their limbs renamed have their masks renamed."""
+
+    def new():
+        return SeastarSwimVectorEnv(4, 50, fidelity="fast", actions="pairs", decision_period=0.2, threads=1)
+
+    memory, reduced = VectorFrameStack(new(), 1), VectorSymmetryReduction(new())
+    (_, info), (_, others) = memory.reset(seed=0), reduced.reset(seed=0)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        actions = rng.integers(0, 21, 4)
+        info, others = memory.step(actions)[-1], reduced.step(actions)[-1]
+        np.testing.assert_array_equal(memory.action_masks(), reduced.action_masks())
+        assert ("action_mask" in info) == ("action_mask" in others)
+
+
+def test_what_cannot_be_remembered_is_refused():
+    with assert_refused("past must be"):
+        VectorFrameStack(batch("prey"), 0)
+    with assert_refused("Asked headings have no place"):
+        VectorFrameStack(SeastarSwimVectorEnv(1, 50, fidelity="fast", headings=HeadingTargets(), threads=1), 2)

@@ -832,7 +832,7 @@ def test_privileged_observations_are_those_without_a_camera():
 
 
 OF_THEIR_OWN = (FailBlind, ObstTrap, Prizes)
-"""Challenges that show more than robots, and are seen without noise; test_sight.py turns what a camera sees."""
+"""Challenges that show more than robots, and are seen without noise; test_observation.py turns what a camera sees."""
 
 
 @pytest.mark.parametrize("id", [id for id in IDS if isinstance(CHALLENGES[seastar_gym.TASKS[id][0]], OF_THEIR_OWN)])

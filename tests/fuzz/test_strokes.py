@@ -7,7 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
 
+from fuzz import hour, swims
 from fuzz.promises import PROMISES, TAME_PROMISES
 from fuzz.scenes import (
     BENT,
@@ -17,6 +19,7 @@ from fuzz.scenes import (
     FLUID,
     OWN,
     PLAIN,
+    SEEDS,
     TERMS,
     TOUCHED_BODY,
     Case,
@@ -105,3 +108,49 @@ def test_promises_are_kept(trial):
 
 def test_every_promise_is_tried():
     assert {name for trial in TRIALS.values() for name in trial.promises} == {*PROMISES, *TAME_PROMISES}
+
+
+# The chapter's robot: presets keep their promises, and environments in a batch are what they are alone.
+
+
+@pytest.mark.parametrize("fidelity", swims.PRESETS)
+@pytest.mark.parametrize("seed", range(2))
+def test_a_preset_errs_from_the_reference_by_no_more_than_is_promised(fidelity, seed):
+    swims.check_preset(fidelity, seed)
+
+
+@settings(max_examples=8)
+@given(SEEDS)
+def test_a_batch_of_environments_does_what_they_do_alone(seed):
+    swims.check_environment(seed)
+
+
+@settings(max_examples=5)
+@given(SEEDS)
+def test_info_has_the_same_keys_on_reset_and_on_every_step(seed):
+    swims.check_info_keys(seed)
+
+
+# The long run: `pytest tests/fuzz --fuzz-minutes 60 -s`, and its failures one by one, by `--fuzz-case`.
+
+
+def test_what_is_drawn_for_as_long_as_asked_keeps_every_promise(request, capsys):
+    minutes, seed = request.config.getoption("--fuzz-minutes"), request.config.getoption("--fuzz-seed")
+    if not minutes:
+        pytest.skip("runs with --fuzz-minutes")
+    with capsys.disabled():
+        tally = hour.run(minutes, seed)
+        print(tally)
+    assert not tally.failed
+
+
+def test_a_case_keeps_its_promise(request):
+    name = request.config.getoption("--fuzz-case")
+    if not name:
+        pytest.skip("runs with --fuzz-case, as the long run prints it")
+    hour.attempt(hour.Trial.named(name))
+
+
+def test_a_name_is_all_that_a_trial_is():
+    for trial, _ in zip(hour.trials(3), range(500), strict=False):
+        assert hour.Trial.named(str(trial)) == trial

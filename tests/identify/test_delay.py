@@ -188,20 +188,3 @@ def test_times_and_orientations_are_read_as_they_were_written(tmp_path):
     np.testing.assert_array_equal(found.command_times, measurement.command_times)
     assert files[0].read_text().startswith("time,x0,y0,theta\n1700000000.0,0,1,0.1\n")
     assert files[1].read_text().startswith("time,limb1,limb2,")
-
-
-@pytest.mark.parametrize(
-    "text, words",
-    [
-        ("time\n0\n", "commands.csv: after time there must be one column per limb"),
-        ("time,a\n", "commands.csv: after time there must be one column per limb"),
-        ("time,a,b\n0,1\n", "commands.csv, line 2: the line must have 3 fields"),
-        ("time,a\n0,\n", "commands.csv, line 2: '' is no number"),
-        ("time,a\n0,1\n0,1\n", "command_times must be 2 finite times that increase"),
-    ],
-)
-def test_files_of_commands_that_cannot_be_read_are_refused(tmp_path, text, words):
-    (tmp_path / "path.csv").write_text("time,x0,y0\n0,0,0\n")
-    (tmp_path / "commands.csv").write_text(text)
-    with assert_refused(words):
-        Measurement.from_csv(tmp_path / "path.csv", tmp_path / "commands.csv")

@@ -1,6 +1,7 @@
 """The chapter's figures show the swims that they name, and its statements stand beside the computed numbers."""
 
 import csv
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -8,10 +9,16 @@ import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse
 from seastar_gym.gaits import STRAIGHT, pentagon_gait
+from studies import continuum as study
 from studies.chapter import cost, pictures, results, statements, swims
+from studies.chapter import results as chapter
 from studies.chapter.study import STUDY, make_figures
+from studies.chapter.swims import CHAPTER, swim
+from studies.continuum import NAMES, scene
 from studies.frame import DOCS
+from studies.learning import traces
 from studies.pages import numbers
+from studies.results_file import as_json, keep, rounded
 
 COARSE = replace(swims.CHAPTER, numerics=Numerics("implicit-euler", 10e-3))
 PAIRS = list(statements.PAIRS.values())
@@ -222,3 +229,107 @@ def test_the_study_writes_every_figure(tmp_path):
     distances = {row.quantity: row.values for row in rows if row.quantity.startswith("distance of")}
     for column in range(3):
         assert max(distances, key=lambda name: distances[name][column]) == "distance of {1⁻, 4⁺}"
+
+
+# Both discretisations tend to the same robot, the chapter's with order 1 and the continuum's with order 2 or more.
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return study.measure(("damped", "three limbs", "unequal, tapered limbs", "curved limbs", "soft limbs"))
+
+
+def test_both_discretisations_tend_to_the_same_robot(rows):
+    for row in rows:
+        assert (np.diff(row.errors) < 0.0).all(), row
+        assert row.errors[-1] < (0.12 if row.discretisation == "chapter" else 1e-3), row
+
+
+def test_the_table_has_the_rows_of_the_kept_numbers(rows):
+    results = json.loads(json.dumps(study.as_data(rows)))
+    table = study.table(results)
+    for row, kept in zip(rows, study.rows_of(results), strict=True):
+        assert kept[:2] == row[:2] and kept.order == pytest.approx(row.order, abs=1e-4)
+        np.testing.assert_allclose(kept.errors, row.errors, rtol=1e-3)
+        assert f"| {row.name} | " in table and f" {row.order:.1f} |" in table
+
+
+def test_the_chapters_order_is_one_and_the_continuums_two_or_more(rows):
+    orders = {kind: [row.order for row in rows if row.discretisation == kind] for kind in ("chapter", "continuum")}
+    assert min(orders["chapter"]) > 0.7 and max(orders["chapter"]) < 1.3
+    assert min(orders["continuum"]) > 1.9
+
+
+def test_ten_nodes_are_within_about_a_per_cent(rows):
+    ten = study.NODES.index(10)
+    assert max(row.errors[ten] for row in rows if row.discretisation == "continuum") < 0.013
+
+
+@pytest.mark.slow
+def test_every_scene_and_consistent_added_mass_which_is_better_than_lumped():
+    rows = study.measure(NAMES)
+    errors = {(row.name, row.discretisation): row.errors for row in rows}
+    for name in NAMES:
+        assert (errors[name, "continuum"] < 0.4 * errors[name, "chapter"]).all(), name
+    consistent, lumped = errors["added mass", "continuum"], errors[study.LUMPED, "continuum"]
+    assert (consistent < 0.7 * lumped).all()
+
+
+def test_orders_are_slopes_over_the_edge_length():
+    errors = np.array([1.0, 0.1, 0.025, 0.00625])
+    assert study.order(errors) == pytest.approx(2.0)
+
+
+def test_the_picture_is_drawn(rows, tmp_path):
+    study.STUDY.write(study.as_data(rows), tmp_path)
+    assert (tmp_path / "continuum.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_scene_has_the_nodes_and_the_discretisation_asked_for(name):
+    robot = scene(name, "chapter", 7).robot
+    assert (robot.nodes_per_limb, robot.discretisation) == (7, "chapter")
+
+
+# Numbers that are kept are read back as they were, and what is drawn from them is what was swum.
+
+
+PLAIN = {"name": "a [list] of\nlines", "numbers": [1, 2.5, None], "rows": [[1, "two"], []], "inner": {"x": [0.1]}}
+
+
+def test_json_comes_back_with_a_line_for_every_list_of_numbers(tmp_path):
+    keep(PLAIN, tmp_path / "folder" / "kept.json")
+    text = (tmp_path / "folder" / "kept.json").read_text(encoding="utf-8")
+    assert json.loads(text) == PLAIN
+    assert ' "numbers": [1, 2.5, null],\n' in text and '\n  [1, "two"],\n' in text
+
+
+def test_numbers_that_are_not_finite_are_refused():
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        as_json({"speed": float("nan")})
+
+
+def test_numbers_keep_their_significant_digits():
+    assert [rounded(each) for each in (123456.0, -0.00123456, 0.0)] == [123500.0, -0.001235, 0.0]
+
+
+def test_a_swim_of_the_chapter_comes_back():
+    commands = chapter.pair_commands()[:2]
+    swum = swim(CHAPTER, commands, 10)
+    again = chapter.from_data(json.loads(as_json(chapter.as_data(swum, (0.1, 1.5)))), commands)
+    assert again.label == swum.label and again.scene == swum.scene
+    np.testing.assert_allclose(again.time, swum.time, atol=1e-9)
+    np.testing.assert_allclose(again.positions[:, :, 0], swum.positions[:, :, 0], atol=chapter.UNIT)
+    for time in (0.1, 1.5):
+        at = swum.at(time)
+        np.testing.assert_allclose(again.positions[at, 0], swum.positions[at, 0], atol=chapter.UNIT)
+    assert np.isnan(again.positions[3, 0, 1:]).all()
+
+
+def test_ways_round_the_pentagon_come_back():
+    swims = traces.swims(max_strokes=3)
+    results = json.loads(as_json(traces.as_data(swims)))
+    for before, after in zip(swims, traces.from_data(results), strict=True):
+        assert (after.agent, after.strokes, after.result) == (before.agent, 3, before.result)
+        np.testing.assert_allclose(after.hub, before.hub, atol=traces.UNIT)
+        np.testing.assert_allclose(after.waypoints, before.waypoints, atol=1e-6)

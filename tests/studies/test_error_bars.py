@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from seastar_gym.accuracy.commands import CLASSES, STROKES
+from seastar_gym.scene.numerics import Numerics
 from studies.accuracy import error_bars as study
+from studies.accuracy import timed_error_bars as timed
+from studies.accuracy.error_bars import FIDELITIES
+from studies.accuracy.timed import PERIODS, Plan
 
 N = 2 * len(CLASSES)
 
@@ -48,3 +52,20 @@ def test_the_tables_and_the_picture_show_every_robot(tmp_path):
 def test_error_bars_of_the_chapters_robot_cover_fresh_sequences():
     for row in study.measure(("the chapter's",), 2, (51, 52)):
         assert row.coverage >= 0.9 and 1.0 < row.sharpness < 8.0
+
+
+# Error bars of wires that are commanded several times a second.
+
+
+def test_a_table_has_the_coverage_of_every_preset():
+    lines = timed.table({0.5: dict.fromkeys(FIDELITIES, (0.998, 4.75)), 0.2: dict.fromkeys(FIDELITIES, (1.0, 5.0))})
+    assert lines.splitlines()[0] == "| preset | 0.5 s | 0.2 s |"
+    assert "| `fast` | 99.8 %, 4.8 | 100.0 %, 5.0 |" in lines
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("period", PERIODS)
+def test_error_bars_cover_decisions_in_time_and_are_not_vacuous(period):
+    true = timed.TRUE._replace(nodes_per_limb=55, numerics=Numerics("implicit-midpoint", 0.5e-3, 1e-9))
+    for coverage, sharpness in timed.measure(period, Plan(samples=2, seconds=5), true, seed=11).values():
+        assert coverage >= 0.9 and 1.0 < sharpness < 8.0

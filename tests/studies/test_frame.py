@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from refusals import assert_refused
 from studies import command
 from studies.command import declared, main, module_of
 from studies.frame import Results, Study, require_known
+from studies.style import COLOURS, CYCLE, SETTINGS, as_numbers, as_percent, new_figure, subplots
 
 ABOUT = {"command": "python -m studies.toy", "machine": "some machine"}
 
@@ -132,7 +134,7 @@ def test_the_list_has_every_study_with_a_line(capsys):
     printed = capsys.readouterr().out
     for name, line in declared().items():
         assert f"    {name} " in printed and line and line in printed
-    assert {"tasks", "designs.certificates", "scenes.gallery", "learning.timed", "accuracy"} <= set(declared())
+    assert {"tasks", "designs.certificates", "scenes.gallery", "learning.bound", "accuracy"} <= set(declared())
 
 
 @pytest.mark.parametrize("name", declared())
@@ -156,3 +158,38 @@ def test_a_study_is_run_by_the_name_of_its_module_too():
         for words in (["studies", "scenes.thermal"], ["studies.scenes.thermal"])
     ]
     assert done[0] == done[1] and "usage: python -m studies.scenes.thermal [" in done[0]
+
+
+# All studies draw in one style.
+
+
+STUDIES = Path(__file__).parents[2] / "studies"
+
+
+def test_pictures_begin_with_the_style():
+    """Nobody else makes figures, so that a change of the style changes all pictures."""
+    texts = {file: file.read_text(encoding="utf-8") for file in STUDIES.rglob("*.py") if file.name != "style.py"}
+    assert len(texts) > 50
+    assert not [file for file, text in texts.items() if "pyplot" in text or "Figure(figsize" in text]
+
+
+def test_figures_have_the_style():
+    figure, axes = subplots(1, 2, figsize=(4.0, 2.0))
+    lines = [each.plot([0, 1])[0].get_color() for each in axes]
+    assert lines == [CYCLE[0]] * 2
+    assert not axes[0].spines["top"].get_visible() and axes[0].xaxis.get_gridlines()[0].get_visible()
+    assert axes[0].xaxis.label.get_color() == SETTINGS["axes.labelcolor"]
+    np.testing.assert_allclose(figure.get_size_inches(), [4.0, 2.0])
+    assert not new_figure(1.0, 1.0).axes
+
+
+def test_colours_differ():
+    assert len(set(CYCLE)) == len(CYCLE) and len(set(COLOURS.values())) == len(COLOURS)
+
+
+def test_ticks_are_labelled_as_people_write_them():
+    _, axes = subplots(figsize=(2.0, 2.0))
+    as_percent(axes.xaxis)
+    as_numbers(axes.yaxis)
+    assert axes.xaxis.get_major_formatter()(0.1, 0) == "0.1 %"
+    assert [axes.yaxis.get_major_formatter()(value, 0) for value in (0.25, 12000.0)] == ["0.25", "12,000"]

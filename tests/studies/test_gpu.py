@@ -1,11 +1,14 @@
 """The studies of robots on a GPU, as far as they go without one."""
 
-
+import numpy as np
 import pytest
 
+from seastar_gym import Scene
+from seastar_gym.model.rods import make_rods
 from studies import gpu, gpu_code
 from studies.frame import DOCS
 from studies.pages import numbers
+from studies.speed.terms import THE_CHAPTERS, as_table, in_ten_nodes, measure, scenes
 
 TOLD = """ptxas info    : 0 bytes gmem
 ptxas info    : Compiling entry function 'swim_robots' for 'sm_90'
@@ -66,3 +69,22 @@ def test_the_code_spills_no_more_than_before(name):
         now = gpu_code.needs(code, architecture, gpu_code.assembler())
         for what, number in now.items():
             assert number <= 1.1 * before[what] + 64, (architecture, what)
+
+
+# The study of the cost of terms compares scenes with one more term each, in the same round.
+
+
+def test_costs_are_relative_to_the_first_scene():
+    costs = measure({"this": Scene(), "the same": Scene()}, rounds=3)
+    assert [cost.name for cost in costs] == ["this", "the same"]
+    assert costs[0].per_iteration == costs[0].per_stroke == 1.0
+    assert costs[1].iterations == costs[0].iterations >= 1.0
+    assert costs[1].quartiles[0] <= costs[1].per_iteration <= costs[1].quartiles[1]
+    assert as_table(costs).row_count == 2
+
+
+def test_every_scene_has_terms_of_its_own():
+    compared = scenes()
+    assert next(iter(compared)) == THE_CHAPTERS and compared[THE_CHAPTERS] == in_ten_nodes(Scene())
+    assert len({hash(scene) for scene in compared.values()}) == len(compared)
+    assert np.isfinite([make_rods(scene).stretching.EA[0] for scene in compared.values()]).all()

@@ -12,10 +12,19 @@ from studies.frame import DOCS
 from studies.pages import numbers
 from studies.validation import follow, laws, simulate, study, swimmer, turns
 from studies.validation.in_turn import LATE, InTurn
-from studies.validation.inference import LEVEL, SPREAD, effective, predict, quantiles, score, weights
-from studies.validation.luck import other_fours
+from studies.validation.inference import (
+    LEVEL,
+    SPREAD,
+    best_known,
+    effective,
+    other_fours,
+    predict,
+    quantiles,
+    score,
+    told,
+    weights,
+)
 from studies.validation.priors import SWEEPS, UNKNOWNS, place_in_range, samples
-from studies.validation.separation import best_known, told
 from studies.validation.speeds import read_speeds, training
 from studies.validation.swimmer import FULL, VARIANTS, bending, cross_section, fitted_curve, measured_curve, scene
 

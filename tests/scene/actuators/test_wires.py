@@ -1,11 +1,24 @@
 """Two wires per limb: their linear heating and cooling, and what they remember."""
 
+import json
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
+import oracle
 from refusals import assert_refused
-from seastar_gym import Limited, SmaPulse, SmaWires, ThermalSma
+from seastar_gym import AlongLimb, Limited, Numerics, Scene, Seastar, Simulator, SmaLimb, SmaPulse, SmaWires, ThermalSma
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.scene.actuators.actuator import check_actuator
+from seastar_gym.scene.actuators.pulse import pulse
+from seastar_gym.scene.actuators.sma_limb import MEASURED
+from studies.measurements.model import curvature
+from studies.scenes import thermal
 
 WIRES = SmaWires()
 PEAK = WIRES.peak_angle
@@ -108,6 +121,320 @@ def test_corners_are_those_of_the_wire_whatever_the_period(period):
     "change",
     [{"refractory": 1}, {"period": None, "heating_time": 1e308, "cooling_time": 1e308}],
 )  # fmt: skip
-def test_wires_that_cannot_be_are_refused(change):
+def test_pairs_of_wires_that_cannot_be_are_refused(change):
     with assert_refused(next(iter(change))):
         SmaWires(**change)
+
+
+# The thermal actuator: its heat, its hysteresis, and what a batch of robots remembers of it.
+
+
+SCENE = Scene(actuator=ThermalSma(), numerics=Numerics("implicit-midpoint", 0.01))
+SLOW = ThermalSma(heating_time=5.0, cooling_time=20.0)
+"""Heats and cools all the way."""
+
+
+def history(actuator, command, state=None, n=2001):
+    """Times, temperatures of the + wire and its shares of austenite during a stroke."""
+    t = np.linspace(0.0, actuator.period, n)
+    state = actuator.rest if state is None else state
+    states = np.array([actuator.respond(t[: k + 1], np.full((), command), state)[1] for k in range(n)])
+    return t, states[:, 0], states[:, 2]
+
+
+@pytest.mark.parametrize("command", [1.0, 0.4, 0.0, -1.0])
+def test_temperature_solves_the_heat_equation(command):
+    actuator = ThermalSma()
+    heated = max(command, 0.0) * actuator.heating_time
+
+    def slope(t, T):
+        power = actuator.steady_rise if t < heated else 0.0
+        return (power - (T - actuator.water_temperature)) / actuator.time_constant
+
+    start = np.array([35.0, 20.0, 0.25, 0.0, 0.0, 0.0])
+    t, found, _ = history(actuator, command, start, n=201)
+    ends = [0.0, *([heated] if heated else []), 1.0]
+    expected, T = [35.0], 35.0
+    for begin, end in pairwise(ends):
+        inside = t[(t > begin) & (t <= end)]
+        solution = solve_ivp(slope, (begin, end - 1e-12), [T], t_eval=inside - 1e-12, rtol=1e-10, atol=1e-10)
+        expected += solution.y[0].tolist()
+        T = expected[-1]
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
+def test_temperature_is_the_exact_exponential():
+    t, T, _ = history(SLOW, 1.0)
+    hot, tau = 20.0 + 220.0, 0.42
+    heating = t <= 5.0
+    np.testing.assert_allclose(T[heating], hot - 220.0 * np.exp(-t[heating] / tau), rtol=1e-13)
+    cooling = 20.0 + (T[heating][-1] - 20.0) * np.exp(-(t[~heating] - 5.0) / tau)
+    np.testing.assert_allclose(T[~heating], cooling, rtol=1e-13)
+
+
+def test_the_hysteresis_loop_closes_and_is_passed_round_once():
+    t, T, austenite = history(SLOW, 1.0)
+    assert austenite[0] == 0.0 and austenite.max() == 1.0 and austenite[-1] == 0.0
+    heating = t <= 5.0
+    up = np.interp(T, [23.5, 70.5], [0.0, 1.0])
+    down = np.interp(T, [21.5, 56.0], [0.0, 1.0])
+    np.testing.assert_allclose(austenite[heating], up[heating], atol=1e-12)
+    np.testing.assert_allclose(austenite[~heating], down[~heating], atol=1e-12)
+
+
+def test_a_small_loop_within_the_large_one_closes_and_stays_inside():
+    actuator, state = ThermalSma(), ThermalSma().rest
+    t = np.linspace(0.0, 1.0, 101)
+    for _ in range(30):
+        before = state
+        _, state = actuator.respond(t, np.full((), 0.3), before)
+    np.testing.assert_allclose(state, before, atol=1e-10)  # heat of strokes past is forgotten
+    _, T, austenite = history(actuator, 0.3, state, n=201)
+    assert 0.0 < np.ptp(austenite) < 0.5
+    assert (austenite >= np.interp(T, [23.5, 70.5], [0.0, 1.0]) - 1e-12).all()
+    assert (austenite <= np.interp(T, [21.5, 56.0], [0.0, 1.0]) + 1e-12).all()
+
+
+def test_between_the_lines_the_share_of_austenite_stands_still():
+    _, T, austenite = history(ThermalSma(), 0.0, np.array([45.0, 20.0, 0.5, 0.0, 0.0, 0.0]))
+    still = austenite == 0.5
+    assert still.any() and not still.all()
+    assert T[still].min() == pytest.approx(21.5 + 0.5 * (56.0 - 21.5), abs=0.05)
+
+
+def test_a_full_command_comes_near_the_pulse_and_the_defaults_are_as_near_as_a_fit():
+    for turned in thermal.misfit(ThermalSma()):
+        assert np.sqrt(np.mean(turned**2)) < 0.07 and np.abs(turned).max() < 0.17
+    assert np.sum(thermal.misfit(ThermalSma()) ** 2) < 1.01 * np.sum(thermal.misfit(thermal.fit()) ** 2)
+    assert "default: tau = 0.420 s" in thermal.describe("default", ThermalSma())
+    assert ThermalSma().delta_psi([[0.0, 0.1]]).shape == (1, 2)
+
+
+def test_the_study_draws_its_picture(tmp_path):
+    thermal.draw(ThermalSma(), tmp_path / "thermal.png")
+    assert (tmp_path / "thermal.png").stat().st_size > 10_000
+
+
+def test_the_other_wire_turns_the_other_way_while_the_first_is_still_warm():
+    actuator, t = ThermalSma(), np.array([0.0, 0.1])
+    _, state = actuator.respond(np.array([0.0, 0.1, 1.0]), np.ones(()), actuator.rest)
+    turned, after = actuator.respond(t, np.full((), -1.0), state)
+    assert turned[0] == pytest.approx(actuator.peak_angle * state[2]) and state[2] > 0.05
+    assert turned[1] == pytest.approx(actuator.peak_angle * (after[2] - after[3])) and turned[1] < -0.3
+
+
+def test_robots_swim_and_cool_down_and_are_cold_after_a_reset():
+    simulator = Simulator(SCENE, 2)
+    for _ in range(2):
+        report = simulator.stroke([[0, 1, 0, 0, -1], [0, 0.5, 0, 0, 0]])
+        assert not report.status.any()
+    state = simulator.get_state()
+    assert state.actuators.shape == (2, 5, 6)
+    assert state.actuators[0, 1, 0] > 25.0 and state.actuators[0, 4, 1] > 25.0 and state.actuators[0, 1, 1] == 20.0
+    assert state.actuators[0, 1, 0] > state.actuators[1, 1, 0] > 20.0  # half the pulse, less heat
+    assert simulator.hub_position()[0, 0] > 5e-3
+    simulator.stroke(np.zeros((2, 5)))
+    simulator.reset(np.array([True, False]))
+    np.testing.assert_array_equal(simulator.actuators[0], np.tile(ThermalSma().rest, (5, 1)))
+    assert simulator.actuators[1, 1, 0] > 20.0
+
+
+def test_it_swims_about_as_far_as_the_pulse():
+    hubs = []
+    for actuator in (ThermalSma(), SmaPulse()):
+        simulator = Simulator(Scene(actuator=actuator, numerics=SCENE.numerics))
+        for _ in range(5):
+            simulator.stroke([[0, 1, 0, 0, -1]])
+        hubs.append(simulator.hub_position()[0, 0])
+    assert hubs[0] == pytest.approx(hubs[1], rel=0.2)
+
+
+def test_temperatures_are_observed():
+    env = SeastarSwimEnv(scene=SCENE)
+    first, _ = env.reset(seed=0)
+    assert first.size == 186 + 20 == env.observation_space.shape[0]
+    observation, *_ = env.step([1, 0, 0, 0, 0])
+    seen = observation[-24:-4].reshape(5, 4)
+    assert 0.0 < seen[0, 0] < 1.0 and 0.0 < seen[0, 2] < 1.0 and not seen[1:].any()
+
+
+# --- a largest temperature -------------------------------------------------------------------------------------------
+
+LIMIT = 75.0
+SAFE = ThermalSma(heating_time=0.1, cooling_time=0.1, largest_temperature=LIMIT)
+
+
+def test_a_wire_that_is_heated_for_ever_stays_below_the_largest_temperature():
+    state, t, hottest = SAFE.rest, np.linspace(0.0, 0.05, 51), 0.0
+    for _ in range(100):
+        for begin in (0.0, 0.05):
+            temperature = [SAFE.respond(begin + t[: k + 1], np.ones(()), state)[1][0] for k in range(1, len(t))]
+            hottest = max(hottest, *temperature)
+            _, state = SAFE.respond(begin + t, np.ones(()), state)
+    assert LIMIT - 0.5 < hottest <= LIMIT + 1e-9
+    free = ThermalSma(heating_time=0.1, cooling_time=0.1).rest
+    for _ in range(100):
+        _, free = ThermalSma(heating_time=0.1, cooling_time=0.1).respond(t, np.ones(()), free)
+    assert free[0] > 200.0
+
+
+def test_heating_ends_exactly_where_the_limit_is_reached():
+    hot, start = 240.0, 60.0
+    time = 0.42 * np.log((hot - start) / (hot - LIMIT))  # of (hot - T) falling to (hot - LIMIT)
+    state = np.array([start, 20.0, 0.5, 0.0, 0.0, 0.0])
+    assert SAFE.seconds_heated(np.array([0.0, 0.2]), np.ones(()), state) == pytest.approx(time, rel=1e-12)
+    _, at_limit = SAFE.respond(np.array([0.0, time]), np.ones(()), state)
+    assert at_limit[0] == pytest.approx(LIMIT, rel=1e-14) and at_limit[4] == 0.0
+    np.testing.assert_array_equal(SAFE.refractory_wires(np.stack([state, at_limit])), [[False, False], [True, False]])
+    _, after = SAFE.respond(np.array([0.0, time + 0.03]), np.ones(()), state)
+    assert after[0] == pytest.approx(20.0 + (LIMIT - 20.0) * np.exp(-0.03 / 0.42), rel=1e-12)
+
+
+def test_a_limit_that_is_never_reached_changes_no_bit():
+    t, commands = np.linspace(0.0, 1.0, 51), np.array([1.0, 0.3, -1.0, 0.0])
+    for limit in (100.0, 240.0, 1000.0):
+        one, other = ThermalSma(), ThermalSma(largest_temperature=limit)
+        rest = np.tile(one.rest, (4, 1))
+        for seen, wanted in zip(other.respond(t, commands, rest), one.respond(t, commands, rest), strict=True):
+            np.testing.assert_array_equal(seen, wanted)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"water_temperature": 22.0}, {"austenite_start": 80.0}, {"martensite_start": 80.0}, {"martensite_finish": 24.0},
+        {"time_constant": 0.9e-3}, {"largest_temperature": 20.0},
+    ],
+)  # fmt: skip
+def test_wires_that_cannot_be_are_refused(change):
+    with pytest.raises(ValueError, match=r"\.$"):
+        ThermalSma(**change)
+
+
+# The limb with measured curves: its heat, its delay, its presets, and what it makes of the chapter's commands.
+
+
+LIMB = SmaLimb()
+END = LIMB.delay + LIMB.heating_time
+
+
+def periodic(limb: SmaLimb, n: int = 60) -> np.ndarray:
+    """State of a limb after n strokes of command 1."""
+    state = limb.rest
+    for _ in range(n):
+        _, state = limb.respond(np.array([0.0, limb.period]), np.ones(()), state)
+    return state
+
+
+def test_a_limb_of_some_length_bends_by_the_measured_change_of_curvature():
+    limb = SmaLimb.preset(20, limb_length=0.03)
+    assert limb.peak_angle == pytest.approx(MEASURED[20].curvature_change * 0.03, rel=1e-15)
+    scene = Scene(Seastar(along=AlongLimb()), actuator=SmaLimb.preset(20, limb_length=np.array([0.01, 0.03])))
+    assert scene.n_robots == 2
+
+
+@pytest.mark.parametrize("command", [1.0, 0.4, -0.7])
+def test_temperature_solves_the_heat_equation_after_the_delay(command):
+    wire, ends = (0 if command > 0 else 1), LIMB.delay + abs(command) * LIMB.heating_time
+    steady = LIMB.rise / (1.0 - np.exp(-LIMB.heating_time / LIMB.time_constant))
+    t, start = np.linspace(0.0, 1.0, 201), np.array([2.0, 2.0, 0.0, 0.0, 0.0, 0.0])
+
+    def slope(now, theta):
+        return (steady * (LIMB.delay < now < ends) - theta) / LIMB.time_constant
+
+    solution = solve_ivp(slope, (0.0, 1.0), [2.0], t_eval=t, max_step=1e-4, rtol=1e-8)
+    found = LIMB.temperatures(t, np.full((), command), start)
+    np.testing.assert_allclose(found[:, wire], solution.y[0], atol=0.01)
+    np.testing.assert_allclose(found[:, 1 - wire], 2.0 * np.exp(-t / LIMB.time_constant), rtol=1e-13)
+
+
+def test_a_full_pulse_lifts_a_cold_wire_by_the_rise():
+    heated = LIMB.temperatures(np.array([0.0, END]), np.ones(()), LIMB.rest)
+    assert heated[-1].tolist() == pytest.approx([LIMB.rise, 0.0], rel=1e-12)
+
+
+@pytest.mark.parametrize("liquid_metal", MEASURED)
+@pytest.mark.parametrize("frequency", [0.4, 1.1, 2.3])
+def test_repeated_commands_tend_to_the_closed_form_of_the_periodic_state(liquid_metal, frequency):
+    limb = SmaLimb.preset(liquid_metal, period=1.0 / frequency)
+    t = np.linspace(0.0, limb.period, 50)
+    numbers = {"width" if n == "heating_time" else n: x for n, x in MEASURED[liquid_metal]._asdict().items()}
+    found = limb.curvature(limb.temperatures(t, np.ones(()), periodic(limb))[:, 0])
+    np.testing.assert_allclose(found, curvature(numbers, frequency, t), rtol=1e-9)
+
+
+def test_a_new_command_waits_no_longer():
+    state = LIMB.rest
+    for _ in range(10):  # intervals shorter than the delay
+        _, state = LIMB.respond(np.array([0.0, 0.01]), np.ones(()), state)
+    assert state[0] > LIMB.rise and state[2] == 0.0 and state[4] == pytest.approx(LIMB.heating_time - 0.01)
+    commands = np.array([1.0, -0.3, 0.0])
+    heated = LIMB.seconds_heated(np.array([0.0, 0.9]), commands, np.broadcast_to(LIMB.rest, (3, 6)))
+    np.testing.assert_allclose(heated, np.abs(commands) * LIMB.heating_time, atol=1e-15)
+
+
+@pytest.mark.parametrize("liquid_metal", MEASURED)
+def test_presets_nearly_reach_their_peak_in_every_stroke_and_can_be_written(liquid_metal):
+    limb = SmaLimb.preset(liquid_metal)
+    check_actuator(limb)
+    scene = Scene(actuator=limb)
+    assert Scene.from_dict(json.loads(json.dumps(scene.to_dict()))) == scene
+    turned, _ = limb.respond(np.array([0.0, limb.delay + limb.heating_time]), np.ones(()), periodic(limb))
+    assert 0.7 * limb.peak_angle < turned[-1] <= limb.peak_angle
+    assert limb.share(np.zeros(2)).tolist() == [0.0, 0.0] and limb.curvature(np.zeros(())) == limb.rest_curvature
+
+
+@pytest.mark.parametrize("duration", [0.015, 0.25])
+def test_a_robot_swims_with_intervals_of_any_length_and_forgets_on_reset(duration):
+    simulator = Simulator(Scene(actuator=LIMB, numerics=Numerics("implicit-midpoint", 0.01)), 2)
+    for _ in range(4):
+        assert not simulator.advance(duration, np.array([[0, 1, 0, 0, -1], [0, 0.5, 0, 0, 0]])).status.any()
+    assert simulator.actuators[0, 1, 0] >= simulator.actuators[1, 1, 0] > 0.0 == simulator.actuators[0, 0, 0]
+    simulator.reset()
+    assert not simulator.actuators.any()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"heating_time": 1e3}, {"time_constant": 1e9}],
+)  # fmt: skip
+def test_limbs_that_cannot_be_are_refused(change):
+    with assert_refused("heating_time"):
+        replace(LIMB, **change)
+
+
+def test_a_material_that_was_not_measured_is_refused():
+    with assert_refused("0, 10, 20, 30, 40, 50 % of liquid metal"):
+        SmaLimb.preset(15)
+
+
+# The pulse is the ramp of Fig. 13.5b.
+
+
+CHAPTER = (0.0, 0.1, 1.0)
+durations = st.floats(1e-3, 10.0)
+
+
+def test_pulse_rises_while_heated_and_falls_while_cooling():
+    times = np.array([0.0, 0.025, 0.05, 0.1, 0.55, 0.775, 1.0])
+    np.testing.assert_allclose(pulse(times, 0.1, 0.9), [0.0, 0.25, 0.5, 1.0, 0.5, 0.25, 0.0], rtol=0.0, atol=1e-15)
+
+
+def test_pulse_is_exact_at_its_corners_and_that_of_the_oracle_between_them():
+    actuator = SmaPulse()
+    assert actuator.corners == CHAPTER and actuator.period == 1.0
+    assert actuator.delta_psi(CHAPTER).tolist() == [0.0, np.pi / 5, 0.0]
+    times = np.linspace(0.0, 0.999, 1000)
+    np.testing.assert_allclose(actuator.delta_psi(times), [oracle.pulse(t) for t in times], rtol=0.0, atol=1e-15)
+
+
+@given(durations, durations, st.lists(st.floats(-20.0, 40.0), min_size=1, max_size=20))
+def test_pulse_stays_between_zero_and_one_whatever_the_time(heating_time, cooling_time, times):
+    share = pulse(times, heating_time, cooling_time)
+    assert share.shape == (len(times),)
+    assert np.all((share >= 0.0) & (share <= 1.0))
+
+
+def test_pulse_takes_numbers_and_arrays_of_any_shape():
+    assert SmaPulse().delta_psi(0.05) == pytest.approx(np.pi / 10)
+    assert SmaPulse().delta_psi(np.zeros((2, 3))).shape == (2, 3)

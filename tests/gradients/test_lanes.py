@@ -1,0 +1,123 @@
+"""Every operation of the lanes that are differentiated: the values of lanes.py, and the derivatives of calculus."""
+
+import numba
+import numpy as np
+import pytest
+
+from seastar_gym.simd import dual_lanes, tape_lanes
+from seastar_gym.simd.compilation import STRICT
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="these lanes have compiled code alone")
+
+X, Y, Z = POINT = 0.7, -1.3, 0.4
+DIRECTION = 0.3, 0.2, -0.6
+TABLE = np.array([5.0, 6.0, 7.0])
+BEYOND = 4
+"""Rows of arguments, of which the first holds nothing; places behind them are those of the tape."""
+EXPECTED = {
+    "x + y": (X + Y, 1.0, 1.0, 0.0),
+    "2.0 - x": (2.0 - X, -1.0, 0.0, 0.0),
+    "x * y": (X * Y, Y, X, 0.0),
+    "3.0 * x": (3.0 * X, 3.0, 0.0, 0.0),
+    "x / y": (X / Y, 1.0 / Y, -X / Y**2, 0.0),
+    "1.0 / y": (1.0 / Y, 0.0, -1.0 / Y**2, 0.0),
+    "-x": (-X, -1.0, 0.0, 0.0),
+    "sqrt(x)": (np.sqrt(X), 0.5 / np.sqrt(X), 0.0, 0.0),
+    "absolute(y)": (-Y, 0.0, -1.0, 0.0),
+    "floor(y)": (-2.0, 0.0, 0.0, 0.0),
+    "add_product(z, x, y)": (Z + X * Y, Y, X, 1.0),
+    "add_product(x, y, y)": (X + Y * Y, 1.0, 2.0 * Y, 0.0),
+    "subtract_product(x, 2.0, y)": (X - 2.0 * Y, 1.0, -2.0, 0.0),
+    "subtract_product(z, y, y)": (Z - Y * Y, 0.0, -2.0 * Y, 1.0),
+    "select(x > y, x, y)": (X, 1.0, 0.0, 0.0),
+    "select((x < y) | (y > 0.0), x, 4.0)": (4.0, 0.0, 0.0, 0.0),
+    "select((x < y) | ~(y < 0.0), x, 4.0)": (4.0, 0.0, 0.0, 0.0),
+    "load(shared, 1)": (6.0, 0.0, 0.0, 0.0),
+    "load_at(shared, floor(x) + 2.0)": (7.0, 0.0, 0.0, 0.0),
+    "splat(8.0)": (8.0, 0.0, 0.0, 0.0),
+    "sqrt(x - x)": (0.0, 0.0, 0.0, 0.0),
+    "(x * y) * (x * y)": (X * Y * X * Y, 2.0 * X * Y**2, 2.0 * X**2 * Y, 0.0),
+    "1.0 if any_lane((x > 0.0) & (y < 0.0)) else 0.0": (1.0, 0.0, 0.0, 0.0),
+}
+OF_DUALS = {"slope_of(x)": (DIRECTION[0], 0.0), "with_slope(x, y)": (X, Y)}
+OF_TAPES = {
+    "constant(x)": (X, 0.0, 0.0, 0.0),
+    "less_step(x, y)": (X, 0.0, -1.0, 0.0),
+    "sqrt(constant(x) - constant(x))": (0.0, 0.0, 0.0, 0.0),
+}
+
+
+def compiled(lanes, lines, before="", behind=""):
+    """function(arguments, table, results, entries) that stores every line in a row of its own."""
+    stores = "".join(f"    store(out, {k}, {line})\n" for k, line in enumerate(lines))
+    source = f"""\
+def function(arguments, table, results, entries):
+    rows, shared, out = borrow(arguments), borrow(table), borrow(results)
+{before}    x, y, z = load(rows, 1), load(rows, 2), load(rows, 3)
+{stores}{behind}"""
+    namespace = dict(vars(lanes))
+    exec(source, namespace)
+    return numba.njit(**STRICT)(namespace["function"])
+
+
+def test_duals_have_the_slopes_of_calculus():
+    expected = {line: (value, np.dot(slopes, DIRECTION)) for line, (value, *slopes) in EXPECTED.items()} | OF_DUALS
+    n, row = dual_lanes.N_LANES, dual_lanes.ROW
+    arguments, results = np.zeros((BEYOND, row)), np.full((len(expected), row), np.nan)
+    arguments[1:, :n], arguments[1:, n:] = np.transpose([POINT]), np.transpose([DIRECTION])
+    compiled(dual_lanes, expected)(arguments, TABLE, results, None)
+    for found, (line, (value, slope)) in zip(results, expected.items(), strict=True):
+        np.testing.assert_allclose(found[:n], value, rtol=1e-15, err_msg=line)
+        np.testing.assert_allclose(found[n:], slope, rtol=1e-14, err_msg=line)
+
+
+WHILE_PAUSED = len(EXPECTED) + len(OF_TAPES)
+"""The row of what is computed while nothing is written down."""
+
+
+@pytest.fixture(scope="module")
+def on_tape():
+    """The operations on a tape of a given length: (values, places, entries, place behind the last, whether full)."""
+    behind = f"""\
+    pause_tape()
+    store(out, {WHILE_PAUSED}, load(rows, 1) * load(rows, 2))
+    resume_tape()
+    store(out, {WHILE_PAUSED + 1}, x * y)
+    return end_of_tape(), tape_is_full()
+"""
+    function = compiled(tape_lanes, EXPECTED | OF_TAPES, f"    begin_tape(entries, {BEYOND})\n", behind)
+
+    def run(capacity):
+        entries, results = np.zeros((capacity, tape_lanes.ENTRY)), np.full((WHILE_PAUSED + 2, tape_lanes.ROW), np.nan)
+        arguments = np.zeros((BEYOND, tape_lanes.ROW))
+        arguments[1:, 0], arguments.view(np.int64)[1:, 1] = POINT, range(1, BEYOND)
+        end, full = function(arguments, TABLE, results, entries)
+        return results[:, 0], results.view(np.int64)[:, 1], entries, end, full
+
+    return run
+
+
+def swept(entries, place, end):
+    """Derivatives of what stands at a place in the three arguments."""
+    slopes, parents = np.zeros(end), entries.view(np.int32)
+    slopes[place] = 1.0
+    for k in range(end - 1, BEYOND - 1, -1):
+        slopes[parents[k, 0]] += entries[k, 1] * slopes[k]
+        slopes[parents[k, 1]] += entries[k, 2] * slopes[k]
+    return slopes[1:BEYOND]
+
+
+def test_a_tape_has_the_derivatives_of_calculus(on_tape):
+    values, places, entries, end, full = on_tape(100)
+    assert full == 0
+    paused = {"while paused": (X * Y, 0.0, 0.0, 0.0), "resumed": EXPECTED["x * y"]}
+    rows = zip(values, places, (EXPECTED | OF_TAPES | paused).items(), strict=True)
+    for found, place, (line, (value, *slopes)) in rows:
+        np.testing.assert_allclose(found, value, rtol=1e-15, err_msg=line)
+        expected = np.zeros(3) if place == 0 else swept(entries, place, end)
+        np.testing.assert_allclose(expected, slopes, rtol=1e-14, err_msg=line)
+
+
+def test_a_tape_that_is_too_short_says_so(on_tape):
+    *_, end, full = on_tape(10)
+    assert (end, full != 0) == (10, True)
