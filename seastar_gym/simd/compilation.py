@@ -12,146 +12,41 @@ import contextlib
 import functools
 import hashlib
 import logging
-import operator
 import os
 import pickle
 import secrets
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import llvmlite
 import numba
 import numpy as np
-from numba.core import ir, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache, UserWideCacheLocator
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import FunctionPass, LoweringPass, register_pass
-from numba.core.ir_utils import get_definition, guard
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
-from numba.core.typed_passes import NativeLowering
-from numba.core.untyped_passes import RewriteSemanticConstants
 
 from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.pipeline import EntryCompiler, KernelCompiler
 from seastar_gym.simd.plain import plain_kernels
 
 PACKAGE = Path(__file__).resolve().parent.parent
 DIGEST_SIZE = hashlib.sha256().digest_size  # bytes
 
-
-@register_pass(mutates_CFG=False, analysis_only=False)
-class _AbsentTerms(FunctionPass):
-    """Makes `rods.body is None` a constant, as numba does for arguments alone: the types of members are known, too.
-
-    So a kernel asks the bundle that it gets, and what is behind the question is gone when compiled.
-    """
-
-    _name = "absent_terms"
-
-    def __init__(self):
-        FunctionPass.__init__(self)
-
-    def run_pass(self, state):
-        function, changed = state.func_ir, False
-        for block in function.blocks.values():
-            for statement in block.find_insts(ir.Assign):
-                absent = _is_absent(function, state.args, statement.value)
-                if absent is not None:
-                    statement.value = ir.Const(absent, statement.loc)
-                    function._definitions[statement.target.name] = [statement.value]
-                    changed = True
-        return changed
-
-
-def _is_absent(function, arguments, question):
-    """What `member is None` or `member is not None` says of an argument's member; None where nothing is asked so."""
-    if not (isinstance(question, ir.Expr) and question.op == "binop"):
-        return None
-    member, other = (guard(get_definition, function, side) for side in (question.lhs, question.rhs))
-    kind = _type_of(function, arguments, member)
-    if kind is None or not (isinstance(other, ir.Const) and other.value is None):
-        return None
-    absent = isinstance(kind, types.NoneType | types.Omitted)
-    return {operator.is_: absent, operator.is_not: not absent}.get(question.fn)
-
-
-def _type_of(function, arguments, value):
-    """Type of an argument, of its member or of a member's member; None for anything else."""
-    if isinstance(value, ir.Arg):
-        return arguments[value.index]
-    if isinstance(value, ir.Expr) and value.op == "getattr":
-        bundle = _type_of(function, arguments, guard(get_definition, function, value.value))
-        if isinstance(bundle, types.BaseNamedTuple) and value.attr in bundle.fields:
-            return bundle.types[bundle.fields.index(value.attr)]
-    return None
-
-
-class _Compiler(CompilerBase):
-    """Numba's compiler, with constants for absent terms before it looks for branches that are never taken."""
-
-    def define_pipelines(self):
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes.add_pass_after(_AbsentTerms, RewriteSemanticConstants)
-        passes.finalize()
-        return [passes]
-
-
-class _Part(JITCodeLibrary):
-    """Code that compiled code alone calls.
-
-    What it is linked into optimises it and turns it into machine code. By itself it would be both for nothing.
-    """
-
-    def _optimize_final_module(self):
-        pass
-
-    def _finalize_final_module(self):
-        self._finalize_dynamic_globals()
-        self._finalized = True
-
-    def get_pointer_to_function(self, name):
-        return 0
-
-    @property
-    def codegen(self):
-        """There is no machine code that an environment of Python's could be given to."""
-        return SimpleNamespace(set_env=lambda name, environment: None)
-
-
-@register_pass(mutates_CFG=False, analysis_only=False)
-class _AsPart(LoweringPass):
-    """Has a kernel lowered into a `_Part`."""
-
-    _name = "as_part"
-
-    def __init__(self):
-        LoweringPass.__init__(self)
-
-    def run_pass(self, state):
-        state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
-        return True
-
-
-class _KernelCompiler(_Compiler):
-    """Compiler of kernels, which only compiled code calls: each is lowered into a `_Part`."""
-
-    def define_pipelines(self):
-        (passes,) = super().define_pipelines()
-        lowering = [kind for kind, _ in passes.passes].index(NativeLowering)
-        passes.add_pass_after(_AsPart, passes.passes[lowering - 1][0])
-        passes.finalize()
-        return [passes]
-
-
 # error_model="numpy": divisions follow IEEE instead of raising; failure is a status, not an exception.
-STRICT = {"error_model": "numpy", "nogil": True, "pipeline_class": _Compiler}
+STRICT = {"error_model": "numpy", "nogil": True, "pipeline_class": EntryCompiler}
 # Without wrappers for Python, which would be a third of the compilation.
-BLOCK = {**STRICT, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _KernelCompiler}
+BLOCK = {**STRICT, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": KernelCompiler}
 
 
 class Kernel(CPUDispatcher):
     """A building block of compiled code, without the wrapper that a call from Python would need."""
+
+    def compile(self, sig):
+        """Compile for these types of arguments, unless it was: numba's own method would have every kernel timed."""
+        with global_compiler_lock:
+            if sig not in self.overloads:
+                with self._compiling_counter:
+                    self.add_overload(self._compiler.compile(sig, None))
 
     def __call__(self, *args, **kwargs):
         name = self.py_func.__name__

@@ -18,11 +18,11 @@ import llvmlite.binding as llvm
 import numpy as np
 from llvmlite import ir
 from numba.core import config, types
-from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
 
 from seastar_gym.simd import compilation
 from seastar_gym.simd.modules import COMPILATION, WIDTH, KernelModules, made_module
+from seastar_gym.simd.pipeline import linked
 
 N_LANES = 32
 """Robots in a row of memory: as many as threads that run in step."""
@@ -147,9 +147,7 @@ class Program:
     def _linked(self) -> tuple[Any, llvm.ModuleRef]:
         """The kernel as numba types and lowers it, with all that it calls."""
         self._kernel.compile(tuple(self._types))
-        compiled = self._kernel.overloads[tuple(self._types)]
-        with global_compiler_lock:
-            return compiled.fndesc, compiled.library._get_module_for_linking()
+        return linked(self._kernel, tuple(self._types))
 
     def code(self, machine: llvm.TargetMachine, triple: str, add_entry: Any) -> llvm.ModuleRef:
         """Optimised code of a processor. add_entry: Adds the entry that calls ROBOT to a module of `ir`."""

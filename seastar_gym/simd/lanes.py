@@ -20,6 +20,9 @@ numpy_lanes.py lists all that kernels may ask of lanes, and does the same on num
 here are those there.
 """
 
+import functools
+import hashlib
+
 from llvmlite import ir
 from numba.core import cgutils, config, types
 from numba.core.datamodel import models
@@ -106,7 +109,24 @@ class _AbsentModel(models.DataModel):
 
 class Bundle(types.containers.NamedTuple):
     """A borrowed named tuple. It goes to another kernel as one value, where numba's own would go member by member, each
-    taken out and put in again: half of all that is compiled. Nor does anybody look in it for arrays to count."""
+    taken out and put in again: half of all that is compiled. Nor does anybody look in it for arrays to count.
+
+    Its name is short, as it is part of the name of every kernel that takes one; numba's spells out all members.
+    """
+
+    def __init__(self, members, kind):
+        super().__init__(members, kind)
+        self.name = f"{kind.__name__}_{hashlib.blake2b(self.name.encode(), digest_size=8).hexdigest()}"
+
+    @functools.cached_property
+    def _hash(self):
+        return hash(self.key)
+
+    def __hash__(self):
+        return self._hash
+
+    def __getstate__(self):
+        return {name: value for name, value in self.__dict__.items() if name != "_hash"}  # another process has others
 
 
 @register_model(Bundle)
