@@ -45,6 +45,8 @@ def _teach(op: Callable, result_of: Callable, operands: tuple[tuple, ...], build
 
     @infer_global(op)
     class Typing(AbstractTemplate):
+        metadata = {"target": "cpu"}  # asked before numba's own, of which none is for lanes
+
         def generic(self, args, kws):
             return result_of(args)
 

@@ -78,6 +78,10 @@ def _type_of(function, arguments, value):
     return None
 
 
+MANGLED = "seastar_gym"
+"""Part of the name of every kernel."""
+
+
 class _Part(JITCodeLibrary):
     """Code that compiled code alone calls: its own, without that of the kernels which it calls.
 
@@ -109,25 +113,34 @@ class _Whole(JITCodeLibrary):
     """Code that Python calls, with that of all kernels below it, each linked in once."""
 
     def finalize(self):
-        self._linking_libraries = list(_reached(self))
+        self._linking_libraries = _reached(self)
         super().finalize()
 
     def _optimize_final_module(self):
         """Optimise once: numba's first pass gathers reference counts, of which kernels have none."""
+        missing = [each.name for each in self._final_module.functions if each.is_declaration and MANGLED in each.name]
+        assert not missing, missing
         passes, builder = self._codegen._module_pass_manager()
         passes.run(self._final_module, builder)
 
 
 def _reached(library):
-    """The libraries that one calls, and those that these call, each once and before what it calls."""
-    found = {}
-    ahead = list(reversed(library._linking_libraries))
-    while ahead:
-        called = ahead.pop()
-        if called not in found:
-            found[called] = None
-            ahead += reversed(called._linking_libraries if isinstance(called, _Part) else ())
-    return found
+    """The libraries that one calls, and those that these call, each once and after all that call it.
+
+    LLVM's linker leaves out what nothing calls yet.
+    """
+    found, seen = [], set()
+
+    def visit(caller):
+        for called in reversed(caller._linking_libraries):
+            if called not in seen:
+                seen.add(called)
+                if isinstance(called, _Part):
+                    visit(called)
+                found.append(called)
+
+    visit(library)
+    return found[::-1]
 
 
 def linked(kernel, signature):
