@@ -2,7 +2,11 @@
 
 import numpy as np
 
-from seastar_gym import GridCurrent, ShearCurrent, UniformCurrent, Vortex
+from seastar_gym import GridCurrent, ShearCurrent, UniformCurrent, Vortex, Water
+
+NONE = Water(1000.0, 1.0, 1.0, UniformCurrent(), 0.0)
+"""Water that has every term and shows none: each other set of terms would be machine code of its own to compile. Robots
+with a relaxation time, which may be 0, go with it."""
 
 
 def swirl(x, y):

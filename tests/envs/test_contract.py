@@ -305,7 +305,7 @@ ARGUMENTS = {
         "scene": SCENE,
     },
     "error_bars": {"error_bars": True, "scene": SCENE},
-    "device": {"device": "scalar", "scene": SCENE},
+    "device": {"device": "scalar", "fidelity": "fast"},
     "decisions": {"decision_period": 0.2, "observe_actuators": False, "fidelity": "fast"},
     "continuous": {"actions": "continuous", "decision_period": np.float64(0.3), "fidelity": "fast"},
     "headings": {"headings": HeadingTargets((0.1, 1 / 3, 0.0, 1.0, 2.0)), "fidelity": "fast"},

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import oracle
+from currents import NONE
 from hubs import TEN
 from momenta import bodied_momenta
 from refusals import assert_refused
@@ -149,13 +150,15 @@ def test_pressed_limbs_rest_where_statics_says():
     pushes with what bending of the last hinge leaves of F, EI/dl over the edge length squared times the way of the tip.
     """
     gap, force, opening = 0.04, 0.02, 0.0385
-    robot = Seastar(nodes_per_limb=10, n_limbs=2, limbs=(Limb(direction=0.0), Limb(direction=gap)))
+    limbs = Limb(direction=0.0), Limb(direction=gap)
+    robot = Seastar(nodes_per_limb=10, n_limbs=2, limbs=limbs, relaxation_time=0.0)
     tip, nodes = robot.nodes_per_limb - 1, robot.nodes()
     push = np.array([-np.sin(gap), np.cos(gap)])
     scene = Scene(
-        robot=robot,
-        actuator=SmaPulse(peak_angle=0.0),
-        numerics=Numerics(step=20e-3, newton_tolerance=1e-10),
+        robot,
+        NONE,
+        SmaPulse(peak_angle=0.0),
+        Numerics(step=20e-3, newton_tolerance=1e-10),
         held_nodes=tuple(node for node in range(robot.n_nodes) if node != tip),
         loads=((tip, *(force * push)),),
         contact=Contact(opening_angle=opening),
