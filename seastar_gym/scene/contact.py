@@ -30,7 +30,7 @@ class Contact:
     """
 
     modulus: Annotated[Numbers | None, positive("Pa")] = None
-    opening_angle: Annotated[float, positive("rad")] = 0.3
+    opening_angle: Annotated[float, positive("rad")] = 0.25
     layer: Annotated[Numbers | None, positive("m")] = None
 
     def __post_init__(self) -> None:

@@ -35,10 +35,10 @@ Floats = NDArray[np.float64]
 
 KINDS: dict[str, Contact] = {
     "Contact()": Contact(),
-    "Contact(opening_angle=0.25)": Contact(opening_angle=0.25),
+    "Contact(opening_angle=0.3)": Contact(opening_angle=0.3),
     "Contact(layer=5.6e-3)": Contact(layer=5.6e-3),
     "Contact(layer=10e-3)": Contact(layer=10e-3),
-    "cones": Contact(),
+    "cones": Contact(opening_angle=0.3),
 }
 CONES = "cones"
 """Limbs that begin as cones of the opening angle, as the package had them first."""
