@@ -36,7 +36,6 @@ Floats = NDArray[np.float64]
 KINDS: dict[str, Contact] = {
     "Contact()": Contact(),
     "Contact(opening_angle=0.3)": Contact(opening_angle=0.3),
-    "Contact(layer=5.6e-3)": Contact(layer=5.6e-3),
     "Contact(layer=10e-3)": Contact(layer=10e-3),
     "cones": Contact(opening_angle=0.3),
 }
