@@ -176,7 +176,7 @@ class Touching(Rigid):
         star, thick = self.star, np.zeros(self.star.n_nodes + len(self.corners))
         for limb in range(star.n_limbs):
             for i in range(1, star.nodes_per_limb):
-                thick[star.node(limb, i)] = min(star.rod_radius, 0.5 * self.opening_angle * star.edge_length * i)
+                thick[star.node(limb, i)] = oracle.tapered(star.rod_radius, star.edge_length * i, self.opening_angle)
         thick[star.n_nodes :] = self.radius
         return thick
 

@@ -835,12 +835,19 @@ def share_of_edge(s: float, edge: int, last: int, overhang: float = 0.25) -> flo
     return float(np.interp(s, [-overhang, *full, 1.0 + overhang], [0.0, 1.0, 1.0, 0.0]))
 
 
+def tapered(radius: float, distance: float, opening_angle: float) -> float:
+    """Thickness of a limb near its root: Hermite's cubic, whose slope in the middle is half the opening angle."""
+    slope = 0.5 * opening_angle
+    s = np.clip(distance * slope / (1.5 * radius), 0.0, 1.0)
+    return float(radius * (3.0 * s**2 - 2.0 * s**3))
+
+
 def touches(star: Star, ends: Array, start: Array, opening_angle: float) -> list[Touch]:
     """Nodes of a limb that meet edges of its neighbours, at `ends`, in a step that began at `start`."""
     thickness = np.zeros(star.n_nodes)
     for limb in range(star.n_limbs):
         for i in range(1, star.nodes_per_limb):
-            thickness[star.node(limb, i)] = min(star.rod_radius, 0.5 * opening_angle * star.edge_length * i)
+            thickness[star.node(limb, i)] = tapered(star.rod_radius, star.edge_length * i, opening_angle)
     found = []
     for right in range(star.n_limbs):
         left = (right + 1) % star.n_limbs

@@ -28,8 +28,8 @@ def touching_at_rest(
 ) -> str | None:
     """What touches at rest, in words, or None.
 
-    limbs: Limbs on a body. pairs: Those that may touch each other. outline: Of the body. opening_angle: Of the cones as
-    which limbs begin, see `Contact` [rad].
+    limbs: Limbs on a body. pairs: Those that may touch each other. outline: Of the body. opening_angle: Of the cones
+    in which limbs begin, see `Contact` [rad]; they are looked at, so that no touch at rest is missed.
     """
     n = min(max(nodes_per_limb, FEW), MANY)
     share = np.arange(n) / (n - 1)

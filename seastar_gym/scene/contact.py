@@ -24,12 +24,13 @@ class Contact:
         presses it F layer^3/(8 EI) deep (Hetenyi, Beams on Elastic Foundation). Softer than the limbs themselves are,
         it changes where they go, and limbs that press hard pass through each other sooner, which stops their robot.
     opening_angle: Angle between neighbouring limbs at the hub at which they touch [rad]. Since all limbs begin at one
-        point, they taper to cones near the hub, which fit into this angle. On a body they taper likewise from their
-        roots, and must leave its rim at more than half the angle.
+        point, they taper towards it over three radii divided by this angle, along a cubic that is flat at either end:
+        limbs that are pressed onto each other near the hub come to stand at this angle. They lie within cones that fit
+        into it. On a body they taper likewise from their roots, and must leave its rim at more than half the angle.
     """
 
     modulus: Annotated[Numbers | None, positive("Pa")] = None
-    opening_angle: Annotated[float, positive("rad")] = 0.3
+    opening_angle: Annotated[float, positive("rad")] = 0.25
     layer: Annotated[Numbers | None, positive("m")] = None
 
     def __post_init__(self) -> None:

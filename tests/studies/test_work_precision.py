@@ -7,6 +7,7 @@ import pytest
 
 from seastar_gym import Contact, Numerics, Scene, Seastar
 from seastar_gym.accuracy.commands import PROMISED
+from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.numerics import PRESETS, Resolution
 from studies.accuracy import contact
 from studies.accuracy import work_precision as study
@@ -80,15 +81,26 @@ def test_tables_and_picture_are_made_and_nothing_is_measured_twice(small, tmp_pa
     assert main(command) == 2 and "another machine or version" in capsys.readouterr().err
 
 
+def test_cones_are_those_of_the_opening_angle_and_only_where_they_are_asked_for():
+    scene = Scene(Seastar(nodes_per_limb=37), contact=contact.KINDS[contact.CONES])
+    smooth = make_rods(scene).contact.thickness[1:37]
+    with contact.shape(contact.CONES):
+        cones = make_rods(scene).contact.thickness[1:37]
+    np.testing.assert_allclose(cones, np.minimum(1.6e-3, 0.15 * 0.1 / 36 * np.arange(1, 37)))
+    assert np.all(smooth <= cones) and smooth[0] < 0.5 * cones[0]
+    with contact.shape("Contact()"):
+        np.testing.assert_array_equal(make_rods(scene).contact.thickness[1:37], smooth)
+
+
 def test_contacts_are_told_by_error_softness_and_the_speed_that_stops_a_robot():
     """Softer limbs store less energy before they would pass through each other."""
     assert contact.survives(Contact(), 5.0) and not contact.survives(Contact(layer=10e-3), 10.0)
     assert set(contact.STEPS) == {*contact.NODES, contact.LIMIT}
     numbers = {"19": 0.05, "37": None, "10": 0.1}
     row = {"largest": numbers, "median": numbers, "away": [0.01, 0.2], "cost": 2.5}
-    every = dict.fromkeys(contact.KINDS | contact.BETWEEN)
+    every = dict.fromkeys(contact.KINDS)
     told = contact.STUDY.tables["contact"](
         {what: dict.fromkeys(every, value) for what, value in (("contacts", row), ("bounds", 0.03), ("thrown", 5.0))}
     )
     assert "| `Contact()` | 10 %, 10 % | 5 %, 5 % | fails, fails | 3 % | 20 %, 1 % | 5 | x 2.5 |" in told
-    assert "Contact(layer=7e-3)" not in told  # measured by its promise and speed alone
+    assert "| cones | 10 %" in told

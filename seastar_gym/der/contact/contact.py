@@ -150,14 +150,14 @@ def coefficients(
 ) -> Contact:
     """Thickness and stiffness of every node; half of the latter, because nodes of both limbs push.
 
-    pairs: (right, left) limbs that may touch, counted from 0. modulus, layer: See moduli_at_nodes. opening_angle: Angle
-    at which the cones near the hub touch [rad]. rim: Of a body, or None.
+    pairs: (right, left) limbs that may touch, counted from 0. modulus, layer: See moduli_at_nodes. opening_angle: See
+    tapered. rim: Of a body, or None.
     """
     share = np.arange(mesh.nodes_per_limb) / (mesh.nodes_per_limb - 1)
     thickness, stiffness = [0.0], [0.0]
     at_nodes = moduli_at_nodes(mesh, modulus, layer)
     for length, reaches, moduli in zip(mesh.limb_lengths, mesh.at_nodes.reach, at_nodes, strict=True):
-        thickness += [min(r, 0.5 * opening_angle * length * s) for r, s in zip(reaches, share, strict=True)][1:]
+        thickness += [tapered(r, length * s, opening_angle) for r, s in zip(reaches, share, strict=True)][1:]
         stiffness += moduli.tolist()[1:]
     corners, radius = Rim(np.zeros((0, 2)), 0.0) if rim is None else rim
     beyond = [] if rim is None else [0.0] * (1 + mesh.n_limbs)
@@ -172,6 +172,16 @@ def coefficients(
         rim=np.array([radius]),
         reach=np.array([reach]),
     )
+
+
+def tapered(reach: float, distance: float, opening_angle: float) -> float:
+    """Thickness [m] at a distance from a limb's root: a cubic, flat at the root and where it comes to the reach.
+
+    Half the opening angle is its steepest slope. A cone's slope at the root, where limbs are clamped, would bend those
+    that are turned onto each other at a point, which no mesh resolves.
+    """
+    s = min(1.0, opening_angle * distance / (3.0 * reach))
+    return reach * s * s * (3.0 - 2.0 * s)
 
 
 def moduli_at_nodes(mesh: Mesh, modulus: float | None, layer: float | None) -> np.ndarray:
