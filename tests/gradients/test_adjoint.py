@@ -143,24 +143,11 @@ def test_pytorch_swims_farther_along_the_gradient():
     np.testing.assert_allclose(commands.grad.numpy(), expected, rtol=0.0, atol=1e-10 * np.abs(expected).max())
 
 
-UNPROVEN = ("hub hinges",)
-
-
 @pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[] if name in ("vacuum", "held node") else pytest.mark.slow)
-        for name in TERMS
-        if name not in UNPROVEN
-    ],
+    "name", [pytest.param(name, marks=[] if name in ("vacuum", "held node") else pytest.mark.slow) for name in TERMS]
 )
 def test_every_term_has_the_gradient_of_dual_lanes(name):
+    """Where limbs touch to some 1e-9: conjugate gradients, which solve for them, leave that by rounding."""
     scene, numbers, commands = TERMS[name]
-    assert_is_that_of_dual_lanes(scene, ["commands", *numbers], commands)
-
-
-@pytest.mark.parametrize("name", UNPROVEN)
-def test_terms_without_a_comparison_are_refused(name):
-    scene, _, commands = TERMS[name]
-    with pytest.raises(ValueError, match=rf"no gradients of swims with {name} yet: differentiate has derivatives\.$"):
-        record(scene, commands)
+    tolerance = 1e-10 if scene.contact is None else 1e-8
+    assert_is_that_of_dual_lanes(scene, ["commands", *numbers], commands, tolerance)
