@@ -190,9 +190,11 @@ TERMS = {
         COMMANDS,
     ),
     "held node": (replace(SMALL, held_nodes=(0,)), ["robot.youngs_modulus", "fluid.drag_coefficient"], COMMANDS),
-    "along, body, loads, gravity and more": (
+    "along, body, contact, loads, gravity and more": (
         replace(
             SMALL,
+            contact=Contact(),
+            actuator=SmaPulse(2.9, 0.2, 0.3),
             robot=Seastar(
                 nodes_per_limb=5,
                 density=1100.0,
@@ -206,7 +208,7 @@ TERMS = {
             gravity=(0.3, -1.0),
         ),
         ["robot.density", "robot.youngs_modulus", "fluid.added_mass_coefficient", "actuator.peak_angle"],
-        COMMANDS,
+        TOUCHING,
     ),
 }
 
