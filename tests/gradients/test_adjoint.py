@@ -132,15 +132,33 @@ def test_refusals_are_sentences(slopes, reason):
         record(SMALL, COMMANDS).gradient(slopes, ["commands"])
 
 
+def example(name):
+    return runpy.run_path(str(Path(__file__).parents[2] / "examples" / name))
+
+
+def assert_is_slope_of_the_hub(found):
+    expected = differentiate(SMALL, COMMANDS, ["commands"]).by["commands"].hub[-1, 0]
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-10 * np.abs(expected).max())
+
+
 def test_pytorch_swims_farther_along_the_gradient():
     torch = pytest.importorskip("torch")
-    example = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "torch_gradients.py"))
-    distances = example["swim_far"](SMALL, steps=5)
+    its = example("torch_gradients.py")
+    distances = its["swim_far"](SMALL, steps=5)
     assert all(after > before for before, after in pairwise(distances))
     commands = torch.tensor(COMMANDS, requires_grad=True)
-    example["Swim"].apply(commands, SMALL)[-1, 0].backward()
-    expected = differentiate(SMALL, COMMANDS, ["commands"]).by["commands"].hub[-1, 0]
-    np.testing.assert_allclose(commands.grad.numpy(), expected, rtol=0.0, atol=1e-10 * np.abs(expected).max())
+    its["Swim"].apply(commands, SMALL)[-1, 0].backward()
+    assert_is_slope_of_the_hub(commands.grad.numpy())
+
+
+def test_jax_swims_farther_along_the_gradient():
+    jax = pytest.importorskip("jax")
+    its = example("jax_gradients.py")
+    distances = its["swim_far"](SMALL, steps=5)
+    assert all(after > before for before, after in pairwise(distances))
+    of_two = jax.vmap(jax.grad(lambda commands: its["hub_of"](SMALL)(commands)[-1, 0]))
+    found = of_two(jax.numpy.stack([jax.numpy.zeros_like(COMMANDS), COMMANDS]))
+    assert_is_slope_of_the_hub(found[1])
 
 
 @pytest.mark.parametrize(
