@@ -218,7 +218,7 @@ def shaped(points: int) -> dict[str, Any]:
 
 FITTED, SWUM = 4, 10
 """Radii along each limb that are fitted, and strokes that are measured."""
-LIMITS = {"maxfun": 200, "ftol": 1e-12}
+LIMITS = {"maxfun": 60, "ftol": 1e-12}
 """Of L-BFGS."""
 UNEVEN = 0.1
 """Standard deviation of the logarithm of the true radii."""
