@@ -125,9 +125,13 @@ def sooner(commands: Floats, goals: Floats) -> tuple[Floats, list[list[float]]]:
 
 
 def again(fidelity: Fidelity, commands: Floats, goals: Floats) -> list[float]:
-    """How near to the waypoints a swim comes at a fidelity, at ends of decisions [mm]."""
-    hub = record(wires(fidelity), commands, duration=EVERY).swim.hub
-    return [rounded(1e3 * float(np.hypot(*(hub - goal).T)[1:].min()), 3) for goal in goals]
+    """How near to the waypoints, one after the other, a swim comes at a fidelity, at ends of decisions [mm]."""
+    hub, begin, found = record(wires(fidelity), commands, duration=EVERY).swim.hub, 1, list[float]()
+    for goal in goals:
+        distance = np.hypot(*(hub[begin:] - goal).T)
+        found.append(rounded(1e3 * float(distance.min()), 3))
+        begin += int(distance.argmin())
+    return found
 
 
 def pulses() -> dict[str, Any]:
