@@ -1,6 +1,6 @@
 """Gradients of swims in JAX: commands with which the hub ends as far from its start as it can.
 
-    pip install jax
+    pip install -e ".[learners]"
     python examples/jax_gradients.py
 
 `hub_of` makes swims a function like any other of JAX's, which `jit`, `vmap` and `grad` take.

@@ -15,7 +15,7 @@ derivatives are differences, and by the gradient of the sum of squares (L-BFGS).
 
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -163,7 +163,7 @@ CHANGES = [*np.geomspace(0.2, 0.02, 24), 0.0, 0.0]
 
 def with_radii(scene: Scene, radii: Sequence[float]) -> Scene:
     """The scene with the same radii along all limbs [m]."""
-    limb = Limb(radius=tuple(np.asarray(radii).tolist()))
+    limb = Limb(radius=tuple(radii))
     return replace(scene, robot=replace(scene.robot, limbs=(limb,) * scene.robot.n_limbs))
 
 
@@ -174,7 +174,7 @@ def of_limbs(n_limbs: int, points: int) -> list[str]:
 
 def speed_and_work(scene: Scene, radii: Floats) -> tuple[float, float, Any]:
     """Speed [m/s] and work [J] per stroke of the straight gait with these radii, and the swim."""
-    swim = record(with_radii(scene, radii), np.tile(STRAIGHT, (SETTLING + MEASURED, 1)))
+    swim = record(with_radii(scene, radii.tolist()), np.tile(STRAIGHT, (SETTLING + MEASURED, 1)))
     way = np.linalg.norm(swim.swim.hub[-1] - swim.swim.hub[SETTLING])
     return float(way) / MEASURED, float(swim.swim.work[SETTLING:].sum()) / MEASURED, swim
 
@@ -235,7 +235,7 @@ def measured() -> tuple[Scene, list[str], Measurement]:
     truth = with_numbers(guess, {name: 1.6e-3 * float(np.exp(UNEVEN * rng.standard_normal())) for name in names})
     commands = rng.uniform(-0.9, 0.9, (SWUM, guess.robot.n_limbs))
     places = record(truth, commands).swim.positions[1:]
-    return guess, names, Measurement(1.0 + np.arange(SWUM), places, tuple(range(places.shape[1])), commands)
+    return guess, names, Measurement(np.arange(1.0, SWUM + 1.0), places, tuple(range(places.shape[1])), commands)
 
 
 def by_differences() -> dict[str, float]:
@@ -269,7 +269,7 @@ def by_gradients() -> dict[str, float]:
     }
 
 
-CELLS = {
+CELLS: dict[tuple[str, str], Callable[[], Any]] = {
     ("pulses", "pentagon"): pulses,
     **{("radii", name): partial(shaped, points) for name, points in POINTS.items()},
     ("fit", "differences"): by_differences,
