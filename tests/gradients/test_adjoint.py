@@ -41,11 +41,10 @@ def assert_is_that_of_dual_lanes(scene, names, commands=COMMANDS, tolerance=1e-1
     slopes = slopes_of(recorded.swim)
     for name, found in recorded.gradient(slopes, names).items():
         right = number_of(slopes, expected.by[name])
-        atol = tolerance * np.abs(right).max()
-        if scene.contact is not None:  # conjugate gradients leave rounding of all terms, whose sum may be small
-            sizes = Motion(*map(np.abs, expected.by[name]))
-            atol = 1e-8 * number_of({quantity: np.abs(each) for quantity, each in slopes.items()}, sizes).max()
-        np.testing.assert_allclose(found, right, rtol=0.0, atol=atol, err_msg=name)
+        sizes = Motion(*map(np.abs, expected.by[name]))  # of the terms, whose sum may be small
+        largest = number_of({quantity: np.abs(each) for quantity, each in slopes.items()}, sizes).max()
+        share = tolerance if scene.contact is None else 1e-8  # conjugate gradients leave rounding
+        np.testing.assert_allclose(found, right, rtol=0.0, atol=share * largest, err_msg=name)
     assert recorded.sentence == expected.sentence
     return recorded
 
