@@ -14,7 +14,7 @@ from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
 from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.gradients.history import CAPACITY, COUNTERS, INTERVAL, N_STEPS, OF_STEP, Kept, keeping_swim, n_numbers
-from seastar_gym.gradients.replay import pulling_back
+from seastar_gym.gradients.replay import Rows, Slopes, Tape, pulling_back
 from seastar_gym.gradients.stencils import arrays_of
 from seastar_gym.gradients.swim import (
     COUNTS,
@@ -107,7 +107,6 @@ class Record:
     """
 
     def __init__(self, scene: Scene, commands: Floats, state: State | None, duration: float):
-        refuse_unproven(scene)
         self._scene, self._commands, self._state, self._duration = scene, commands, state, duration
         self._rods, self._limits = make_rods(scene), make_limits(scene)
         self._scheme = scheme_of(scene.numerics.scheme, scene.numerics.damping)
@@ -253,12 +252,6 @@ class Record:
         return found
 
 
-def refuse_unproven(scene: Scene) -> None:
-    """ValueError for terms whose gradients have not been compared with dual lanes."""
-    if scene.robot.discretisation != "continuum":
-        raise ValueError("There are no gradients of swims with hub hinges yet: differentiate has derivatives.")
-
-
 def _actuation(n_limbs: int, n: int) -> Actuation:
     return Actuation(*(np.zeros((n_limbs, n)) for _ in range(2)))
 
@@ -281,18 +274,17 @@ class _Sweep:
         ]
         self._n_coefficients = _number(self._rods, self._moved)
         memory = make_work(one, stages)
-        n_rows = n_numbers(record._start.q.size, record._n_a, stages, one.n_points)
+        n_q = record._start.q.size
+        n_rows = n_numbers(n_q, record._n_a, stages, one.n_points)
         self._work = WorkOfGradient(*_on_tape(memory), None, np.zeros(1 + n_rows))  # type: ignore[call-arg]
-        self._rows = tuple(
-            np.zeros((n, ROW)) for n in (*2 * (record._start.q.size,), record._n_a, *3 * (record._n_limbs,))
-        )
+        self._rows = Rows(*(np.zeros((n, ROW)) for n in (n_q, n_q, record._n_a, *3 * (record._n_limbs,))))
         self._grow(ENTRIES)
         of_places, of_rest = slopes_of_heading(record.swim.positions, record._start.rest)
         in_places = given["positions"] + given["heading"][:, None, None] * of_places
         in_places[:, 0] += given["hub"]
         self.of_rest: Floats = np.tensordot(given["heading"], of_rest, axes=1)
         n, held = 2 * one.n_nodes, record._held
-        self.of_q, self.of_v = (np.zeros(record._start.q.size) for _ in range(2))
+        self.of_q, self.of_v = (np.zeros(n_q) for _ in range(2))
         self.of_turns: list[Floats] = []
         for k in range(len(record._turns), -1, -1):
             if k < len(record._turns):
@@ -326,28 +318,25 @@ class _Sweep:
         record = self._record
         times, turned = record._turns[k]
         kept = record._keep(k)
-        before = self._slopes[: 1 + self._n_coefficients].copy()
-        places = tuple(rows.view(np.int64) for rows in self._rows)
+        first = 1 + self._n_coefficients
+        before = self._slopes[:first].copy()
+        scene = (
+            self._rods, self._work, record._scheme, SCHEMES["implicit-euler"],
+            Actuation(self._rows.start, self._rows.end), record._limits, np.zeros((len(REPORT_ROWS), ROW)),
+        )  # fmt: skip
+        places = Rows(*(rows.view(np.int64) for rows in self._rows))
         while True:
-            of_q, of_v, of_a, of_turn = self.of_q.copy(), self.of_v.copy(), np.zeros(record._n_a), 0.0 * turned
-            outcome = pulling_back()(
-                self._rods, self._work, record._scheme, SCHEMES["implicit-euler"],
-                _actuation_of(self._rows), record._limits, np.zeros((len(REPORT_ROWS), ROW)), self._rows, places,
-                kept, times, turned, of_work, self._entries, self._entries.view(np.int32), self._slopes,
-                1 + self._n_coefficients, of_q, of_v, of_a, of_turn,
-            )  # fmt: skip
+            of = Slopes(self.of_q.copy(), self.of_v.copy(), np.zeros(record._n_a), 0.0 * turned, of_work)
+            tape = Tape(self._entries, self._entries.view(np.int32), self._slopes, first)
+            outcome = pulling_back()(scene, tape, self._rows, places, kept, times, turned, of)
             if outcome == 0:
                 break
             if outcome == 2:
                 raise RuntimeError("A time step could not be repeated as it was.")
             self._grow(2 * len(self._entries))
-            self._slopes[: len(before)] = before
-        self.of_q, self.of_v = of_q, of_v
-        return of_turn
-
-
-def _actuation_of(rows: tuple[Floats, ...]) -> Actuation:
-    return Actuation(rows[3], rows[4])
+            self._slopes[:first] = before
+        self.of_q, self.of_v = of.q, of.v
+        return of.shape
 
 
 def _on_tape(bundle: Any) -> Any:

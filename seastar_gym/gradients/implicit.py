@@ -9,6 +9,7 @@ which is the implicit function theorem. Positions keep their bits.
 """
 
 from seastar_gym.der.body.body import place_roots
+from seastar_gym.der.contact.coupled import solve_again_coupled
 from seastar_gym.der.linear.star_solution import substitute_star
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.stepping.momentum import correct_momentum
@@ -25,6 +26,7 @@ def correct_slopes(rods, work, scheme, k, stage, q_0, v_0, h, robots):
     substitute_star(rods, work, work.step)
     for row in range(2 * rods.n_free):
         store(work.step, row, slope_of(load(work.step, row)))
+    solve_again_coupled(rods, work, work.step)
     for row in range(2 * rods.n_nodes):
         move_slope(work, row, load(work.step, row), robots)
     if rods.body is not None:

@@ -9,16 +9,20 @@ to the one before.
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 from numba.core.compiler_lock import global_compiler_lock
+from numpy.typing import NDArray
 
 from seastar_gym.der import potential
-from seastar_gym.der.body.body import move_roots, place_roots
+from seastar_gym.der.body.body import carry_roots, gather_roots, move_roots, place_roots
+from seastar_gym.der.contact.contact import PRESSED, SLOT_ROWS, add_gap_gradient, gap, n_listed
+from seastar_gym.der.contact.coupled import solve_again_coupled
 from seastar_gym.der.energy import fill_moments
 from seastar_gym.der.linear import rigid_hub, star_matrix
 from seastar_gym.der.linear.star_matrix import eliminate_node, eliminate_root, store_root
-from seastar_gym.der.linear.star_solution import substitute_star
+from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.stepping import steps
 from seastar_gym.der.stepping.momentum import correct_momentum
@@ -37,7 +41,7 @@ from seastar_gym.gradients.history import (
 )
 from seastar_gym.simd import compilation, tape_lanes
 from seastar_gym.simd.compilation import entry_point, kernel
-from seastar_gym.simd.lanes import any_lane, borrow, load, load_number, splat, store, store_number
+from seastar_gym.simd.lanes import any_lane, borrow, load, load_number, splat, store, store_number, subtract_product
 from seastar_gym.simd.modules import COMPILATION, LANES, KernelModules
 from seastar_gym.simd.tape_lanes import (
     begin_tape,
@@ -70,6 +74,7 @@ def correct_on_tape(rods, work, scheme, k, stage, q_0, v_0, h, robots):
     resume_tape()
     factorise(rods, work, stage, None)
     substitute_star(rods, work, work.step)
+    solve_contact(rods, work)
     for row in range(2 * rods.n_nodes):
         store(work.q, row, less_step(load(work.q, row), load(work.step, row)))
     if rods.body is not None:
@@ -77,6 +82,39 @@ def correct_on_tape(rods, work, scheme, k, stage, q_0, v_0, h, robots):
         arc = load(rods.body.scale, 0) * load(work.step, row)
         store(work.q, row, less_step(load(work.q, row), arc))
     place_roots(rods, work.q)
+
+
+@kernel
+def solve_contact(rods, work):
+    """From x = H^-1 g of the star, in work.step, to the solution with contact's part of the Hessian, see coupled.py.
+
+    That is x - sum over the pairs of (H + C K C^T)^-1 c k (c x), c the gradient of a pair's gap: on the tape c x alone.
+    """
+    if work.contact is None or n_listed(work) == 0:
+        return
+    if not any_lane(load(work.contact.touching, 0) > 0.0):
+        return
+    rows, star, x, c = 2 * rods.n_free, work.contact.x, work.contact.ends, work.contact.seen
+    carry_roots(rods, work, work.step)
+    for row in range(2 * rods.n_points):
+        store(star, row, load(work.step, row))
+        store(x, row, load(work.step, row))
+    for slot in range(n_listed(work)):
+        k = load(work.contact.slots, SLOT_ROWS * slot + PRESSED)
+        if any_lane(k > 0.0):
+            y = k * gap(rods, work, slot, star)
+            pause_tape()
+            for row in range(2 * rods.n_points):
+                store(c, row, 0.0)
+            add_gap_gradient(rods, work, slot, splat(1.0), c)
+            gather_roots(rods, work, c)
+            solve_again(rods, work, c, work.step)
+            solve_again_coupled(rods, work, work.step)
+            resume_tape()
+            for row in range(rows):
+                store(x, row, subtract_product(load(x, row), y, load(work.step, row)))
+    for row in range(rows):
+        store(work.step, row, load(x, row))
 
 
 @kernel
@@ -178,127 +216,178 @@ def read_tape(entries, parents, slopes, first, end):
     slopes[0] = 0.0
 
 
+class Rows(NamedTuple):
+    """Rows on a tape: q, v, a, the limbs' rotations at both ends of an interval, and moments, shape (.., 2) each.
+
+    Or the same memory as whole numbers.
+    """
+
+    q: NDArray[Any]
+    v: NDArray[Any]
+    a: NDArray[Any]
+    start: NDArray[Any]
+    end: NDArray[Any]
+    moments: NDArray[Any]
+
+
+class Tape(NamedTuple):
+    """Memory of a tape.
+
+    entries, parents: Its entries, and the same memory as int32. slopes: Those of all places.
+    first: Place of q; v, a and rotations stand behind it, coefficients before it, whose slopes are added up.
+    """
+
+    entries: NDArray[np.float64]
+    parents: NDArray[np.int32]
+    slopes: NDArray[np.float64]
+    first: int
+
+
+class Slopes(NamedTuple):
+    """Slopes in q, v and a, in rotations, shape (n_intervals + 1, n_limbs), and in the actuators' work."""
+
+    q: NDArray[np.float64]
+    v: NDArray[np.float64]
+    a: NDArray[np.float64]
+    shape: NDArray[np.float64]
+    work: float
+
+
 @kernel
 def put_rows(rows, places, numbers, begin, first):
-    """Put numbers from `begin` on into rows, as what stands on the tape from place `first` on."""
+    """Put numbers from `begin` on into rows, as what stands on the tape from place `first` on.
+
+    Returns the place behind them.
+    """
     for row in range(rows.shape[0]):
         rows[row, 0] = numbers[begin + row]
         places[row, 1] = first + row
+    return first + rows.shape[0]
 
 
 @kernel
-def seed(slopes, places, of_rows):
+def put_state(rows, places, step, first):
+    """Put q, v and a at the beginning of a step on the tape, see put_rows."""
+    n_q = rows.q.shape[0]
+    behind = put_rows(rows.q, places.q, step, OF_STEP, first)
+    behind = put_rows(rows.v, places.v, step, OF_STEP + n_q, behind)
+    return put_rows(rows.a, places.a, step, OF_STEP + 2 * n_q, behind)
+
+
+@kernel
+def seed(tape, places, of_rows):
+    """Give what stands in rows its slopes."""
     for row in range(places.shape[0]):
-        slopes[places[row, 1]] += of_rows[row]
+        tape.slopes[places[row, 1]] += of_rows[row]
+        of_rows[row] = 0.0
 
 
 @kernel
-def take_slopes(slopes, first, of_rows):
-    """Move the slopes from place `first` on to rows."""
+def take_slopes(tape, first, of_rows):
+    """Move the slopes from place `first` on to those of rows; returns the place behind them."""
     for row in range(of_rows.shape[0]):
-        of_rows[row] = slopes[first + row]
-        slopes[first + row] = 0.0
+        of_rows[row] += tape.slopes[first + row]
+        tape.slopes[first + row] = 0.0
+    return first + of_rows.shape[0]
+
+
+@kernel
+def pull_through_step(scene, tape, rows, places, step, h, start, end, of, k):
+    """Take slopes through a step of interval k, of length h [s]. start, end: Rotations at both ends of the interval.
+
+    Returns 0; 1 if the tape is too short, 2 if the step was not the one that was kept.
+    """
+    rods, work, scheme, fallback, actuation, limits, report = scene
+    at_start = put_state(rows, places, step, tape.first)
+    behind = put_rows(rows.end, places.end, end, 0, put_rows(rows.start, places.start, start, 0, at_start))
+    begin = OF_STEP + 2 * rows.q.shape[0] + rows.a.shape[0]
+    work.solution[0] = 0.0
+    for row in range(step.shape[0] - begin):
+        work.solution[1 + row] = step[begin + row]
+    report[:] = 0.0
+    begin_tape(tape.entries, behind)
+    same = replay_step_on_tape(
+        borrow(rods), borrow(work), borrow(scheme), borrow(fallback), borrow(actuation), borrow(rows.q),
+        borrow(rows.v), borrow(rows.a), borrow(step), h, borrow(limits), borrow(report),
+    )  # fmt: skip
+    if tape_is_full() != 0:
+        return 1
+    if not same:
+        return 2
+    seed(tape, places.q, of.q)
+    seed(tape, places.v, of.v)
+    seed(tape, places.a, of.a)
+    read_tape(tape.entries, tape.parents, tape.slopes, behind, end_of_tape())
+    at_a = take_slopes(tape, take_slopes(tape, tape.first, of.q), of.v)
+    at_end = take_slopes(tape, take_slopes(tape, at_a, of.a), of.shape[k])
+    take_slopes(tape, at_end, of.shape[k + 1])
+    return 0
+
+
+@kernel
+def pull_through_work(scene, tape, rows, places, step, shape, of, k):
+    """Take the slope in work to the state where interval k begins; returns 0, or 1 if the tape is too short.
+
+    The work is the sum of (m_k + m_k+1)(shape_k+1 - shape_k)/2, m the moments where intervals begin and end.
+    """
+    rods, work, _, _, actuation, _, _ = scene
+    at_start = put_rows(rows.q, places.q, step, OF_STEP, tape.first)
+    at_end = put_rows(rows.start, places.start, shape[k], 0, at_start)
+    behind = put_rows(rows.end, places.end, shape[k], 0, at_end)
+    begin_tape(tape.entries, behind)
+    fill_moments_on_tape(borrow(rods), borrow(work), borrow(actuation), borrow(rows.q), borrow(rows.moments))
+    if tape_is_full() != 0:
+        return 1
+    for limb in range(shape.shape[1]):
+        half = 0.5 * of.work * rows.moments[limb, 0]
+        for other in (k, k - 1):  # the intervals that begin and that end here
+            if 0 <= other < shape.shape[0] - 1:
+                turned = shape[other + 1, limb] - shape[other, limb]
+                tape.slopes[places.moments[limb, 1]] += 0.5 * of.work * turned
+                of.shape[other + 1, limb] += half
+                of.shape[other, limb] -= half
+    read_tape(tape.entries, tape.parents, tape.slopes, behind, end_of_tape())
+    take_slopes(tape, tape.first, of.q)
+    take_slopes(tape, at_start, of.shape[k])
+    take_slopes(tape, at_end, of.shape[k])
+    return 0
+
+
+@kernel
+def pull_through_roots(scene, tape, rows, places, step, of):
+    """Take slopes through what puts roots of limbs on a body before the first step."""
+    behind = put_state(rows, places, step, tape.first)
+    begin_tape(tape.entries, behind)
+    move_roots_on_tape(borrow(scene[0]), borrow(rows.q), borrow(rows.v))
+    seed(tape, places.q, of.q)
+    seed(tape, places.v, of.v)
+    read_tape(tape.entries, tape.parents, tape.slopes, behind, end_of_tape())
+    take_slopes(tape, take_slopes(tape, tape.first, of.q), of.v)
 
 
 @entry_point
-def _pull_back(
-    rods, work, scheme, fallback, actuation, limits, report, rows, places, kept, times, shape, of_work, entries,
-    parents, slopes, first, of_q, of_v, of_a, of_shape,
-):  # fmt: skip
-    """Take slopes at the end of a swim through some intervals to its beginning, in place: to those in the state, in the
-    rotations of limbs and, added up, in coefficients.
+def _pull_back(scene, tape, rows, places, kept, times, shape, of):
+    """Take slopes at the end of a swim through some intervals to its beginning, in place.
 
-    rows, places: q, v, a, both rotations of an interval and moments, shape (.., 2) each, and the same memory as whole
-        numbers.
+    scene: rods, work, scheme, fallback, actuation, limits and report, on a tape.
     kept: What history.py has kept of every step, shape (n_steps + 1, n_rows); the last begins where the swim ended.
     times, shape: Ends of the intervals [s], shape (n + 1,), and rotations then [rad], shape (n + 1, n_limbs).
-    of_work: Slope in the actuators' work in these intervals.
-    entries, parents: Memory of the tape, and the same as int32. slopes: Those of all places.
-    first: Place of q; coefficients stand before it, and their slopes are added up.
-    of_q, of_v, of_a: Slopes in the state at the end, then at the beginning. of_shape: Those in `shape`, added to.
+    of: Slopes at the end, then at the beginning; those in rotations are added to.
 
     Returns 0; 1 if the tape is too short, 2 if a step was not the one that was kept.
     """
-    q, v, a, start, end, moments = rows
-    q_places, v_places, a_places, start_places, end_places, moment_places = places
-    n_q, n_a, n_limbs = q.shape[0], a.shape[0], start.shape[0]
-    at_v, at_a, at_start = first + n_q, first + 2 * n_q, first + 2 * n_q + n_a
-    at_end = at_start + n_limbs
-    behind = at_end + n_limbs
-    numbers, n_intervals = kept.shape[1], times.shape[0] - 1
-    for n in range(kept.shape[0] - 1, -1, -1):
-        step = kept[n]
+    last = kept.shape[0] - 1
+    for n in range(last, -1, -1):
+        step, outcome = kept[n], 0
         k = int(step[INTERVAL])
-        if n < kept.shape[0] - 1:
-            put_rows(q, q_places, step, OF_STEP, first)
-            put_rows(v, v_places, step, OF_STEP + n_q, at_v)
-            put_rows(a, a_places, step, OF_STEP + 2 * n_q, at_a)
-            put_rows(start, start_places, shape[k], 0, at_start)
-            put_rows(end, end_places, shape[k + 1], 0, at_end)
-            work.solution[0] = 0.0
-            begin = OF_STEP + 2 * n_q + n_a
-            for row in range(numbers - begin):
-                work.solution[1 + row] = step[begin + row]
-            report[:] = 0.0
-            begin_tape(entries, behind)
+        if n < last:
             h = step[SIZE] * (times[k + 1] - times[k])
-            same = replay_step_on_tape(
-                borrow(rods), borrow(work), borrow(scheme), borrow(fallback), borrow(actuation), borrow(q), borrow(v),
-                borrow(a), borrow(step), h, borrow(limits), borrow(report),
-            )  # fmt: skip
-            if tape_is_full() != 0:
-                return 1
-            if not same:
-                return 2
-            seed(slopes, q_places, of_q)
-            seed(slopes, v_places, of_v)
-            seed(slopes, a_places, of_a)
-            read_tape(entries, parents, slopes, behind, end_of_tape())
-            take_slopes(slopes, first, of_q)
-            take_slopes(slopes, at_v, of_v)
-            take_slopes(slopes, at_a, of_a)
-            for limb in range(n_limbs):
-                of_shape[k, limb] += slopes[at_start + limb]
-                of_shape[k + 1, limb] += slopes[at_end + limb]
-                slopes[at_start + limb] = 0.0
-                slopes[at_end + limb] = 0.0
-        if of_work != 0.0 and (n == 0 or kept[n - 1, INTERVAL] != k):
-            # Moments m at the ends of intervals: the work is the sum of (m_k + m_k+1)(shape_k+1 - shape_k)/2.
-            put_rows(q, q_places, step, OF_STEP, first)
-            put_rows(start, start_places, shape[k], 0, at_start)
-            put_rows(end, end_places, shape[k], 0, at_end)
-            begin_tape(entries, behind)
-            fill_moments_on_tape(borrow(rods), borrow(work), borrow(actuation), borrow(q), borrow(moments))
-            for limb in range(n_limbs):
-                turned, half = 0.0, 0.5 * of_work * moments[limb, 0]
-                if k < n_intervals:
-                    turned += shape[k + 1, limb] - shape[k, limb]
-                    of_shape[k + 1, limb] += half
-                    of_shape[k, limb] -= half
-                if k > 0:
-                    turned += shape[k, limb] - shape[k - 1, limb]
-                    of_shape[k, limb] += half
-                    of_shape[k - 1, limb] -= half
-                slopes[moment_places[limb, 1]] += 0.5 * of_work * turned
-            if tape_is_full() != 0:
-                return 1
-            read_tape(entries, parents, slopes, behind, end_of_tape())
-            for row in range(n_q):
-                of_q[row] += slopes[first + row]
-                slopes[first + row] = 0.0
-            for limb in range(n_limbs):
-                of_shape[k, limb] += slopes[at_start + limb] + slopes[at_end + limb]
-                slopes[at_start + limb] = 0.0
-                slopes[at_end + limb] = 0.0
-    put_rows(q, q_places, kept[0], OF_STEP, first)
-    put_rows(v, v_places, kept[0], OF_STEP + n_q, at_v)
-    begin_tape(entries, behind)
-    move_roots_on_tape(borrow(rods), borrow(q), borrow(v))
-    seed(slopes, q_places, of_q)
-    seed(slopes, v_places, of_v)
-    read_tape(entries, parents, slopes, behind, end_of_tape())
-    take_slopes(slopes, first, of_q)
-    take_slopes(slopes, at_v, of_v)
+            outcome = pull_through_step(scene, tape, rows, places, step, h, shape[k], shape[k + 1], of, k)
+        if outcome == 0 and of.work != 0.0 and (n == 0 or kept[n - 1, INTERVAL] != k):
+            outcome = pull_through_work(scene, tape, rows, places, step, shape, of, k)
+        if outcome != 0:
+            return outcome
+    pull_through_roots(scene, tape, rows, places, kept[0], of)
     return 0
 
 

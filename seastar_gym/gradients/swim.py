@@ -100,8 +100,9 @@ def differentiate(
 
     A direction takes a lane, so that N_LANES of them cost some three to four swims of a robot alone. Stages are
     differentiated as solved exactly: what Newton's tolerance leaves of them is in the swim, not in its derivatives. How
-    steps were halved, limbs touched and energies were cut is taken as it came. At the ends of [-1, 1], derivatives in
-    commands are those from within; where a wire's rotation has a corner, they are the mean of both sides.
+    steps were halved, limbs touched and energies were cut is taken as it came; where limbs begin or cease to touch,
+    derivatives jump. At the ends of [-1, 1], derivatives in commands are those from within; where a wire's rotation has
+    a corner, they are the mean of both sides.
     """
     told, length = checked_swim(scene, commands, duration)
     require_names(by)
@@ -127,8 +128,6 @@ def checked_swim(scene: Scene, commands: ArrayLike, duration: float | None) -> t
     require_kind("scene", scene, Scene, "a Scene")
     if scene.n_robots is not None:
         raise ValueError("Derivatives need the scene of one robot, such as scene.of_robot(0).")
-    if scene.contact is not None:  # which differences of swims did not confirm where limbs touched
-        raise ValueError("There are no derivatives of swims with contact yet.")
     told = as_finite("commands", commands, (None, scene.robot.n_limbs))
     length = scene.actuator.period if duration is None else duration
     require_duration(length, scene.numerics.step)

@@ -20,7 +20,13 @@ from seastar_gym.der.contact.contact import (
     n_listed,
     not_touching,
 )
-from seastar_gym.der.contact.coupled import add_contact_product, dot, solve_coupled, solver_iterations
+from seastar_gym.der.contact.coupled import (
+    add_contact_product,
+    dot,
+    solve_again_coupled,
+    solve_coupled,
+    solver_iterations,
+)
 from seastar_gym.der.contact.crossing import edges_cross, on_their_sides, without_new_crossings
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
@@ -334,6 +340,20 @@ def test_the_step_solves_the_star_and_contact_together(discretisation):
     assert np.abs(x - star).max() > 1e-2 * np.abs(star).max()
     np.testing.assert_allclose(x - star, moved, rtol=0.0, atol=1e-5 * np.abs(moved).max())
     assert not touching.work.contact.missed.any()
+
+
+def test_derivatives_are_solved_to_rounding():
+    touching = touching_limbs()
+    rods, work = touching.rods, touching.work
+    star, x, _, _ = steps(touching)
+    iterations, found = plain(solver_iterations.plain(work)), star.copy()
+    solve_again_coupled.plain(rods, work, found)
+    taken, moved = np.zeros_like(x), np.zeros_like(x)
+    add_contact_product.plain(rods, work, found, -1.0, taken)
+    solve_again.plain(rods, work, taken, moved)
+    np.testing.assert_allclose(found - star, moved, rtol=0.0, atol=1e-9 * np.abs(moved).max())
+    np.testing.assert_allclose(found, x, rtol=0.0, atol=1e-4 * np.abs(x).max())
+    np.testing.assert_array_equal(plain(solver_iterations.plain(work)), iterations)
 
 
 def test_contact_makes_the_matrix_stiffer_so_its_decrement_is_smaller():

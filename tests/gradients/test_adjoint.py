@@ -12,7 +12,7 @@ import pytest
 import seastar_gym.gradients.adjoint as adjoint
 from gradients.test_differentiate import COMMANDS, SMALL, TERMS, differences, swum
 from seastar_gym import Numerics, Simulator, SmaWires, ThermalSma, Water
-from seastar_gym.gradients import differentiate, gradient, record
+from seastar_gym.gradients import Motion, differentiate, gradient, record
 from seastar_gym.gradients.adjoint import QUANTITIES
 from seastar_gym.scene.per_robot import at, with_numbers
 
@@ -41,7 +41,10 @@ def assert_is_that_of_dual_lanes(scene, names, commands=COMMANDS, tolerance=1e-1
     slopes = slopes_of(recorded.swim)
     for name, found in recorded.gradient(slopes, names).items():
         right = number_of(slopes, expected.by[name])
-        np.testing.assert_allclose(found, right, rtol=0.0, atol=tolerance * np.abs(right).max(), err_msg=name)
+        sizes = Motion(*map(np.abs, expected.by[name]))  # of the terms, whose sum may be small
+        largest = number_of({quantity: np.abs(each) for quantity, each in slopes.items()}, sizes).max()
+        share = tolerance if scene.contact is None else 1e-8  # conjugate gradients leave rounding
+        np.testing.assert_allclose(found, right, rtol=0.0, atol=share * largest, err_msg=name)
     assert recorded.sentence == expected.sentence
     return recorded
 
@@ -132,35 +135,38 @@ def test_refusals_are_sentences(slopes, reason):
         record(SMALL, COMMANDS).gradient(slopes, ["commands"])
 
 
+def example(name):
+    return runpy.run_path(str(Path(__file__).parents[2] / "examples" / name))
+
+
+def assert_is_slope_of_the_hub(found):
+    expected = differentiate(SMALL, COMMANDS, ["commands"]).by["commands"].hub[-1, 0]
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-10 * np.abs(expected).max())
+
+
 def test_pytorch_swims_farther_along_the_gradient():
     torch = pytest.importorskip("torch")
-    example = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "torch_gradients.py"))
-    distances = example["swim_far"](SMALL, steps=5)
+    its = example("torch_gradients.py")
+    distances = its["swim_far"](SMALL, steps=5)
     assert all(after > before for before, after in pairwise(distances))
     commands = torch.tensor(COMMANDS, requires_grad=True)
-    example["Swim"].apply(commands, SMALL)[-1, 0].backward()
-    expected = differentiate(SMALL, COMMANDS, ["commands"]).by["commands"].hub[-1, 0]
-    np.testing.assert_allclose(commands.grad.numpy(), expected, rtol=0.0, atol=1e-10 * np.abs(expected).max())
+    its["Swim"].apply(commands, SMALL)[-1, 0].backward()
+    assert_is_slope_of_the_hub(commands.grad.numpy())
 
 
-UNPROVEN = ("hub hinges",)
+def test_jax_swims_farther_along_the_gradient():
+    jax = pytest.importorskip("jax")
+    its = example("jax_gradients.py")
+    distances = its["swim_far"](SMALL, steps=5)
+    assert all(after > before for before, after in pairwise(distances))
+    of_two = jax.vmap(jax.grad(lambda commands: its["hub_of"](SMALL)(commands)[-1, 0]))
+    found = of_two(jax.numpy.stack([jax.numpy.zeros_like(COMMANDS), COMMANDS]))
+    assert_is_slope_of_the_hub(found[1])
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[] if name in ("vacuum", "held node") else pytest.mark.slow)
-        for name in TERMS
-        if name not in UNPROVEN
-    ],
+    "name", [pytest.param(name, marks=[] if name in ("vacuum", "held node") else pytest.mark.slow) for name in TERMS]
 )
 def test_every_term_has_the_gradient_of_dual_lanes(name):
     scene, numbers, commands = TERMS[name]
     assert_is_that_of_dual_lanes(scene, ["commands", *numbers], commands)
-
-
-@pytest.mark.parametrize("name", UNPROVEN)
-def test_terms_without_a_comparison_are_refused(name):
-    scene, _, commands = TERMS[name]
-    with pytest.raises(ValueError, match=rf"no gradients of swims with {name} yet: differentiate has derivatives\.$"):
-        record(scene, commands)

@@ -163,9 +163,17 @@ def test_halved_steps_are_of_their_branch():
 
 # Other terms; each of these scenes is compiled for minutes
 
+TOUCHING = np.array([[0.9, -0.9, 0.0, 0.8, -0.7], [-0.8, 0.9, 0.3, -0.9, 0.5], [0.9, -0.9, 0.7, 0.6, -0.9]])
+FAR = SmaPulse(1.2, 0.1, 0.2)
+"""Pulses with which limbs touch by the commands TOUCHING."""
 FLUID = Water(950.0, 1.3, 0.1, Vortex(0.02, 0.1, -0.05, 0.06), 0.8)
 TERMS = {
     "vacuum": (replace(SMALL, fluid=None), ["robot.density"], COMMANDS),
+    "contact": (
+        replace(SMALL, contact=Contact(), actuator=FAR),
+        ["robot.youngs_modulus", "robot.rod_radius"],
+        TOUCHING,
+    ),
     "hub hinges": (
         replace(SMALL, robot=Seastar(nodes_per_limb=5, discretisation="chapter")),
         ["robot.youngs_modulus"],
@@ -182,9 +190,11 @@ TERMS = {
         COMMANDS,
     ),
     "held node": (replace(SMALL, held_nodes=(0,)), ["robot.youngs_modulus", "fluid.drag_coefficient"], COMMANDS),
-    "along, body, loads, gravity and more": (
+    "along, body, contact, loads, gravity and more": (
         replace(
             SMALL,
+            contact=Contact(),
+            actuator=SmaPulse(2.9, 0.2, 0.3),
             robot=Seastar(
                 nodes_per_limb=5,
                 density=1100.0,
@@ -198,7 +208,7 @@ TERMS = {
             gravity=(0.3, -1.0),
         ),
         ["robot.density", "robot.youngs_modulus", "fluid.added_mass_coefficient", "actuator.peak_angle"],
-        COMMANDS,
+        TOUCHING,
     ),
 }
 
@@ -207,7 +217,34 @@ TERMS = {
 @pytest.mark.parametrize("name", TERMS)
 def test_every_term_has_the_derivatives_of_its_differences(name):
     scene, numbers, commands = TERMS[name]
-    assert_is_derivative(scene, numbers, commands=commands)
+    touch = scene.contact is not None
+    found = assert_is_derivative(scene, numbers, commands=commands, share=1e-5 if touch else 1e-4)
+    assert ("some limbs touched" in found.sentence) == touch
+
+
+@pytest.mark.slow
+def test_derivatives_jump_where_limbs_begin_to_touch():
+    """Swims are continuous there, but differences across such a place, 1e-4 of a radius away, are no derivatives."""
+    scene, name, commands = TERMS["contact"][0], "robot.rod_radius", TOUCHING
+
+    def at_share(share):
+        number = at(scene, name) * (1.0 + share)
+        found = differentiate(with_numbers(scene, {name: number}), commands, [name])
+        return found.swim.velocities, number * found.by[name].velocities
+
+    (low, below), (high, above) = ((share, at_share(share)) for share in (-2e-4, 2e-4))
+    jump = np.abs(above[1] - below[1]).max()
+    assert jump > 0.5 * np.abs(below[1]).max()
+    while high - low > 1e-12:
+        middle = 0.5 * (low + high)
+        found = at_share(middle)
+        if np.abs(found[1] - below[1]).max() > 0.5 * jump:
+            high, above = middle, found
+        else:
+            low, below = middle, found
+    assert np.abs(above[1] - below[1]).max() > 0.9 * jump
+    assert np.abs(above[0] - below[0]).max() < 1e-9 * np.abs(below[0]).max()
+    assert 9e-5 < low < 1e-4
 
 
 # Refusals
@@ -232,8 +269,3 @@ def test_refusals_are_sentences(by, reason):
 def test_scenes_of_many_robots_are_refused():
     with pytest.raises(ValueError, match=r"scene of one robot.*\.$"):
         differentiate(replace(SMALL, actuator=SmaPulse((0.3, 0.4))), COMMANDS, ["commands"])
-
-
-def test_contact_is_refused():
-    with pytest.raises(ValueError, match=r"no derivatives of swims with contact yet\.$"):
-        differentiate(replace(SMALL, contact=Contact()), COMMANDS, ["commands"])

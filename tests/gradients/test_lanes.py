@@ -4,8 +4,11 @@ import numba
 import numpy as np
 import pytest
 
+from seastar_gym.gradients.implicit import correct_slopes
+from seastar_gym.gradients.kernels import DualKernels
+from seastar_gym.gradients.replay import TapeKernels, replay_step
 from seastar_gym.simd import dual_lanes, tape_lanes
-from seastar_gym.simd.compilation import STRICT
+from seastar_gym.simd.compilation import STRICT, Kernel
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="these lanes have compiled code alone")
 
@@ -121,3 +124,18 @@ def test_a_tape_has_the_derivatives_of_calculus(on_tape):
 def test_a_tape_that_is_too_short_says_so(on_tape):
     *_, end, full = on_tape(10)
     assert (end, full != 0) == (10, True)
+
+
+@pytest.mark.parametrize(
+    ("kind", "lanes", "outside"),
+    [(TapeKernels, tape_lanes, replay_step), (DualKernels, dual_lanes, correct_slopes)],
+)
+def test_kernels_call_kernels_on_their_own_lanes_alone(kind, lanes, outside):
+    """Others would write to rows of another width, into memory that is not theirs."""
+    kernels = kind()
+    kernels(outside)
+    values = [value for module in kernels._modules.values() for value in vars(module).values()]
+    called = [value.py_func for value in values if isinstance(value, Kernel)]
+    wrong = [each.__qualname__ for each in called if each.__globals__.get("load", lanes.load) is not lanes.load]
+    assert len(called) > 100
+    assert not wrong

@@ -17,6 +17,7 @@ from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, any_lane, load, select, splat, store, subtract_product
 
 ACCURACY = 1e-10  # of the decrement: what may be left of it, and about what rounding leaves at steps of 5 ms
+TO_ROUNDING = 1e-22  # what conjugate gradients leave of derivatives: of what contact changes, squared, in the norm of H
 MOST_ITERATIONS = 200  # two limbs that touch need some 3 to 8; beyond, the robot halves its step
 
 
@@ -57,31 +58,60 @@ def solve_coupled(rods, work, robots, decrement):
     if work.contact is None or n_listed(work) == 0:
         return decrement
     contact = work.contact
-    x, r, z, p, Hp, w = contact.x, contact.r, contact.z, contact.p, contact.Hp, contact.w
-    rows = 2 * rods.n_free
-    zero = splat(0.0)
+    x, star = contact.x, contact.ends  # no longer needed for the list
     substitute_star(rods, work, x)
-    running = robots & (load(work.contact.touching, 0) > 0.0)
+    running = robots & (load(contact.touching, 0) > 0.0)
     if not any_lane(running):
         return decrement
-    star = work.contact.ends  # no longer needed for the list
-    for row in range(rows):
+    for row in range(2 * rods.n_free):
         store(star, row, load(x, row))
+    running, decrement, iterations = share_step(rods, work, x, star, running, decrement, ACCURACY)
+    store(contact.solves, 0, load(contact.solves, 0) + iterations)
+    store(contact.missed, 0, select(running, 1.0, load(contact.missed, 0)))
+    return decrement
+
+
+@kernel
+def solve_again_coupled(rods, work, x):
+    """From H^-1 b, rows x, to (H + C K C^T)^-1 b, to rounding; x stays as it is where limbs do not touch."""
+    if work.contact is None or n_listed(work) == 0:
+        return
+    running = load(work.contact.touching, 0) > 0.0
+    if any_lane(running):
+        share_step(rods, work, x, None, running, splat(0.0), TO_ROUNDING)
+
+
+@kernel
+def share_step(rods, work, x, star, running, decrement, accuracy):
+    """Conjugate gradients from the star's step, rows x, to that of the star and contact, in place.
+
+    star: The star's step once more. decrement: That of the star's step [J]. None: there is none, and what is left at
+    first stands in its place. accuracy: What may be left, of the decrement.
+
+    Returns the mask of the robots among `running` that did not arrive, the decrement and the iterations.
+    """
+    contact = work.contact
+    r, z, p, Hp, w = contact.r, contact.z, contact.p, contact.Hp, contact.w
+    rows, zero = 2 * rods.n_free, splat(0.0)
+    for row in range(rows):
         store(r, row, zero)
     add_contact_product(rods, work, x, -1.0, r)
     solve_again(rods, work, r, z)
     for row in range(rows):
         store(p, row, load(z, row))
         store(Hp, row, load(r, row))
-    left, iterations = dot(rods, r, z), 0
-    running = running & (left > ACCURACY * decrement)
+    left, iterations, count = dot(rods, r, z), 0, zero
+    if star is None:
+        decrement = left
+    running = running & (left > accuracy * decrement)
     while any_lane(running) and iterations < MOST_ITERATIONS:
-        store(contact.solves, 0, load(contact.solves, 0) + select(running, 1.0, zero))
+        count += select(running, splat(1.0), zero)
         for row in range(rows):
             store(w, row, load(Hp, row))
         add_contact_product(rods, work, p, 1.0, w)
         alpha = select(running, left / dot(rods, p, w), zero)
-        decrement = select(running, add_product(decrement, alpha, dot(rods, star, Hp)), decrement)
+        if star is not None:
+            decrement = select(running, add_product(decrement, alpha, dot(rods, star, Hp)), decrement)
         for row in range(rows):
             store(x, row, select(running, add_product(load(x, row), alpha, load(p, row)), load(x, row)))
             store(r, row, subtract_product(load(r, row), alpha, load(w, row)))
@@ -91,7 +121,6 @@ def solve_coupled(rods, work, robots, decrement):
         for row in range(rows):
             store(p, row, add_product(load(z, row), beta, load(p, row)))
             store(Hp, row, add_product(load(r, row), beta, load(Hp, row)))
-        running = running & (left > ACCURACY * decrement)
+        running = running & (left > accuracy * decrement)
         iterations += 1
-    store(work.contact.missed, 0, select(running, 1.0, load(work.contact.missed, 0)))
-    return decrement
+    return running, decrement, count
