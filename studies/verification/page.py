@@ -66,8 +66,7 @@ gives.
 `python -m studies.verification` shows every comparison and writes this page, which has a part of them;
 `tests/test_verification.py` holds each to a bound. Robot and fluid are the chapter's, l is the length of an edge, and
 *continuum* and *chapter* are the [two discretisations](model.md#two-discretisations). A difference is ours minus the
-reference; in brackets, over the reference. None of this is a comparison with an experiment: see
-[validation](validation.md).
+reference; in brackets, over the reference.
 """
 
 

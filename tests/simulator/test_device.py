@@ -296,7 +296,11 @@ EXACT = re.compile(r"(neg|abs|mov|selp|min|max|setp\.\w+|cvt\.(rmi|rzi)(\.s64|\.
 CODES = {scheme: replace(SMALL, numerics=Numerics(scheme, 0.005)) for scheme in get_args(SchemeName)}
 
 
-@pytest.mark.parametrize("scene", [*CODES.values(), scenes()[f"sdirk2, {EVERYTHING}"]], ids=[*CODES, "everything"])
+@pytest.mark.parametrize(
+    "scene",
+    [*CODES.values(), pytest.param(scenes()[f"sdirk2, {EVERYTHING}"], marks=pytest.mark.slow)],
+    ids=[*CODES, "everything"],
+)
 def test_the_code_for_gpus_rounds_every_operation_by_itself_and_calls_nothing(scene):
     assert_strict(code_of(scene))
 

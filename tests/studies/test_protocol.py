@@ -30,6 +30,7 @@ def test_a_bench_finds_the_wires():
     np.testing.assert_allclose(found["peak_angle"], np.array(true.limb_strengths) * true.actuator.peak_angle, rtol=0.05)
 
 
+@pytest.mark.slow
 def test_every_step_of_the_protocol_runs(monkeypatch):
     for name, value in {"SWIMS": 2, "PULSES": 20, "SECONDS": 7.0, "DRAWS": 8, "GAITS": ("lagged",)}.items():
         monkeypatch.setattr(protocol, name, value)

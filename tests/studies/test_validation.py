@@ -250,6 +250,7 @@ def test_the_tracked_swimmer_turns_away_from_limbs_that_heat_in_the_first_stroke
     assert np.all(np.abs(letters.turns[~turning]) < 0.2) and np.all(letters.ways > 0.03)
 
 
+@pytest.mark.slow
 def test_letters_of_the_left_and_of_the_right_turn_samples_alike():
     left, right = (turns.swum(letter, "all four", 10, samples(4)) for letter in "FE")
     np.testing.assert_allclose(left, right, rtol=1e-3, atol=1e-6)
