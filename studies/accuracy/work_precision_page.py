@@ -138,8 +138,7 @@ def _doubt(problems: Mapping[str, Any]) -> str:
         if not settled(found):
             said += (
                 f" Not so for {name}, where {PERCENT * found['limit_error']:.2g} % are in doubt on the worst sequence: "
-                "near the hub, limbs that are pressed flat onto each other give way over less than the reference's "
-                "edges resolve ([contact](#contact)). The picture shows medians there."
+                "it was measured with [cones near the hub](#contact). The picture shows medians there."
             )
     return said.strip()
 
