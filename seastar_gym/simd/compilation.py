@@ -21,6 +21,7 @@ from pathlib import Path
 import llvmlite
 import numba
 import numpy as np
+from numba.core import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache, UserWideCacheLocator
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
@@ -34,15 +35,21 @@ DIGEST_SIZE = hashlib.sha256().digest_size  # bytes
 
 # error_model="numpy": divisions follow IEEE instead of raising; failure is a status, not an exception.
 STRICT = {"error_model": "numpy", "nogil": True, "pipeline_class": EntryCompiler}
-# Without wrappers for Python, which would be a third of the compilation.
-BLOCK = {**STRICT, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": KernelCompiler}
+# Without wrappers for Python, which would be a third of the compilation, and without counts of references.
+BLOCK = {
+    **STRICT, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False, "pipeline_class": KernelCompiler,
+}  # fmt: skip
 
 
 class Kernel(CPUDispatcher):
     """A building block of compiled code, without the wrapper that a call from Python would need."""
 
     def compile(self, sig):
-        """Compile for these types of arguments, unless it was: numba's own method would have every kernel timed."""
+        """Compile for these types of arguments, unless it was: numba's own method would have every kernel timed.
+
+        A literal 0 is any integer: what it decides goes when the caller is optimised.
+        """
+        sig = tuple(map(types.unliteral, sig))
         with global_compiler_lock:
             if sig not in self.overloads:
                 with self._compiling_counter:

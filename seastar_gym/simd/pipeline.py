@@ -15,9 +15,11 @@ from numba.core.compiler_machinery import FunctionPass, LoweringPass, register_p
 from numba.core.ir_utils import get_definition, guard
 from numba.core.typed_passes import (
     InlineOverloads,
+    IRLegalization,
     NativeLowering,
     NopythonRewrites,
     NoPythonSupportedFeatureValidation,
+    PreLowerStripPhis,
 )
 from numba.core.untyped_passes import (
     FindLiterallyCalls,
@@ -25,6 +27,7 @@ from numba.core.untyped_passes import (
     InlineInlinables,
     LiteralUnroll,
     MakeFunctionToJitFunction,
+    ReconstructSSA,
     RewriteDynamicRaises,
     RewriteSemanticConstants,
     WithLifting,
@@ -179,18 +182,21 @@ NEEDLESS = frozenset({
     WithLifting, InlineClosureLikes, RewriteDynamicRaises, MakeFunctionToJitFunction, InlineInlinables,
     FindLiterallyCalls, LiteralUnroll, InlineOverloads, NopythonRewrites, NoPythonSupportedFeatureValidation,
 })  # fmt: skip
-"""Numba's passes for what kernels do not have: closures, `with`, exceptions, expressions of arrays."""
+"""Numba's passes for what no compiled function of ours has: closures, `with`, exceptions, expressions of arrays."""
+NEEDLESS_IN_KERNELS = frozenset({ReconstructSSA, PreLowerStripPhis, IRLegalization})
+"""Those for variables of several types, and for counting references: what calls kernels owns the arrays."""
 
 
 class EntryCompiler(CompilerBase):
     """Compiler of functions that Python calls. Absent terms are constants before numba looks for dead branches."""
 
     lowered = _AsWhole
+    needless = NEEDLESS
 
     def define_pipelines(self):
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.add_pass_after(_AbsentTerms, RewriteSemanticConstants)
-        passes.passes = [each for each in passes.passes if each[0] not in NEEDLESS]
+        passes.passes = [each for each in passes.passes if each[0] not in self.needless]
         lowering = [kind for kind, _ in passes.passes].index(NativeLowering)
         passes.add_pass_after(self.lowered, passes.passes[lowering - 1][0])
         passes.finalize()
@@ -201,3 +207,4 @@ class KernelCompiler(EntryCompiler):
     """Compiler of kernels, which only compiled code calls."""
 
     lowered = _AsPart
+    needless = NEEDLESS | NEEDLESS_IN_KERNELS

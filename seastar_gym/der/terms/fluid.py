@@ -68,9 +68,9 @@ def add_work_of_current(rods, work, v, h, frame, energy):
         if rods.body is not None and node == rods.n_nodes:  # a body's angle
             continue
         wx, wy = relative(work, node, load(v, 2 * node), load(v, 2 * node + 1))
-        _, c_speed, _ = drag_slopes(load(rods.drag, node), wx, wy)
+        c_speed = drag_slopes(load(rods.drag, node), wx, wy)[1]
         slopes = (zero, (c_speed * wx, c_speed * wy), (zero, zero, zero))
-        _, (fx, fy), _ = add_cross_flow(rods, work.normals, node, wx, wy, 1.0, 1.0, slopes)
+        fx, fy = add_cross_flow(rods, work.normals, node, wx, wy, 1.0, 1.0, slopes)[1]
         power = subtract_product(power, fx, load(work.current, 2 * node) - frame[0])
         power = subtract_product(power, fy, load(work.current, 2 * node + 1) - frame[1])
     power = add_power_on_strips(rods, work, v, frame, power)
@@ -87,7 +87,7 @@ def add_power_in_middle(rods, work, v, frame, power):
         a, b = tail_node(rods, e), e + 1
         ax, ay = relative(work, a, load(v, 2 * a), load(v, 2 * a + 1))
         bx, by = relative(work, b, load(v, 2 * b), load(v, 2 * b + 1))
-        _, (fx, fy), _ = middle_drag_slopes(rods, work.normals, e, ax + bx, ay + by, 1.0, 1.0)
+        fx, fy = middle_drag_slopes(rods, work.normals, e, ax + bx, ay + by, 1.0, 1.0)[1]
         u_x = load(work.current, 2 * a) - frame[0] + (load(work.current, 2 * b) - frame[0])
         u_y = load(work.current, 2 * a + 1) - frame[1] + (load(work.current, 2 * b + 1) - frame[1])
         power = subtract_product(subtract_product(power, fx, u_x), fy, u_y)
