@@ -185,6 +185,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `solver_status`          | int        | -    | `SolverStatus` of the decision, 0: converged                     |
     | `solver_message`         | str        | -    | what to do about a status other than 0; empty for 0              |
     | `smallest_opening_angle` | float      | rad  | between neighbouring limbs, below 0: they crossed; pi on a body  |
+    | `largest_overlap`        | float      | 1    | depth to which limbs press, only with contact, see below         |
     | `reward_progress`        | float      | 1    | term of the reward                                               |
     | `reward_waypoint`        | float      | 1    | term of the reward                                               |
     | `reward_effort`          | float      | 1    | term of the reward                                               |
@@ -200,6 +201,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     it in about 95 % of strokes (docs/numerics.md); NaN after a failure.
     `energy_growth` is 1 in the first 20 strokes; a value well above 1 means that the time stepping adds energy
     (docs/numerics.md). The chapter's scene at a fidelity has no such entry.
+    `largest_overlap` is over the distance at which limbs touch: 1 where centre lines meet, a warning beyond 0.5.
     With `randomization`, `info` also has the drawn numbers, by name.
 
     ## Starting state

@@ -407,6 +407,7 @@ class Swimming(ABC):
             "solver_status": report.status,
             "solver_message": _messages(report.status),
             "smallest_opening_angle": report.smallest_opening_angle,
+            **({} if self.scene.contact is None else {"largest_overlap": report.largest_overlap}),
             **score.terms,
         }
         reward = functools.reduce(operator.add, score.terms.values())
@@ -427,6 +428,7 @@ class Swimming(ABC):
             "solver_status": counts.copy(),
             "solver_message": _messages(counts),
             "smallest_opening_angle": np.full(self.n_robots, min(self.scene.robot.opening_angle, np.pi)),
+            **({} if self.scene.contact is None else {"largest_overlap": none.copy()}),
             **{name: none.copy() for name in self.TERMS},
         }
 

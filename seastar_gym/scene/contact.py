@@ -6,6 +6,11 @@ from typing import Annotated
 from seastar_gym.scene.number import Numbers, check_numbers, positive
 from seastar_gym.scene.serial import register_part
 
+LARGEST_OVERLAP = 0.5
+"""Depth over the distance at which limbs touch, beyond which a simulator warns: forces are linear in the depth, and
+limbs that meet twice as fast come twice as deep, to each other's centre lines, and would pass through each other. Near
+a hub whose clamps turn past each other, coarse meshes see less of it than fine ones."""
+
 
 @register_part
 @dataclass(frozen=True)
@@ -13,6 +18,7 @@ class Contact:
     """Contact: limbs that touch push each other apart, without friction, and so do limbs and a body.
 
     See der/contact/contact.py. A body is as hard as a limb that touches it. Limbs do not meet it by their root edges.
+    `StrokeReport.largest_overlap` has the depth to which they press; beyond LARGEST_OVERLAP a simulator warns, once.
 
     modulus: Force per length of limb and per depth of overlap [Pa]. None means pi/6 of Young's modulus, the value of
         incompressible elastic cylinders side by side: pi/4 E*, 1/E* = 2 (1 - 0.5^2)/E (Popov, Contact Mechanics and

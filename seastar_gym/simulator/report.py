@@ -1,11 +1,14 @@
 """`StrokeReport`: the solver's status and counts for every robot after an interval of time, such as a stroke."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from seastar_gym.scene.contact import LARGEST_OVERLAP
 
 Floats = NDArray[np.float64]
 
@@ -61,6 +64,8 @@ class StrokeReport(NamedTuple):
     covered: Time covered [s].
     smallest_opening_angle: Smallest angle between neighbouring limbs at the hub [rad]. Below zero, limbs crossed. With
         a body it is pi.
+    largest_overlap: Largest depth to which limbs pressed each other or a body at the ends of time steps, over the
+        distance at which they touch: 1 where centre lines meet, 0 where nobody touches. See scene/contact.py.
     error_estimate: Estimate of the hub's error, of space and time [m]: a bound that holds in about 95 % of strokes, see
         error_bars.py. NaN without `error_bars`.
     heating_time: Time for which wires were heated, summed over limbs [s]; NaN if the actuator does not say it.
@@ -84,6 +89,7 @@ class StrokeReport(NamedTuple):
     energy_cuts: NDArray[np.int64]
     covered: Floats
     smallest_opening_angle: Floats
+    largest_overlap: Floats
     error_estimate: Floats
     heating_time: Floats
     energy: Floats
@@ -92,7 +98,7 @@ class StrokeReport(NamedTuple):
     energy_growth: Floats
 
 
-LARGEST, LAST = ("status", "peak_moment"), ("error_estimate", "energy_growth")
+LARGEST, LAST = ("status", "largest_overlap", "peak_moment"), ("error_estimate", "energy_growth")
 """Fields of which a whole has the largest, or the last, of its pieces; most others it has the sum of."""
 
 
@@ -125,6 +131,7 @@ def make_report(
         status=rows["status"].astype(np.int64),
         covered=rows["covered"],
         smallest_opening_angle=angle,
+        largest_overlap=rows["largest_overlap"],
         error_estimate=rows["error_estimate"],
         heating_time=heating_time,
         energy=power * heating_time,
@@ -132,4 +139,17 @@ def make_report(
         peak_moment=rows["peak_moment"],
         energy_growth=rows["energy_growth"],
         **{name: rows[name].astype(np.int64) for name in COUNTS},
+    )
+
+
+def warn_of_overlap(overlaps: Floats) -> None:
+    """Warn of the robot whose limbs pressed deepest. overlaps: Largest ones, shape (n_robots,)."""
+    robot = int(overlaps.argmax())
+    warnings.warn(
+        f"Limbs of robot {robot} overlap by {overlaps[robot]:.2f} of the distance at which they touch: beyond "
+        f"{LARGEST_OVERLAP:g} contact is too soft to rely on, and limbs soon pass through each other, which stops "
+        "their robot. Use a larger Contact.modulus, a shorter Contact.layer, a smaller peak angle or slower initial "
+        "velocities.",
+        RuntimeWarning,
+        stacklevel=2,
     )

@@ -15,6 +15,7 @@ from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_array, as_finite, as_floats, require_choice, require_count, require_flag, shown
+from seastar_gym.scene.contact import LARGEST_OVERLAP
 from seastar_gym.scene.numerics import MAX_STEPS
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import write_rows
@@ -26,7 +27,7 @@ from seastar_gym.simulator.drive import Drive, checked_commands
 from seastar_gym.simulator.error_bars import ErrorBars, twin_scene
 from seastar_gym.simulator.growth import EnergyGrowth, is_watched
 from seastar_gym.simulator.lock import BROKEN_OFF, StrokeLock
-from seastar_gym.simulator.report import StrokeReport, make_report
+from seastar_gym.simulator.report import StrokeReport, make_report, warn_of_overlap
 from seastar_gym.simulator.schedule import ends_at, ends_of_parts, require_duration
 from seastar_gym.simulator.state import State, checked_state
 from seastar_gym.simulator.workers import processors
@@ -85,10 +86,11 @@ class Simulator:
         self._lock = StrokeLock()
         watched = is_watched(scene) and device == "cpu"
         self._growth: EnergyGrowth | None = EnergyGrowth(self.n_robots, scene.actuator.period) if watched else None
+        self._may_warn_of_overlap = scene.contact is not None
         self._bars: ErrorBars | None = None
         if error_bars:
             twin = Simulator(twin_scene(scene), self.n_robots, self.threads, device=device)
-            twin._growth = None
+            twin._growth, twin._may_warn_of_overlap = None, False
             self._bars = ErrorBars(twin, self.n_robots)
         self.set_limb_strengths(scene.limb_strengths or 1.0)
 
@@ -166,7 +168,7 @@ class Simulator:
         drive = {name: getattr(self._drive, name) for name in ("state", "strengths", "commands", "phase")}
         arguments = (self.scene, self.n_robots, self.threads, False, self._batch.effort.size > 0, self.device)
         rows = self._batch.rows()
-        watched = {"bars": self._bars, "growth": self._growth}
+        watched = {"bars": self._bars, "growth": self._growth, "may_warn": self._may_warn_of_overlap}
         return {"arguments": arguments, "rows": rows, "clock": self._clock, "drive": drive, **watched}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -174,7 +176,7 @@ class Simulator:
         self._batch.put_rows(state["rows"])
         self._clock.restore(state["clock"])
         vars(self._drive).update(state["drive"])
-        self._bars, self._growth = state["bars"], state["growth"]
+        self._bars, self._growth, self._may_warn_of_overlap = (state[each] for each in ("bars", "growth", "may_warn"))
 
     def reset(self, mask: ArrayLike | None = None, heading: ArrayLike = 0.0) -> None:
         """Put robots at rest, with the hub at the origin and limb 1 in the direction `heading`.
@@ -476,5 +478,8 @@ class Simulator:
             self._bars.compare(self.hub_position(), failed)
         if self._growth is not None:
             self._growth.end(lambda: self.kinetic_energy(relative_to_water=True), self.time)
+        if self._may_warn_of_overlap and rows["largest_overlap"].max() > LARGEST_OVERLAP:
+            self._may_warn_of_overlap = False
+            warn_of_overlap(rows["largest_overlap"])
         rows |= {"error_estimate": self.error_estimate, "energy_growth": self.energy_growth}
         return make_report(rows, self.scene.robot.hub_hinge, self._drive.heating_time, self._drive.heating_power)

@@ -27,7 +27,7 @@ from seastar_gym.der.contact.coupled import (
     solve_coupled,
     solver_iterations,
 )
-from seastar_gym.der.contact.crossing import edges_cross, on_their_sides, without_new_crossings
+from seastar_gym.der.contact.crossing import deepest_overlap, edges_cross, on_their_sides, without_new_crossings
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import make_work
@@ -311,6 +311,21 @@ def test_edges_cross_where_the_lines_through_them_meet_within_both():
             (i, k), (j, m) = each[lane, [1, 2]], each[lane, [5, 6]]
             shares = np.linalg.solve(np.stack([k - i, j - m], axis=1), j - i)
             assert seen[lane] == np.all((shares > 0.0) & (shares < 1.0))
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_deepest_overlap_is_the_depth_over_the_distance_at_which_limbs_touch(side):
+    """The tip of limb 2, or 5, lies beside the middle of limb 1, to which all lanes press it differently deep."""
+    asked = np.linspace(-0.5, 0.99, N_LANES)
+    q = np.tile(REST, (N_LANES, 1, 1))
+    q[:, 6 if side > 0.0 else 15] = np.stack([np.full(N_LANES, 0.05), side * 2.0 * ROBOT.rod_radius * (1.0 - asked)], 1)
+    work = make_work(RODS, 1)
+    work.q[:] = work.q_hat[:] = rows(q)
+    stage = Stage(work.q_hat, work.v_hat, Lanes(1e-3), Lanes(1e3), False)
+    freeze_contact.plain(RODS, work, stage, rows(q))
+    add_contact.plain(RODS, work, stage, None, Lanes(0.0))
+    seen = plain(deepest_overlap.plain(RODS, work, rows(q)))
+    np.testing.assert_allclose(seen, np.maximum(asked, 0.0), atol=1e-12)
 
 
 # The Newton step where limbs touch solves the star's matrix plus that of contact.

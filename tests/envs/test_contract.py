@@ -17,6 +17,7 @@ from episodes import assert_same, assert_same_steps, swum
 from refusals import assert_refused
 from seastar_gym import (
     TASKS,
+    Contact,
     DomainRandomization,
     FailBlind,
     HeadingTargets,
@@ -124,7 +125,7 @@ def test_the_reward_has_the_terms_and_weights_of_the_table():
 
 def test_info_has_the_names_and_types_of_the_table():
     numerics = Numerics("implicit-midpoint", 5e-3, 1e-5)
-    env = SeastarSwimEnv(scene=Scene(numerics=numerics), error_bars=True, headings=HeadingTargets())
+    env = SeastarSwimEnv(scene=Scene(numerics=numerics, contact=Contact()), error_bars=True, headings=HeadingTargets())
     for info in (env.reset(seed=0)[1], env.step([0, 1, 0, 0, 2])[4]):
         documented = {row["name"]: row["type"] for row in table("Info")}
         assert set(info) == set(documented)
@@ -186,6 +187,7 @@ def test_info_of_a_task_is_that_of_the_docstrings(id):
     common = {row["name"] for row in table("Info")} - {
         "error_estimate",
         "energy_growth",
+        "largest_overlap",
         "heading",
         "heading_error",
         "reward_heading",

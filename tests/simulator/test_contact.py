@@ -2,7 +2,9 @@
 
 import itertools
 import math
+import pickle
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -15,8 +17,10 @@ from seastar_gym import Attachment, Body, Contact, Limb, Numerics, Scene, Seasta
 from seastar_gym.der.contact.contact import tapered
 from seastar_gym.model.mesh import make_mesh
 from seastar_gym.model.rods import make_rods
+from seastar_gym.scene.contact import LARGEST_OVERLAP
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.scene.shape import rest_positions
+from seastar_gym.simulator.report import report_of_pieces
 from strokes import finished
 
 COMMANDS = np.array(list(itertools.product([-1.0, 0.0, 1.0], repeat=5)))
@@ -25,6 +29,10 @@ CLOSING = COMMANDS[((COMMANDS == 1.0) & (np.roll(COMMANDS, -1, axis=1) == -1.0))
 
 
 CROSSED = Seastar(limbs=tuple(Limb(natural_curvature=bend) for bend in (16.0, -16.0, 16.0, -16.0, 0.0)))
+
+
+DEEP = pytest.mark.filterwarnings("ignore:Limbs of robot:RuntimeWarning")
+"""Of tests whose limbs press each other too deep."""
 
 
 def images(command: np.ndarray) -> list[tuple[float, ...]]:
@@ -100,6 +108,7 @@ def test_no_crossing_by_the_worst_commands(fidelity, robot, peak_angle):
         assert (status == 0).all()
 
 
+@DEEP
 @pytest.mark.parametrize("contact", [Contact(), Contact(layer=10e-3)], ids=["default", "layer"])
 @pytest.mark.parametrize("fidelity", ["fast", "balanced", "chapter"])
 @pytest.mark.parametrize("peak_angle", [0.75, 0.85, 0.94])
@@ -245,6 +254,38 @@ def test_limbs_taper_flat_at_the_root_within_cones_of_the_opening_angle():
     assert np.all(found <= 0.5 * angle * x)
 
 
+def thrown(speed: float, numerics: Numerics, contact: Contact, n_robots: int = 1) -> Simulator:
+    """Two limbs turn towards each other, their tips so fast [m/s]."""
+    simulator = Simulator(Scene(TEN, None, numerics=numerics, contact=contact), n_robots)
+    state = simulator.get_state()
+    arms = state.positions[0, 1:].reshape(5, -1, 2) - state.positions[0, 0]
+    across = np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * np.array([speed, -speed, 0, 0, 0])[:, None, None] / 0.1
+    state.velocities[:, 1:] = across.reshape(-1, 2)
+    simulator.set_state(state)
+    return simulator
+
+
+@DEEP
+@pytest.mark.parametrize("angle", [0.05, 0.1, 0.2, 0.31])
+def test_straight_limbs_that_are_held_an_angle_apart_overlap_by_what_is_left_of_their_thickness(angle):
+    """Largest of 1 - distance/thickness, of nodes from the other limb's nodes and from feet on its edges."""
+    limbs, opening = (Limb(direction=0.0), Limb(direction=1.0)), 0.3
+    robot = Seastar(nodes_per_limb=10, n_limbs=2, limbs=limbs)
+    held = Scene(robot, None, held_nodes=tuple(range(robot.n_nodes)), contact=Contact(opening_angle=opening))
+    simulator = Simulator(held)
+    x = np.arange(10) * robot.edge_length
+    state = simulator.get_state()
+    state.positions[0, 1:10] = np.stack([x, 0.0 * x], axis=1)[1:]
+    state.positions[0, 10:] = np.outer(x, [np.cos(angle), np.sin(angle)])[1:]
+    simulator.set_state(state)
+    report = simulator.stroke(np.zeros((1, 2)))
+    thickness = np.array([tapered(robot.rod_radius, each, opening) for each in x])
+    feet = 1.0 - (x * np.sin(angle))[1:] / (thickness + np.interp(x * np.cos(angle), x, thickness))[1:]
+    nodes = 1.0 - (x * np.sin(0.5 * angle))[1:] / thickness[1:]
+    assert report.largest_overlap[0] == pytest.approx(max(0.0, feet.max(), nodes.max()), rel=1e-6)
+
+
+@DEEP
 @pytest.mark.parametrize(("speed", "stopped"), [(5.0, False), (100.0, True)])
 @pytest.mark.parametrize("numerics", [Numerics("sdirk2", 0.02), Numerics("implicit-midpoint", 5e-3)], ids=str)
 def test_neighbours_thrown_at_each_other_bounce_or_stop_but_never_cross(numerics, speed, stopped):
@@ -258,6 +299,65 @@ def test_neighbours_thrown_at_each_other_bounce_or_stop_but_never_cross(numerics
     report = simulator.stroke(np.zeros((1, 5)))
     assert bool(report.status[0]) == stopped
     assert not crossings(simulator.positions, pairs=simulator.scene.robot.limbs_that_may_touch()).any()
+
+
+def test_thrown_limbs_that_overlap_too_much_warn_once_and_would_cross_at_twice_the_speed():
+    numerics, contact, still = Numerics("sdirk2", 1e-3), Contact(layer=10e-3), np.zeros((2, 5))
+    simulator = thrown(1.0, numerics, contact, 2)
+    start = simulator.get_state()
+    with pytest.warns(RuntimeWarning, match=r"Limbs of robot 0 overlap by 0\.[5-9]"):
+        first = simulator.stroke(still)
+    again = pickle.loads(pickle.dumps(simulator))
+    again.set_state(start)
+    for report in (first, again.stroke(still)):
+        assert not report.status.any()
+        assert np.all(report.largest_overlap > LARGEST_OVERLAP) and np.all(report.largest_overlap < 1.0)
+    with pytest.warns(RuntimeWarning, match="overlap"):
+        report = thrown(2.0, numerics, contact).stroke(still[:1])
+    assert report.status[0] == 1 and 0.9 < report.largest_overlap[0] <= 1.0
+
+
+def test_the_largest_overlap_is_of_any_time_step_whatever_the_company_and_zero_apart():
+    scene = Scene(TEN, actuator=SmaPulse(0.75), numerics=Numerics.preset("balanced"), contact=Contact(layer=10e-3))
+    found = Simulator(scene, len(CLOSING)).stroke(CLOSING).largest_overlap
+    assert 0.1 < found.max() < LARGEST_OVERLAP
+    for robot in (0, 7, len(CLOSING) - 1):
+        assert Simulator(scene, 1).stroke(CLOSING[robot : robot + 1]).largest_overlap[0] == found[robot]
+    halves = Simulator(scene, len(CLOSING))
+    pieces = [halves.advance(0.5, CLOSING), halves.advance(0.5)]
+    np.testing.assert_allclose(report_of_pieces(pieces).largest_overlap, found, rtol=1e-3)
+    assert (pieces[1].largest_overlap < found).any()
+    assert (Simulator(scene, 1).stroke(np.zeros((1, 5))).largest_overlap == 0.0).all()
+    assert (Simulator(Scene(TEN), 2).stroke(CLOSING[:2]).largest_overlap == 0.0).all()
+
+
+@DEEP
+def test_limbs_turned_past_each_other_come_deeper_on_finer_meshes_and_others_stay_below_the_bound():
+    """Clamps whose directions cross leave no room near the hub, of which ten nodes see little."""
+
+    def overlap(nodes, peak, contact):
+        robot, numerics = Seastar(nodes_per_limb=nodes), Numerics("sdirk2", 5e-3)
+        scene = Scene(robot, actuator=SmaPulse(peak), numerics=numerics, contact=contact)
+        report = Simulator(scene, len(DISTINCT)).stroke(DISTINCT)
+        return float(report.largest_overlap.max()), bool(report.status.any())
+
+    past, failed = zip(*(overlap(nodes, 0.75, Contact()) for nodes in (10, 19, 37)), strict=True)
+    assert past[0] < past[1] < LARGEST_OVERLAP < past[2] and not any(failed)
+    assert overlap(37, 0.75, Contact(layer=10e-3)) == (pytest.approx(1.0, abs=0.05), True)
+    assert overlap(37, 0.62, Contact(layer=10e-3))[0] < LARGEST_OVERLAP
+    assert overlap(37, 0.62, Contact())[0] < 0.2
+
+
+def test_info_has_the_largest_overlap_where_there_is_contact():
+    scene = Scene(TEN, actuator=SmaPulse(0.75), numerics=Numerics.preset("balanced"), contact=Contact(layer=10e-3))
+    one, batch = gym.make("SeastarSwim-v0", scene=scene), gym.make_vec("SeastarSwim-v0", 2, scene=scene)
+    assert one.reset(seed=0)[1]["largest_overlap"] == 0.0
+    assert (batch.reset(seed=0)[1]["largest_overlap"] == 0.0).all()
+    closing = [2, 0, 1, 1, 1]
+    overlap = one.step(closing)[4]["largest_overlap"]
+    np.testing.assert_array_equal(batch.step(np.array([closing, [1] * 5]))[4]["largest_overlap"], [overlap, 0.0])
+    assert 0.1 < overlap < LARGEST_OVERLAP
+    assert "largest_overlap" not in gym.make("SeastarSwim-v0", scene=Scene(TEN)).reset(seed=0)[1]
 
 
 def test_a_long_limb_meets_one_beyond_its_neighbour():

@@ -1,14 +1,24 @@
-"""Limbs that came to cross in a step, or to enter a body: such a step is refused, so that none passes through."""
+"""How near limbs came to passing through each other, or a body; a step in which they would is refused."""
 
 import numpy as np
 
-from seastar_gym.der.contact.broad_phase import across_gap
-from seastar_gym.der.contact.contact import edge_ends
+from seastar_gym.der.contact.broad_phase import across_gap, thickness_of_pair
+from seastar_gym.der.contact.contact import edge_ends, members, n_listed
 from seastar_gym.der.contact.near_body import height_over_body
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.star import corner_place, tail_node
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import add_product, any_lane, load, load_number, select, splat, store, subtract_product
+from seastar_gym.simd.lanes import (
+    add_product,
+    any_lane,
+    load,
+    load_number,
+    select,
+    splat,
+    sqrt,
+    store,
+    subtract_product,
+)
 
 
 @kernel
@@ -148,3 +158,37 @@ def reaches_disc(rods, q, e):
     squared, along = add_product(ex * ex, ey, ey), add_product(dx * ex, dy, ey)
     across = subtract_product(dx * ey, dy, ex)
     return (along > 0.0) & (along < squared) & (across * across < rim * rim * squared)
+
+
+@kernel
+def deepest_overlap(rods, work, q):
+    """Largest depth of the pairs that were listed last, over the distance at which they touch, at positions q.
+
+    1 where a node is on the centre line of another limb, or on the outline of a body; 0 where nobody touches.
+    """
+    deepest = splat(0.0)
+    if not any_lane(load(work.contact.touching, 0) > 0.0):
+        return deepest
+    for slot in range(n_listed(work)):
+        i, j, k = members(rods, work, slot)
+        ex, ey = edge_vector(q, j, k)
+        dx, dy = edge_vector(q, j, i)
+        squared, along = add_product(ex * ex, ey, ey), add_product(dx * ex, dy, ey)
+        s = select(along > 0.0, select(along < squared, along / squared, 1.0), 0.0)
+        dx, dy = subtract_product(dx, s, ex), subtract_product(dy, s, ey)
+        thickness = thickness_of_pair(rods, i, j, k, s)
+        nearest = subtract_product(thickness, deepest, own_thickness(rods, i, k, thickness))
+        squared = add_product(dx * dx, dy, dy)
+        deeper = (nearest > 0.0) & (squared < nearest * nearest)
+        if any_lane(deeper):
+            depth = thickness - sqrt(squared)
+            deepest = select(deeper, depth / own_thickness(rods, i, k, thickness), deepest)
+    return deepest
+
+
+@kernel
+def own_thickness(rods, i, k, thickness):
+    """Part of the thickness of node i and an edge that ends at k that is of limbs [m], and not of a body."""
+    if rods.body is not None and (i >= rods.n_nodes or k >= rods.n_nodes):
+        return thickness - load(rods.contact.rim, 0)
+    return thickness

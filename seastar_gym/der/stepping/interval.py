@@ -1,10 +1,12 @@
 """An interval between two corners of a time grid, covered by steps that every robot halves and doubles for itself."""
 
+from seastar_gym.der.contact.crossing import deepest_overlap
 from seastar_gym.der.geometry import edge_geometry, half_angle
 from seastar_gym.der.star import tail_node
 from seastar_gym.der.stepping.report import (
     COVERED,
     HALVINGS,
+    LARGEST_OVERLAP,
     REJECTIONS,
     SMALLEST_HUB_T,
     STEPS,
@@ -36,6 +38,15 @@ def note_hub_angles(rods, q, robots, report):
         smallest = select(robots & narrow & (t < smallest), t, smallest)
         first = second
     store(report, SMALLEST_HUB_T, smallest)
+
+
+@kernel
+def note_overlap(rods, work, q, robots, report):
+    """Keep the largest overlap at the ends of the steps of the robots in the mask, in scenes with contact."""
+    if rods.contact is None:
+        return
+    largest, now = load(report, LARGEST_OVERLAP), deepest_overlap(rods, work, q)
+    store(report, LARGEST_OVERLAP, select(robots & (now > largest), now, largest))
 
 
 @kernel
@@ -74,6 +85,7 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
         step = Step(start, size, size * duration, (1.0 + halvings) * limits.max_iterations, retrying)
         good, accepted, error_rate = try_step(rods, work, tableau, actuation, q, v, a, step, going, limits, report)
         note_hub_angles(rods, q, going, report)
+        note_overlap(rods, work, q, accepted, report)
         stuck = going & ~good
         rejected = going & ~accepted
         on_fallback = going & ~on_scheme

@@ -15,10 +15,11 @@ REPORT_ROWS = (
     "energy_cuts",  # steps after which velocities were cut, see guard.py
     "covered",  # time [s]
     "smallest_hub_t",  # smallest tan(phi/2) of a hub hinge
+    "largest_overlap",  # of limbs that touch each other or a body, see contact/crossing.py
 )
 (
     NEWTON_ITERATIONS, SOLVER_ITERATIONS, REGULARISED, BACKTRACKS, STEPS, HALVINGS, REJECTIONS, ENERGY_CUTS, COVERED,
-    SMALLEST_HUB_T,
+    SMALLEST_HUB_T, LARGEST_OVERLAP,
 ) = range(len(REPORT_ROWS))  # fmt: skip
 
 # Rows of a lane group's effort, if it is asked for: work of the actuators [J], the largest moment that resisted one
