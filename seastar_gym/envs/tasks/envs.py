@@ -91,20 +91,16 @@ class SeastarTaskEnv(SeastarSwimEnv):
 
     ## Splits
     An episode is a number, and what is drawn for it follows from its split and its number alone. A reset draws the
-    number, from two thousand million in the split "train", from a thousand in "test". `info["instance"]` tells it, and
+    number, from two billion in the split "train", from a thousand in "test". `info["instance"]` tells it, and
     `reset(options={"instance": number})` swims a certain one. The splits share no episode.
 
     ## Arguments
     task: Name of a challenge, or a challenge with numbers of your own, as an object or in plain form.
     split: Which episodes are drawn: "train" or "test".
-    actions: How commands are written, see `SeastarSwimEnv`.
-    fidelity: Accuracy of the simulation, see `SeastarSwimEnv`.
-    decision_period: Time between decisions [s]. None means a stroke.
     render_mode: See `SeastarSwimEnv`. Pictures show what the robot is not told.
-    frames_per_stroke: Number of pictures of a decision, see `SeastarSwimEnv`.
-    sight: Camera through which the robot is seen, see `SeastarSwimEnv`; `SimToReal` has one of its own. What a task
-        shows besides the robot, such as prey, is not late.
-    action_delay: Time from a decision to when wires are heated by it [s], see `SeastarSwimEnv`.
+    sight: See `SeastarSwimEnv`; `SimToReal` has one of its own. What a task shows besides the robot, such as prey, is
+        not late.
+    actions, fidelity, decision_period, frames_per_stroke, action_delay: See `SeastarSwimEnv`.
     """
 
     _option = "instance"
