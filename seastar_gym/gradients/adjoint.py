@@ -41,7 +41,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_floats, shown
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import aligned_rows, side_by_side
-from seastar_gym.simd.tape_lanes import ENTRY, ROW
+from seastar_gym.simd.tape_lanes import ENTRY, FACTOR, PLACE, ROW
 from seastar_gym.simulator.state import State
 
 Floats = NDArray[np.float64]
@@ -51,7 +51,7 @@ QUANTITIES = ("hub", *Motion._fields)
 SPARE_STEPS = 16
 """Steps more than there are ends of steps in an interval, for which there is room at first."""
 ENTRIES = 1 << 16
-"""Entries of a new tape; it grows where a time step needs more. Each takes 24 bytes, and 8 for its slope."""
+"""Entries of a new tape; it grows where steps need more. Each takes 80 bytes with four lanes, its slope included."""
 
 MOST_KEPT = 64e6
 """Memory of the time steps that a record keeps [B]; others are swum once more."""
@@ -275,7 +275,7 @@ class _Sweep:
 
     def __init__(self, record: Record, given: Mapping[str, Floats], changes: Sequence[Start]):
         self._record, one, stages = record, record._rods, record._scheme.n_stages
-        self._rods = _on_tape(side_by_side([one]))
+        self._rods = _on_tape(side_by_side([one] * N_LANES))
         self._moved = [
             np.any([change.coefficients[k] != 0.0 for change in changes], axis=0) & np.full(len(rows), bool(changes))
             for k, rows in enumerate(arrays_of(self._rods))
@@ -285,7 +285,7 @@ class _Sweep:
         residual = np.zeros((stages * n_free, ROW))
         self._work, self._own_work = _works(make_work(one, stages, again=True), residual, stages, one.n_points)
         sizes = (n_q, n_q, record._n_a, *3 * (record._n_limbs,))
-        self._rows = Rows(*(np.zeros((n, ROW)) for n in sizes), residual)
+        self._rows, self._beside = (Rows(*(np.zeros((n, ROW)) for n in sizes), residual) for _ in range(2))
         self._grow(ENTRIES)
         of_places, of_rest = slopes_of_heading(record.swim.positions, record._start.rest)
         in_places = given["positions"] + given["heading"][:, None, None] * of_places
@@ -318,7 +318,7 @@ class _Sweep:
         return float(total)
 
     def _grow(self, capacity: int) -> None:
-        self._entries = np.zeros((capacity, ENTRY))
+        self._entries = np.zeros(capacity * ENTRY)
         self._slopes = np.zeros(capacity)
 
     def _pull_back(self, k: int, of_work: float) -> Floats:
@@ -330,29 +330,31 @@ class _Sweep:
         before = self._slopes[:first].copy()
         scene = SceneOnTape(
             self._rods, self._work, record._scheme, SCHEMES["implicit-euler"],
-            Actuation(self._rows.start, self._rows.end), record._limits, np.zeros((len(REPORT_ROWS), ROW)),
-            record._rods, self._own_work,
+            Actuation(self._rows.start, self._rows.end), Actuation(self._beside.start, self._beside.end),
+            record._limits, np.zeros((len(REPORT_ROWS), ROW)), record._rods, self._own_work, np.zeros((1, N_LANES)),
         )  # fmt: skip
-        places = Rows(*(rows.view(np.int64) for rows in self._rows))
+        places, places_beside = (Rows(*(part.view(np.int64) for part in rows)) for rows in (self._rows, self._beside))
         while True:
             of = Slopes(self.of_q.copy(), self.of_v.copy(), np.zeros(record._n_a), 0.0 * turned, of_work)
-            tape = Tape(self._entries, self._entries.view(np.int32), self._slopes, first)
-            outcome = pulling_back()(scene, tape, self._rows, places, kept, times, turned, of)
+            tape = Tape(self._entries, self._entries.view(np.uint32), self._slopes, first)
+            outcome = pulling_back()(
+                scene, tape, self._rows, places, self._beside, places_beside, kept, times, turned, of
+            )
             if outcome == 0:
                 break
             if outcome == 2:
                 raise RuntimeError("A time step could not be repeated as it was.")
-            self._grow(2 * len(self._entries))
+            self._grow(2 * len(self._slopes))
             self._slopes[:first] = before
         self.of_q, self.of_v = of.q, of.v
         return of.shape
 
 
 def _on_tape(bundle: Any) -> Any:
-    """A bundle whose rows of robots are rows of a tape: value, place and factor, which are 0."""
+    """A bundle whose rows of robots are rows of a tape: values, and factors and place, which are 0."""
     if isinstance(bundle, np.ndarray) and bundle.ndim == 2:
         rows = aligned_rows(len(bundle), ROW)
-        rows[:, 0] = bundle[:, 0]
+        rows[:, :N_LANES] = bundle
         return rows
     if hasattr(bundle, "_fields"):
         return bundle._replace(**{name: _on_tape(getattr(bundle, name)) for name in bundle._fields})
@@ -361,17 +363,16 @@ def _on_tape(bundle: Any) -> Any:
 
 def _works(own: Work, residual: Floats, n_stages: int, n_points: int) -> tuple[Any, Work]:
     """Memory on a tape, and on the lanes of `Simulator`; its rows stand one behind the other in both, see Replayed."""
-    sizes = {n: sum(len(part) for part in arrays_of(own) if part.ndim == n) for n in (1, 2)}
-    memory, lists = np.zeros(sizes[2] * ROW), np.zeros(sizes[1])
-    of_stages, of_lists = (aligned_rows(n_stages * size) for size in (sizes[2] * N_LANES, sizes[1]))
-    numbers, first = np.zeros(1 + n_stages * (OF_STAGE + 2 * n_points)), np.zeros(n_stages)
-    replayed = Replayed(numbers, first, residual, memory, lists, of_stages, of_lists, sizes[2], sizes[1], n_stages)
-    of_last = np.split(of_stages, n_stages)[-1], np.split(of_lists, n_stages)[-1]
-    on_tape = _in_memory(own, memory.reshape(-1, ROW), lists)
-    return (
-        WorkOfGradient(*on_tape, None, replayed),  # type: ignore[call-arg]
-        _in_memory(own, of_last[0].reshape(-1, N_LANES), of_last[1]),
-    )
+    n_lists, n_rows = (sum(len(part) for part in arrays_of(own) if part.ndim == n) for n in (1, 2))
+    memory, lists = np.zeros((n_rows, ROW)), np.zeros(n_lists)
+    slots = 1 if n_stages == 1 else n_stages + 1
+    of_stages, of_lists = aligned_rows(slots, n_rows, N_LANES), np.zeros((slots, n_lists))
+    replayed = Replayed(
+        np.zeros((OF_STEP + 1, ROW)), np.zeros((n_stages * (OF_STAGE + 2 * n_points), ROW)), np.zeros(1),
+        np.zeros(n_stages), residual, memory.ravel(), lists, of_stages.ravel(), of_lists.ravel(), n_rows, n_lists,
+    )  # fmt: skip
+    on_tape = WorkOfGradient(*_in_memory(own, memory, lists), None, replayed)  # type: ignore[call-arg]
+    return on_tape, _in_memory(own, of_stages[-1], of_lists[-1])
 
 
 def _in_memory(bundle: Any, rows: Floats, lists: Floats) -> Any:
@@ -396,7 +397,7 @@ def _number(bundle: Any, moved: Sequence[NDArray[np.bool_]]) -> int:
     for rows, some in zip(arrays_of(bundle), moved, strict=True):
         if rows.ndim == 2:
             count = int(some.sum())
-            rows.view(np.int64)[some, 1] = np.arange(n + 1, n + 1 + count)
-            rows[some, 2] = 1.0
+            rows.view(np.int64)[some, PLACE] = np.arange(n + 1, n + 1 + count)
+            rows[some, FACTOR:PLACE] = 1.0
             n += count
     return n

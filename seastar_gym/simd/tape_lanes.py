@@ -1,15 +1,15 @@
-"""`Lanes` of one robot that write down how they were computed: reverse differentiation.
+"""`Lanes` that write down how they were computed: reverse differentiation.
 
-A kernel that is compiled on these lanes in place of those of lanes.py computes what it always does for one robot, to
-the same bits. Beside it, every operation leaves an entry on a tape: which numbers went in, and the partial derivatives
-in them. Read from its end, the tape gives the derivatives of one number in all that it was computed from.
+A kernel that is compiled on these lanes in place of those of lanes.py computes what it always does, to the same bits.
+Beside it, operations leave entries on a tape: which numbers went in, and the partial derivatives of every robot. Read
+from its end, the tape gives the derivatives of one number of a robot in all that it was computed from.
 
-A number is a value, a place on the tape and a factor, its derivative in what stands there: 1 where an entry was written
-for it. What has one parent alone keeps the place and changes the factor, so that nothing is written down for it; nor is
-for what is constant, whose place and factor are 0. A row of memory that robots do not share holds a value and, behind
-it, the place as a whole number and the factor; shared numbers are constant. An entry has two parents, three numbers in
-a row: both places as int32, then the partial derivatives. As for dual lanes, what robots do is decided by values alone,
-and where a slope does not exist it is zero.
+A number is the robots' values, a place on the tape that they share, and a factor for each, its derivative in what
+stands there: 1 where an entry was written for it. What has one parent alone keeps the place and changes the factors, so
+that nothing is written down for it; nor is for what is constant, whose place and factors are 0. A row of memory that
+robots do not share holds the values, the factors behind them and the place as a whole number; shared numbers are
+constant. An entry has two parents: both places as int32 in one number, then the partial derivatives of all robots. As
+for dual lanes, what robots do is decided by values alone, and where a slope does not exist it is zero.
 
 There is one tape in a process at a time. Beside the functions of lanes.py there are `begin_tape`, `end_of_tape`,
 `leave_places`, `tape_is_full` and `at_place`.
@@ -20,48 +20,39 @@ from numba.core import cgutils, types
 from numba.core.datamodel import models
 from numba.extending import intrinsic, register_model
 
-from seastar_gym.simd.kind import F64, I1, I32, I64, Kind, function_of, negated, teach_masks
+from seastar_gym.simd import lanes as plain
+from seastar_gym.simd.kind import F64, I1, I32, I64, Kind, function_of, negated
 from seastar_gym.simd.lanes import N_LANES as N_LANES
+from seastar_gym.simd.lanes import VECTOR, Rows, mask, registers
 from seastar_gym.simd.lanes import WIDTH as WIDTH
-from seastar_gym.simd.lanes import Rows
+from seastar_gym.simd.lanes import any_lane as any_lane
 from seastar_gym.simd.lanes import borrow as borrow
 from seastar_gym.simd.lanes import load_number as load_number
 from seastar_gym.simd.lanes import store_number as store_number
 
-ROW = 3
-"""Numbers in a row of memory that robots do not share."""
-ENTRY = 3
-"""Numbers in an entry of the tape."""
+FACTOR, PLACE, ROW = N_LANES, 2 * N_LANES, 2 * N_LANES + 1
+"""Where factors and place stand in a row of memory that robots do not share, behind the values, and its numbers."""
+ENTRY = 1 + 2 * N_LANES
+"""Numbers in an entry of the tape: places, then partial derivatives in the first parent and in the second."""
 NOWHERE = ir.Constant(I64, 0)
-ZERO, ONE, MINUS_ONE = (ir.Constant(F64, number) for number in (0.0, 1.0, -1.0))
-TAPE, RECORD, JOIN_THREE = "seastar_tape", "seastar_record", "seastar_join_three"
+ZERO, ONE, MINUS_ONE = (ir.Constant(VECTOR, [number] * WIDTH) for number in (0.0, 1.0, -1.0))
+TAPE, RECORD, JOIN_THREE, CHOOSE = "seastar_tape", "seastar_record", "seastar_join_three", "seastar_choose"
 COUNT, LIMIT, BEGIN, FULL = range(4)
 """State of the tape: place of the next entry; where it ends; its memory; not 0 once an entry did not fit."""
 
 
 class Lanes(types.Type):
     def __init__(self):
-        super().__init__(name="TapeLanes")
+        super().__init__(name=f"TapeLanes({WIDTH} of {N_LANES})")
 
 
-class Mask(types.Type):
-    def __init__(self):
-        super().__init__(name="TapeMask")
-
-
-lanes, mask = Lanes(), Mask()
+lanes = Lanes()
 
 
 @register_model(Lanes)
 class _LanesModel(models.StructModel):
     def __init__(self, dmm, fe_type):
-        super().__init__(dmm, fe_type, [("value", types.float64), ("place", types.int64), ("factor", types.float64)])
-
-
-@register_model(Mask)
-class _MaskModel(models.PrimitiveModel):
-    def __init__(self, dmm, fe_type):
-        super().__init__(dmm, fe_type, I1)
+        super().__init__(dmm, fe_type, [("value", plain.lanes), ("place", types.int64), ("factor", plain.lanes)])
 
 
 # The tape, and what writes on it; one of each once the parts of an entry point are linked
@@ -82,11 +73,12 @@ def _state(builder, which):
     return builder.gep(_once(builder.module, TAPE, _make_tape), [NOWHERE, ir.Constant(I64, which)])
 
 
-JOINED = ir.LiteralStructType([I64, F64])
+JOINED = ir.LiteralStructType([I64, VECTOR])
+"""Place and factors."""
 
 
-def _function(module, name, result, n_parents):
-    function = ir.Function(module, ir.FunctionType(result, [I64, F64] * n_parents), name)
+def _function(module, name, result, *arguments):
+    function = ir.Function(module, ir.FunctionType(result, arguments), name)
     function.linkage = "linkonce_odr"
     function.attributes.add("noinline")
     function.attributes.add("nounwind")
@@ -96,7 +88,7 @@ def _function(module, name, result, n_parents):
 
 def _make_record(module, name):
     """record(place, partial, place, partial) -> the place of a new entry with these parents."""
-    function, build = _function(module, name, I64, 2)
+    function, build = _function(module, name, I64, *(I64, VECTOR) * 2)
     a, of_a, b, of_b = function.args
     place, limit = build.load(_state(build, COUNT)), build.load(_state(build, LIMIT))
     with build.if_then(build.icmp_signed(">=", place, limit), likely=False):
@@ -108,7 +100,8 @@ def _make_record(module, name):
     for k, parent in enumerate((a, b)):
         build.store(build.trunc(parent, I32), build.gep(parents, [ir.Constant(I64, k)]))
     for k, partial in enumerate((of_a, of_b)):
-        build.store(partial, build.gep(entry, [ir.Constant(I64, 1 + k)]))
+        behind = build.gep(entry, [ir.Constant(I64, 1 + k * N_LANES)])
+        build.store(partial, build.bitcast(behind, VECTOR.as_pointer())).align = 8
     build.store(build.add(place, ir.Constant(I64, 1)), _state(build, COUNT))
     build.ret(place)
     return function
@@ -116,14 +109,28 @@ def _make_record(module, name):
 
 def _make_join_three(module, name):
     """join_three(place, slope, place, slope, place, slope) -> (place, factor)."""
-    function, build = _function(module, name, JOINED, 3)
+    function, build = _function(module, name, JOINED, *(I64, VECTOR) * 3)
     parents = [tuple(function.args[k : k + 2]) for k in (0, 2, 4)]
-    joined = _joined(build, [_joined(build, parents[:2]), parents[2]])
-    result = ir.Constant(JOINED, ir.Undefined)
-    for k in range(2):
-        result = build.insert_value(result, joined[k], k)
-    build.ret(result)
+    build.ret(_as_joined(build, *_joined(build, [_joined(build, parents[:2]), parents[2]])))
     return function
+
+
+def _make_choose(module, name):
+    """choose(robots, place, factor, place, factor) -> (place, factor): the first two for these robots."""
+    robots = ir.IntType(WIDTH)
+    function, build = _function(module, name, JOINED, robots, *(I64, VECTOR) * 2)
+    which, *parents = function.args
+    for all_or_none, parent in ((-1, parents[:2]), (0, parents[2:])):
+        with build.if_then(build.icmp_unsigned("==", which, ir.Constant(robots, all_or_none))):
+            build.ret(_as_joined(build, *parent))
+    robot = build.bitcast(which, ir.VectorType(I1, WIDTH))
+    first = parents[0], build.select(robot, parents[1], ZERO)
+    build.ret(_as_joined(build, *_joined(build, [first, (parents[2], build.select(robot, ZERO, parents[3]))])))
+    return function
+
+
+def _as_joined(build, place, factor):
+    return build.insert_value(build.insert_value(ir.Constant(JOINED, ir.Undefined), place, 0), factor, 1)
 
 
 def _apart(builder, a, b):
@@ -133,10 +140,7 @@ def _apart(builder, a, b):
 
 
 def _joined(builder, parents):
-    """(place, factor) of a number with these (place, slope): an entry for it only where their places are apart.
-
-    Calls are said to touch no memory: what nobody reads is neither computed nor written down.
-    """
+    """(place, factor) of a number with these (place, slope): an entry for it only where their places are apart."""
     place, factor = parents[0]
     apart = None
     for other, slope in parents[1:]:
@@ -145,14 +149,24 @@ def _joined(builder, parents):
         place, factor = builder.or_(place, other), builder.fadd(factor, slope)
     if apart is None:
         return place, factor
-    arguments, before = [x for parent in parents for x in parent], builder.block
-    name, make = (RECORD, _make_record) if len(parents) == 2 else (JOIN_THREE, _make_join_three)
-    with builder.if_then(apart):
+    arguments = [x for parent in parents for x in parent]
+    if len(parents) == 2:
+        return _unless(builder, apart, (place, factor), RECORD, _make_record, arguments)
+    return _unless(builder, apart, (place, factor), JOIN_THREE, _make_join_three, arguments)
+
+
+def _unless(builder, condition, otherwise, name, make, arguments):
+    """(place, factor): `otherwise`, but what a function returns where the condition holds.
+
+    Calls are said to touch no memory: what nobody reads is neither computed nor written down.
+    """
+    before = builder.block
+    with builder.if_then(condition):
         made = builder.call(_once(builder.module, name, make), arguments, attrs=("readnone", "nounwind"))
-        of_made = (made, ONE) if len(parents) == 2 else [builder.extract_value(made, k) for k in range(2)]
+        of_made = (made, ONE) if made.type == I64 else [builder.extract_value(made, k) for k in range(2)]
         behind = builder.block
     joined = []
-    for alone, together in zip((place, factor), of_made, strict=True):
+    for alone, together in zip(otherwise, of_made, strict=True):
         found = builder.phi(alone.type)
         found.add_incoming(alone, before)
         found.add_incoming(together, behind)
@@ -171,7 +185,7 @@ def _grown(builder, value, *parents):
 
 
 class Recorded(Kind):
-    """Numbers are (value, place, factor), scalars; a place of None is constant."""
+    """Numbers are (value, place, factor): a vector, one place and a vector; a place of None is constant."""
 
     def opened(self, context, builder, value):
         found = cgutils.create_struct_proxy(lanes)(context, builder, value=value)
@@ -183,7 +197,7 @@ class Recorded(Kind):
         return made._getvalue()
 
     def plain(self, builder, value):
-        return value, None, None
+        return registers.plain(builder, value), None, None
 
     def value(self, number):
         return number[0]
@@ -223,24 +237,34 @@ class Recorded(Kind):
         return _grown(builder, function_of("fma", builder, x, b[0], c[0]), (c, ONE), (a, y), (b, x))
 
     def chosen(self, builder, condition, when_true, when_false):
-        both = zip(known(when_true), known(when_false), strict=True)
-        return tuple(builder.select(condition, true, false) for true, false in both)
+        value = builder.select(condition, when_true[0], when_false[0])
+        if when_true[1] is None and when_false[1] is None:
+            return value, None, None
+        (_, a, of_a), (_, b, of_b) = known(when_true), known(when_false)
+        same, which = (a, builder.select(condition, of_a, of_b)), builder.bitcast(condition, ir.IntType(WIDTH))
+        apart = builder.icmp_unsigned("!=", a, b)
+        return value, *_unless(builder, apart, same, CHOOSE, _make_choose, [which, a, of_a, b, of_b])
 
     def pointers(self, builder, rows, row):
-        """Pointers to the value, the place and the factor of a row that robots do not share."""
-        first = builder.mul(row, ir.Constant(row.type, ROW))
-        parts = [builder.gep(rows, [builder.add(first, ir.Constant(row.type, k))]) for k in range(ROW)]
-        return parts[0], builder.bitcast(parts[1], I64.as_pointer()), parts[2]
+        """Pointers to the values, the place and the factors of a row that robots do not share."""
+        first = builder.gep(rows, [builder.mul(row, ir.Constant(row.type, ROW))])
+        parts = ((0, VECTOR), (PLACE, I64), (FACTOR, VECTOR))
+        return [
+            builder.bitcast(builder.gep(first, [ir.Constant(row.type, at)]), kind.as_pointer()) for at, kind in parts
+        ]
 
     def read(self, builder, rows, row):
-        return tuple(builder.load(pointer) for pointer in self.pointers(builder, rows, row))
+        parts = [builder.load(pointer) for pointer in self.pointers(builder, rows, row)]
+        for part in parts:
+            part.align = 8
+        return tuple(parts)
 
     def write(self, builder, rows, row, number):
         for part, pointer in zip(known(number), self.pointers(builder, rows, row), strict=True):
-            builder.store(part, pointer)
+            builder.store(part, pointer).align = 8
 
     def gathered(self, builder, rows, value):
-        return builder.load(builder.gep(rows, [builder.fptosi(value, I64)])), None, None
+        return registers.gathered(builder, rows, value), None, None
 
 
 def known(number):
@@ -249,20 +273,11 @@ def known(number):
     return (value, NOWHERE, ZERO) if place is None else (value, place, factor)
 
 
-teach_masks(mask)
 recorded = Recorded(lanes, mask, Rows)
 load, load_at, store = intrinsic(recorded.load), intrinsic(recorded.load_at), intrinsic(recorded.store)
 splat, select = intrinsic(recorded.splat), intrinsic(recorded.select)
 sqrt, absolute, floor = intrinsic(recorded.sqrt), intrinsic(recorded.absolute), intrinsic(recorded.floor)
 add_product, subtract_product = intrinsic(recorded.add_product), intrinsic(recorded.subtract_product)
-
-
-@intrinsic
-def any_lane(typing_context, condition):
-    """Whether the mask holds for the robot."""
-    if condition != mask:
-        return None
-    return types.boolean(mask), lambda context, builder, sig, args: args[0]
 
 
 @intrinsic
@@ -283,12 +298,13 @@ def _memory_of(context, builder, array_type, array):
 
 @intrinsic
 def begin_tape(typing_context, entries, first):
-    """Begin a tape in `entries`, shape (capacity, ENTRY), behind what stands at places below `first`."""
+    """Begin a tape in `entries`, ENTRY numbers each, behind what stands at places below `first`."""
     if not (isinstance(entries, types.Array) and isinstance(first, types.Integer)):
         return None
 
     def codegen(context, builder, sig, args):
-        capacity = builder.extract_value(context.make_array(sig.args[0])(context, builder, args[0]).shape, 0)
+        size = context.make_array(sig.args[0])(context, builder, args[0]).nitems
+        capacity = builder.sdiv(size, ir.Constant(I64, ENTRY))
         begin = _memory_of(context, builder, sig.args[0], args[0])
         for which, number in ((COUNT, args[1]), (LIMIT, capacity), (BEGIN, begin)):
             builder.store(number, _state(builder, which))
