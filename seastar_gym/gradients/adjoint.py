@@ -50,7 +50,7 @@ QUANTITIES = ("hub", *Motion._fields)
 """Quantities of a swim that a number may depend on."""
 SPARE_STEPS = 16
 """Steps more than there are ends of steps in an interval, for which there is room at first."""
-ENTRIES = 1 << 16
+ENTRIES = 1 << 14
 """Entries of a new tape; it grows where steps need more. Each takes 80 bytes with four lanes, its slope included."""
 
 MOST_KEPT = 64e6
@@ -132,10 +132,10 @@ class Record:
         self._states, self._reports, work = [(self._start.q, self._start.v)], [], []
         self._kept, room = list[Floats | None](), MOST_KEPT
         for k in range(len(commands)):
-            done, report, state, kept = self._swim(k)
+            done, report, at_end, kept = self._swim(k)
             work.append(done)
             self._reports.append(report)
-            self._states.append(state)
+            self._states.append(at_end)
             room -= kept.nbytes
             self._kept.append(kept if room >= 0.0 else None)
         places, velocities = (
@@ -275,17 +275,18 @@ class _Sweep:
 
     def __init__(self, record: Record, given: Mapping[str, Floats], changes: Sequence[Start]):
         self._record, one, stages = record, record._rods, record._scheme.n_stages
-        self._rods = _on_tape(side_by_side([one] * N_LANES))
+        # Shared coefficients, where nobody asks for slopes in them, are known as constants when kernels are compiled.
+        self._rods = _on_tape(side_by_side([one] * N_LANES)) if changes else one
         self._moved = [
             np.any([change.coefficients[k] != 0.0 for change in changes], axis=0) & np.full(len(rows), bool(changes))
             for k, rows in enumerate(arrays_of(self._rods))
         ]
         self._n_coefficients = _number(self._rods, self._moved)
-        n_q, n_free = record._start.q.size, 2 * one.n_free
-        residual = np.zeros((stages * n_free, ROW))
-        self._work, self._own_work = _works(make_work(one, stages, again=True), residual, stages, one.n_points)
-        sizes = (n_q, n_q, record._n_a, *3 * (record._n_limbs,))
-        self._rows, self._beside = (Rows(*(np.zeros((n, ROW)) for n in sizes), residual) for _ in range(2))
+        n_q = record._start.q.size
+        sizes = (n_q, n_q, record._n_a, *3 * (record._n_limbs,), 2 * one.n_free * stages)
+        self._rows, self._beside = (Rows(*(np.zeros((n, ROW)) for n in sizes)) for _ in range(2))
+        memory = make_work(one, stages, again=True)
+        self._work, self._own_work = _works(memory, self._rows.residual, stages, one.n_points)
         self._grow(ENTRIES)
         of_places, of_rest = slopes_of_heading(record.swim.positions, record._start.rest)
         in_places = given["positions"] + given["heading"][:, None, None] * of_places
@@ -333,7 +334,7 @@ class _Sweep:
             Actuation(self._rows.start, self._rows.end), Actuation(self._beside.start, self._beside.end),
             record._limits, np.zeros((len(REPORT_ROWS), ROW)), record._rods, self._own_work, np.zeros((1, N_LANES)),
         )  # fmt: skip
-        places, places_beside = (Rows(*(part.view(np.int64) for part in rows)) for rows in (self._rows, self._beside))
+        places, places_beside = (Rows(*(part.view(np.uint64) for part in rows)) for rows in (self._rows, self._beside))
         while True:
             of = Slopes(self.of_q.copy(), self.of_v.copy(), np.zeros(record._n_a), 0.0 * turned, of_work)
             tape = Tape(self._entries, self._entries.view(np.uint32), self._slopes, first)
