@@ -102,7 +102,7 @@ def gradient(
 
 
 def record(scene: Scene, commands: ArrayLike, state: State | None = None, duration: float | None = None) -> "Record":
-    """Swim with these commands, and keep the states between intervals, for gradients of the swim.
+    """Swim with these commands, and keep the time steps, for gradients of the swim.
 
     Arguments are those of `differentiate`.
     """
