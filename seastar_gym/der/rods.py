@@ -89,7 +89,7 @@ class Work(NamedTuple):
     normals: Unit normals of the edges where a stage began, or None in scenes that need none; see fluid.py.
     current: Velocity of the fluid at every node there [m/s], or None.
     added_mass: Mass of fluid at every node there, xx, xy, yy [kg], or None.
-    pivots, root_pivots: For solutions of other right-hand sides, see star_solution.py, or None without contact.
+    pivots, root_pivots: For solutions of other right-hand sides, see star_solution.py, or None where nobody asks.
     contact: Memory of contact, or None.
     tension, bending: EA eps [N] and EI kappa [N m] of edges and hinges where a stage began, or None without damping.
     body: Memory of a body, or None.
@@ -126,8 +126,11 @@ class Work(NamedTuple):
     body: body.BodyWork | None
 
 
-def make_work(rods: Rods, n_stages: int) -> Work:
-    """Zeroed memory for one lane group of such rods and a scheme of `n_stages` stages."""
+def make_work(rods: Rods, n_stages: int, again: bool = False) -> Work:
+    """Zeroed memory for one lane group of such rods and a scheme of `n_stages` stages.
+
+    again: Whether linear systems are solved for other right-hand sides, too, as they are with contact.
+    """
     n_limbs, n_edges, n_nodes, n_points = rods.n_limbs, rods.n_edges, rods.n_nodes, rods.n_points
 
     def rows(count):
@@ -157,8 +160,8 @@ def make_work(rods: Rods, n_stages: int) -> Work:
         normals=None if rods.cross_drag is None and rods.added_mass is None else rows(2 * n_nodes),
         current=None if rods.current is None else rows(2 * rods.n_places),
         added_mass=None if rods.added_mass is None else rows(3 * rods.n_places),
-        pivots=None if rods.contact is None else rows(2 * n_nodes),
-        root_pivots=None if rods.contact is None else rows(2 * (n_limbs + 1)),
+        pivots=rows(2 * n_nodes) if again or rods.contact is not None else None,
+        root_pivots=rows(2 * (n_limbs + 1)) if again or rods.contact is not None else None,
         contact=contact.memory(rods.contact, n_limbs, rods.edges_per_limb, n_points),
         tension=None if rods.damping is None else rows(n_edges),
         bending=None if rods.damping is None else rows(n_edges),

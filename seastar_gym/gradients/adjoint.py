@@ -11,10 +11,20 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.der.rods import Work, make_work
 from seastar_gym.der.stepping.report import MOMENTS, REPORT_ROWS, SMALLEST_HUB_T, WORK
 from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
-from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import Actuation
-from seastar_gym.gradients.history import CAPACITY, COUNTERS, INTERVAL, N_STEPS, OF_STEP, Kept, keeping_swim, n_numbers
-from seastar_gym.gradients.replay import Rows, Slopes, Tape, pulling_back
+from seastar_gym.gradients.history import (
+    CAPACITY,
+    COUNTERS,
+    INTERVAL,
+    N_STEPS,
+    OF_STAGE,
+    OF_STEP,
+    Kept,
+    keeping_advance,
+    n_numbers,
+)
+from seastar_gym.gradients.replay import Replayed, Rows, Slopes, Tape, pulling_back
+from seastar_gym.gradients.replay import Scene as SceneOnTape
 from seastar_gym.gradients.stencils import arrays_of
 from seastar_gym.gradients.swim import (
     COUNTS,
@@ -31,7 +41,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_floats, shown
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import aligned_rows, side_by_side
-from seastar_gym.simd.tape_lanes import ENTRY, ROW
+from seastar_gym.simd.tape_lanes import ENTRY, FACTOR, PLACE, ROW
 from seastar_gym.simulator.state import State
 
 Floats = NDArray[np.float64]
@@ -40,11 +50,14 @@ QUANTITIES = ("hub", *Motion._fields)
 """Quantities of a swim that a number may depend on."""
 SPARE_STEPS = 16
 """Steps more than there are ends of steps in an interval, for which there is room at first."""
-ENTRIES = 1 << 16
-"""Entries of a new tape; it grows where a time step needs more. Each takes 24 bytes, and 8 for its slope."""
+ENTRIES = 1 << 14
+"""Entries of a new tape; it grows where steps need more. Each takes 80 bytes with four lanes, its slope included."""
 
-WorkOfGradient = namedtuple("WorkOfGradient", (*Work._fields, "kept", "solution"))  # type: ignore[misc]
-"""`Work` with a history, see history.py, or with the numbers of a step, see replay.py."""
+MOST_KEPT = 64e6
+"""Memory of the time steps that a record keeps [B]; others are swum once more."""
+
+WorkOfGradient = namedtuple("WorkOfGradient", (*Work._fields, "kept", "replayed"))  # type: ignore[misc]
+"""`Work` with a history, see history.py, or with a step that is replayed, see replay.py."""
 
 _the_tape = Lock()
 
@@ -89,7 +102,7 @@ def gradient(
 
 
 def record(scene: Scene, commands: ArrayLike, state: State | None = None, duration: float | None = None) -> "Record":
-    """Swim with these commands, and keep the states between intervals, for gradients of the swim.
+    """Swim with these commands, and keep the time steps, for gradients of the swim.
 
     Arguments are those of `differentiate`.
     """
@@ -102,8 +115,8 @@ class Record:
 
     swim: The swim, to the bits of `Simulator`. status: SolverStatus of every interval, shape (n,).
 
-    Between intervals it keeps the state alone. `gradient` swims one interval after the other once more and keeps its
-    time steps while it goes back through it: some 30 kB each for a robot of 56 nodes.
+    It keeps its time steps, 3.7 kB each for a robot of 56 nodes, as far as they fit MOST_KEPT, and the states between
+    intervals: `gradient` swims others once more, one interval after the other.
     """
 
     def __init__(self, scene: Scene, commands: Floats, state: State | None, duration: float):
@@ -114,13 +127,17 @@ class Record:
         self._held = np.array([2 * node + axis for node in scene.held_nodes for axis in (0, 1)], dtype=int)
         self._start = start_of(scene, state)
         drives = Rotations(scene, state, commands, ())
-        self._memory, self._work = np.zeros((0, N_LANES)), make_work(self._rods, self._scheme.n_stages)
+        self._work = make_work(self._rods, self._scheme.n_stages)
         self._turns = [drives.interval(k, duration)[:2] for k in range(len(commands))]
         self._states, self._reports, work = [(self._start.q, self._start.v)], [], []
-        for times, turned in self._turns:
-            done, report = self._swim(times, turned)
+        self._kept, room = list[Floats | None](), MOST_KEPT
+        for k in range(len(commands)):
+            done, report, at_end, kept = self._swim(k)
             work.append(done)
             self._reports.append(report)
+            self._states.append(at_end)
+            room -= kept.nbytes
+            self._kept.append(kept if room >= 0.0 else None)
         places, velocities = (
             np.array([state[field][: 2 * self._rods.n_nodes] for state in self._states]).reshape(
                 len(self._states), -1, 2
@@ -203,53 +220,44 @@ class Record:
         stages, has_body = self._scheme.n_stages, self._rods.body is not None
         return (2 * self._rods.n_free + 1) * stages + 2 + (stages if has_body else 0)
 
-    def _swim(self, times: Floats, turned: Floats) -> tuple[float, dict[str, float]]:
-        """Swim on through an interval; the actuators' work [J], and the report."""
-        q, v, a = self._lanes(-1)
-        report, effort = np.zeros((1, len(REPORT_ROWS), N_LANES)), np.zeros((1, MOMENTS + self._n_limbs, N_LANES))
-        report[:, SMALLEST_HUB_T] = np.inf
-        shape = np.repeat(turned.ravel()[:, None], N_LANES, axis=1)
-        peaks, failed = np.ones((1, self._n_limbs, N_LANES)), np.zeros((1, 1, N_LANES))
-        advance(
-            self._rods, self._work, self._scheme, SCHEMES["implicit-euler"],
-            _actuation(self._n_limbs, N_LANES), q[None], v[None], a[None], peaks, times, shape[None],
-            self._n_limbs, failed, report, self._limits, effort,
-        )  # fmt: skip
-        if failed[0, 0, 0] > 0.0:
-            q[:] = v[:] = effort[:] = np.nan
-        q[self._held, 0], v[self._held] = self._states[-1][0][self._held], 0.0
-        self._states.append((q[:, 0].copy(), v[:, 0].copy()))
-        counts = dict(zip(REPORT_ROWS, report[0, :, 0].tolist(), strict=True))
-        return float(effort[0, WORK, 0]), {**counts, "status": float(failed[0, 0, 0])}
+    def history(self, k: int) -> Floats:
+        """Every step of interval k and where the last one ended, shape (n_steps + 1, n_numbers), see history.py."""
+        kept = self._kept[k]
+        return self._swim(k)[3] if kept is None else kept
 
-    def _keep(self, k: int) -> Floats:
-        """History of interval k, shape (n_steps + 1, n_numbers): of every step, and where the last one has ended."""
+    def _swim(self, k: int) -> tuple[float, dict[str, float], tuple[Floats, Floats], Floats]:
+        """Swim through interval k: the actuators' work [J], the report, (q, v) at its end, and its history."""
         times, turned = self._turns[k]
         n_q, stages = self._start.q.size, self._scheme.n_stages
         n_rows = n_numbers(n_q, self._n_a, stages, self._rods.n_points)
+        rows = aligned_rows(n_rows, N_LANES)
         shape = np.repeat(turned.ravel()[:, None], N_LANES, axis=1)
         capacity = len(times) + SPARE_STEPS
         while True:
             q, v, a = self._lanes(k)
-            if len(self._memory) < (capacity + 1) * n_rows:
-                self._memory = aligned_rows((capacity + 1) * n_rows, N_LANES)
-            counters, rows = np.zeros(COUNTERS), self._memory[: (capacity + 1) * n_rows]
+            report, effort = np.zeros((1, len(REPORT_ROWS), N_LANES)), np.zeros((1, MOMENTS + self._n_limbs, N_LANES))
+            report[:, SMALLEST_HUB_T] = np.inf
+            peaks, failed = np.ones((1, self._n_limbs, N_LANES)), np.zeros((1, 1, N_LANES))
+            counters, found = np.zeros(COUNTERS), np.empty((capacity + 1, n_rows))
             counters[CAPACITY] = capacity
-            kept = Kept(counters, rows, n_rows, n_q, self._n_a)
-            work = WorkOfGradient(*self._work, kept, None)  # type: ignore[call-arg]
-            keeping_swim()(
-                self._rods, work, self._scheme, SCHEMES["implicit-euler"], _actuation(self._n_limbs, N_LANES), q, v,
-                a, times, shape, self._limits, np.zeros((len(REPORT_ROWS), N_LANES)),
+            kept = Kept(counters, rows, rows.ravel(), found.ravel(), n_rows, n_q, self._n_a)
+            keeping_advance()(
+                self._rods, WorkOfGradient(*self._work, kept, None), self._scheme,  # type: ignore[call-arg]
+                SCHEMES["implicit-euler"], _actuation(self._n_limbs, N_LANES), q[None], v[None], a[None], peaks, times,
+                shape[None], self._n_limbs, failed, report, self._limits, effort,
             )  # fmt: skip
             n = int(counters[N_STEPS])
             if n < capacity:
                 break
             capacity *= 2
-        found: Floats = np.ascontiguousarray(rows.reshape(capacity + 1, n_rows, N_LANES)[: n + 1, :, 0])
         found[n] = 0.0
         found[n, INTERVAL] = len(times) - 1
         found[n, OF_STEP : OF_STEP + n_q], found[n, OF_STEP + n_q : OF_STEP + 2 * n_q] = q[:, 0], v[:, 0]
-        return found
+        if failed[0, 0, 0] > 0.0:
+            q[:] = v[:] = effort[:] = np.nan
+        q[self._held, 0], v[self._held] = self._states[k][0][self._held], 0.0
+        counts = {**dict(zip(REPORT_ROWS, report[0, :, 0].tolist(), strict=True)), "status": float(failed[0, 0, 0])}
+        return float(effort[0, WORK, 0]), counts, (q[:, 0].copy(), v[:, 0].copy()), found[: n + 1]
 
 
 def _actuation(n_limbs: int, n: int) -> Actuation:
@@ -267,17 +275,18 @@ class _Sweep:
 
     def __init__(self, record: Record, given: Mapping[str, Floats], changes: Sequence[Start]):
         self._record, one, stages = record, record._rods, record._scheme.n_stages
-        self._rods = _on_tape(side_by_side([one]))
+        # Shared coefficients, where nobody asks for slopes in them, are known as constants when kernels are compiled.
+        self._rods = _on_tape(side_by_side([one] * N_LANES)) if changes else one
         self._moved = [
             np.any([change.coefficients[k] != 0.0 for change in changes], axis=0) & np.full(len(rows), bool(changes))
             for k, rows in enumerate(arrays_of(self._rods))
         ]
         self._n_coefficients = _number(self._rods, self._moved)
-        memory = make_work(one, stages)
         n_q = record._start.q.size
-        n_rows = n_numbers(n_q, record._n_a, stages, one.n_points)
-        self._work = WorkOfGradient(*_on_tape(memory), None, np.zeros(1 + n_rows))  # type: ignore[call-arg]
-        self._rows = Rows(*(np.zeros((n, ROW)) for n in (n_q, n_q, record._n_a, *3 * (record._n_limbs,))))
+        sizes = (n_q, n_q, record._n_a, *3 * (record._n_limbs,), 2 * one.n_free * stages)
+        self._rows, self._beside = (Rows(*(np.zeros((n, ROW)) for n in sizes)) for _ in range(2))
+        memory = make_work(one, stages, again=True)
+        self._work, self._own_work = _works(memory, self._rows.residual, stages, one.n_points)
         self._grow(ENTRIES)
         of_places, of_rest = slopes_of_heading(record.swim.positions, record._start.rest)
         in_places = given["positions"] + given["heading"][:, None, None] * of_places
@@ -310,44 +319,77 @@ class _Sweep:
         return float(total)
 
     def _grow(self, capacity: int) -> None:
-        self._entries = np.zeros((capacity, ENTRY))
+        self._entries = np.zeros(capacity * ENTRY)
         self._slopes = np.zeros(capacity)
 
     def _pull_back(self, k: int, of_work: float) -> Floats:
         """Take slopes through interval k; returns those in its rotations, shape (n_times, n_limbs)."""
         record = self._record
         times, turned = record._turns[k]
-        kept = record._keep(k)
+        kept = record.history(k)
         first = 1 + self._n_coefficients
         before = self._slopes[:first].copy()
-        scene = (
+        scene = SceneOnTape(
             self._rods, self._work, record._scheme, SCHEMES["implicit-euler"],
-            Actuation(self._rows.start, self._rows.end), record._limits, np.zeros((len(REPORT_ROWS), ROW)),
+            Actuation(self._rows.start, self._rows.end), Actuation(self._beside.start, self._beside.end),
+            record._limits, np.zeros((len(REPORT_ROWS), ROW)), record._rods, self._own_work, np.zeros((1, N_LANES)),
         )  # fmt: skip
-        places = Rows(*(rows.view(np.int64) for rows in self._rows))
+        places, places_beside = (Rows(*(part.view(np.uint64) for part in rows)) for rows in (self._rows, self._beside))
         while True:
             of = Slopes(self.of_q.copy(), self.of_v.copy(), np.zeros(record._n_a), 0.0 * turned, of_work)
-            tape = Tape(self._entries, self._entries.view(np.int32), self._slopes, first)
-            outcome = pulling_back()(scene, tape, self._rows, places, kept, times, turned, of)
+            tape = Tape(self._entries, self._entries.view(np.uint32), self._slopes, first)
+            outcome = pulling_back()(
+                scene, tape, self._rows, places, self._beside, places_beside, kept, times, turned, of
+            )
             if outcome == 0:
                 break
             if outcome == 2:
                 raise RuntimeError("A time step could not be repeated as it was.")
-            self._grow(2 * len(self._entries))
+            self._grow(2 * len(self._slopes))
             self._slopes[:first] = before
         self.of_q, self.of_v = of.q, of.v
         return of.shape
 
 
 def _on_tape(bundle: Any) -> Any:
-    """A bundle whose rows of robots are rows of a tape: value and place, which is 0."""
+    """A bundle whose rows of robots are rows of a tape: values, and factors and place, which are 0."""
     if isinstance(bundle, np.ndarray) and bundle.ndim == 2:
         rows = aligned_rows(len(bundle), ROW)
-        rows[:, 0] = bundle[:, 0]
+        rows[:, :N_LANES] = bundle
         return rows
     if hasattr(bundle, "_fields"):
         return bundle._replace(**{name: _on_tape(getattr(bundle, name)) for name in bundle._fields})
     return bundle
+
+
+def _works(own: Work, residual: Floats, n_stages: int, n_points: int) -> tuple[Any, Work]:
+    """Memory on a tape, and on the lanes of `Simulator`; its rows stand one behind the other in both, see Replayed."""
+    n_lists, n_rows = (sum(len(part) for part in arrays_of(own) if part.ndim == n) for n in (1, 2))
+    memory, lists = np.zeros((n_rows, ROW)), np.zeros(n_lists)
+    slots = 1 if n_stages == 1 else n_stages + 1
+    of_stages, of_lists = aligned_rows(slots, n_rows, N_LANES), np.zeros((slots, n_lists))
+    replayed = Replayed(
+        np.zeros((OF_STEP + 1, ROW)), np.zeros((n_stages * (OF_STAGE + 2 * n_points), ROW)), np.zeros(1),
+        np.zeros(n_stages), residual, memory.ravel(), lists, of_stages.ravel(), of_lists.ravel(), n_rows, n_lists,
+    )  # fmt: skip
+    on_tape = WorkOfGradient(*_in_memory(own, memory, lists), None, replayed)  # type: ignore[call-arg]
+    return on_tape, _in_memory(own, of_stages[-1], of_lists[-1])
+
+
+def _in_memory(bundle: Any, rows: Floats, lists: Floats) -> Any:
+    """A bundle whose arrays stand in these, one behind the other: rows of robots, and what robots share."""
+    taken = [0, 0]
+
+    def placed(part: Any) -> Any:
+        if isinstance(part, np.ndarray):
+            begin = taken[part.ndim - 1]
+            taken[part.ndim - 1] += len(part)
+            return (lists, rows)[part.ndim - 1][begin : begin + len(part)]
+        if hasattr(part, "_fields"):
+            return part._replace(**{name: placed(getattr(part, name)) for name in part._fields})
+        return part
+
+    return placed(bundle)
 
 
 def _number(bundle: Any, moved: Sequence[NDArray[np.bool_]]) -> int:
@@ -356,6 +398,7 @@ def _number(bundle: Any, moved: Sequence[NDArray[np.bool_]]) -> int:
     for rows, some in zip(arrays_of(bundle), moved, strict=True):
         if rows.ndim == 2:
             count = int(some.sum())
-            rows.view(np.int64)[some, 1] = np.arange(n + 1, n + 1 + count)
+            rows.view(np.int64)[some, PLACE] = np.arange(n + 1, n + 1 + count)
+            rows[some, FACTOR:PLACE] = 1.0
             n += count
     return n

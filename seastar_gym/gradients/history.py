@@ -1,45 +1,49 @@
 """What a swim leaves of each time step for `replay.py`, which differentiates it: where it began, and its solutions.
 
-`swim_and_keep` advances as `advance` of der/stepping/stroke.py does, to the same bits, on the lanes of `Simulator`.
+`keeping_advance` is `advance` of der/stepping/stroke.py, to the same bits and on the lanes of `Simulator`.
 """
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba.core.compiler_lock import global_compiler_lock
 from numpy.typing import NDArray
 
-from seastar_gym.der.body.body import move_roots
-from seastar_gym.der.stepping import interval, steps
+from seastar_gym.der.stepping import interval, steps, stroke
 from seastar_gym.der.stepping.interval import FALLBACK_AFTER, cover_interval
+from seastar_gym.der.stepping.momentum import correct_momentum
 from seastar_gym.der.stepping.newton import minimise
 from seastar_gym.der.stepping.steps import try_step
-from seastar_gym.der.stepping.stroke import shape_of_limb
+from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.simd import compilation, lanes
 from seastar_gym.simd.compilation import entry_point, kernel
-from seastar_gym.simd.lanes import any_lane, borrow, load, load_number, select, splat, store, store_number
+from seastar_gym.simd.lanes import N_LANES, any_lane, load, load_number, select, splat, store, store_number
 from seastar_gym.simd.modules import COMPILATION, LANES, KernelModules
 
 INTERVAL, START, SIZE, LIMIT, RETRYING, FALLBACK, OF_STEP = range(7)
-"""Rows of a step: number of its interval between two times, its beginning and its length as shares of that, its
+"""Numbers of a step: that of its interval between two times, its beginning and its length as shares of that, its
 iteration limit, and whether it was retried or taken by the fallback. Behind them stand q, v and a at its beginning and,
-stage by stage, OF_STAGE rows and the solution q."""
+stage by stage, OF_STAGE numbers and the solution q."""
 PHI, SETBACKS, OF_STAGE = range(3)
-"""Rows of a stage: Phi before its last Newton step, and how many of its steps were shortened or regularised."""
+"""Numbers of a stage: Phi before its last Newton step, and how many of its steps were shortened or regularised."""
 N_STEPS, CAPACITY, STAGE, NOW, COUNTERS = range(5)
 """Whole numbers of a history: steps that it has, and room for; stage and interval at hand."""
 
 
 class Kept(NamedTuple):
-    """History of a lane group.
+    """History of the first robot of a lane group.
 
-    counters: Whole numbers, see above. rows: Of all steps, n_rows each. n_q, n_a: Rows of q, as many of v, and of a.
+    counters: Whole numbers, see above. rows, numbers: Memory of the step at hand, shape (n_rows, N_LANES), and the same
+    memory in one row. steps: Numbers of all steps, one after the other, n_rows each. n_q, n_a: Rows of q, as many of v,
+    and of a.
     """
 
     counters: NDArray[np.float64]
     rows: NDArray[np.float64]
+    numbers: NDArray[np.float64]
+    steps: NDArray[np.float64]
     n_rows: int
     n_q: int
     n_a: int
@@ -51,62 +55,64 @@ def n_numbers(n_q: int, n_a: int, n_stages: int, n_points: int) -> int:
 
 
 @kernel
-def keep(kept, row, value):
-    """Keep a number of the step at hand."""
-    store(kept.rows, int(load_number(kept.counters, N_STEPS)) * kept.n_rows + row, value)
-
-
-@kernel
 def try_and_keep(rods, work, scheme, actuation, q, v, a, step, active, limits, report):
-    """try_step, which leaves in work.kept where it began."""
+    """try_step, which leaves in work.kept where it began and, once it is accepted, all of it."""
     kept = work.kept
     for row in range(kept.n_q):
-        keep(kept, OF_STEP + row, load(q, row))
-        keep(kept, OF_STEP + kept.n_q + row, load(v, row))
+        store(kept.rows, OF_STEP + row, load(q, row))
+        store(kept.rows, OF_STEP + kept.n_q + row, load(v, row))
     for row in range(kept.n_a):
-        keep(kept, OF_STEP + 2 * kept.n_q + row, load(a, row))
-    keep(kept, INTERVAL, splat(load_number(kept.counters, NOW)))
-    keep(kept, START, step.start)
-    keep(kept, SIZE, step.size)
-    keep(kept, LIMIT, step.iteration_limit)
-    keep(kept, RETRYING, select(step.retrying, splat(1.0), splat(0.0)))
+        store(kept.rows, OF_STEP + 2 * kept.n_q + row, load(a, row))
+    store(kept.rows, INTERVAL, splat(load_number(kept.counters, NOW)))
+    store(kept.rows, START, step.start)
+    store(kept.rows, SIZE, step.size)
+    store(kept.rows, LIMIT, step.iteration_limit)
+    store(kept.rows, RETRYING, select(step.retrying, splat(1.0), splat(0.0)))
     of_fallback = step.iteration_limit > FALLBACK_AFTER * limits.max_iterations
-    keep(kept, FALLBACK, select(of_fallback, splat(1.0), splat(0.0)))
+    store(kept.rows, FALLBACK, select(of_fallback, splat(1.0), splat(0.0)))
     store_number(kept.counters, STAGE, 0.0)
     good, accepted, error_rate = try_step(rods, work, scheme, actuation, q, v, a, step, active, limits, report)
     n = load_number(kept.counters, N_STEPS)
     if any_lane(accepted) and n < load_number(kept.counters, CAPACITY):
+        for row in range(kept.n_rows):
+            store_number(kept.steps, int(n) * kept.n_rows + row, load_number(kept.numbers, row * N_LANES))
         store_number(kept.counters, N_STEPS, n + 1.0)
     return good, accepted, error_rate
 
 
 @kernel
-def minimise_and_keep(rods, work, stage, active, tolerance, iteration_limit):
-    """minimise, which leaves in work.kept what it has found."""
-    found = minimise(rods, work, stage, active, tolerance, iteration_limit)
-    kept, n_solution = work.kept, 2 * rods.n_points
+def row_of_stage(rods, kept):
+    """First row of the stage at hand."""
     k = int(load_number(kept.counters, STAGE))
-    row = OF_STEP + 2 * kept.n_q + kept.n_a + k * (OF_STAGE + n_solution)
-    keep(kept, row + PHI, found[1])
-    keep(kept, row + SETBACKS, found[3] + found[4])
-    for coordinate in range(n_solution):
-        keep(kept, row + OF_STAGE + coordinate, load(work.q, coordinate))
-    store_number(kept.counters, STAGE, k + 1.0)
+    return OF_STEP + 2 * kept.n_q + kept.n_a + k * (OF_STAGE + 2 * rods.n_points)
+
+
+@kernel
+def minimise_and_keep(rods, work, stage, active, tolerance, iteration_limit):
+    """minimise, which leaves in work.kept what it has found, but for the solution."""
+    found = minimise(rods, work, stage, active, tolerance, iteration_limit)
+    row = row_of_stage(rods, work.kept)
+    store(work.kept.rows, row + PHI, found[1])
+    store(work.kept.rows, row + SETBACKS, found[3] + found[4])
     return found
 
 
 @kernel
-def swim_and_keep(rods, work, scheme, fallback, actuation, q, v, a, times, n_intervals, shape, limits, report):
-    """Advance a lane group through the intervals between `times`, see `advance` of der/stepping/stroke.py."""
-    move_roots(rods, q, v)
-    alive = splat(0.0) < 1.0
-    for k in range(n_intervals):
-        for limb in range(rods.n_limbs):
-            store(actuation.delta_psi_start, limb, splat(1.0) * shape_of_limb(shape, rods.n_limbs, k, limb))
-            store(actuation.delta_psi_end, limb, splat(1.0) * shape_of_limb(shape, rods.n_limbs, k + 1, limb))
-        store_number(work.kept.counters, NOW, float(k))
-        duration = load_number(times, k + 1) - load_number(times, k)
-        alive = cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, alive, limits, report)
+def correct_and_keep(rods, work, scheme, k, stage, q_0, v_0, h, robots):
+    """correct_momentum, which leaves the solution in work.kept."""
+    correct_momentum(rods, work, scheme, k, stage, q_0, v_0, h, robots)
+    row = row_of_stage(rods, work.kept) + OF_STAGE
+    for coordinate in range(2 * rods.n_points):
+        store(work.kept.rows, row + coordinate, load(work.q, coordinate))
+    store_number(work.kept.counters, STAGE, load_number(work.kept.counters, STAGE) + 1.0)
+
+
+@kernel
+def cover_and_count(rods, work, scheme, fallback, actuation, q, v, a, duration, alive, limits, report):
+    """cover_interval, which leaves in work.kept how many intervals are behind."""
+    alive = cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, alive, limits, report)
+    store_number(work.kept.counters, NOW, load_number(work.kept.counters, NOW) + 1.0)
+    return alive
 
 
 class KeepingKernels(KernelModules):
@@ -114,25 +120,28 @@ class KeepingKernels(KernelModules):
 
     def __init__(self) -> None:
         super().__init__({LANES: lanes, COMPILATION: compilation})
+        vars(self._module_of(stroke.__name__))["cover_interval"] = self(cover_and_count)
         vars(self._module_of(interval.__name__))["try_step"] = self(try_and_keep)
-        vars(self._module_of(steps.__name__))["minimise"] = self(minimise_and_keep)
+        of_steps = {"minimise": self(minimise_and_keep), "correct_momentum": self(correct_and_keep)}
+        vars(self._module_of(steps.__name__)).update(of_steps)
 
 
-swim_on_keeping_lanes: Any = None
-"""`swim_and_keep` with kernels that keep, once somebody has asked for it."""
+groups_on_keeping_lanes: Callable[..., None]
+"""`advance` with kernels that keep, once somebody has asked for it."""
 
 
 @entry_point
-def _swim_and_keep(rods, work, scheme, fallback, actuation, q, v, a, times, shape, limits, report):
-    swim_on_keeping_lanes(  # there when it is compiled
-        borrow(rods), borrow(work), borrow(scheme), borrow(fallback), borrow(actuation), borrow(q), borrow(v),
-        borrow(a), borrow(times), times.shape[0] - 1, borrow(shape), borrow(limits), borrow(report),
+def _advance_and_keep(
+    rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shape, n_turning, failed, report, limits, effort
+):  # fmt: skip
+    groups_on_keeping_lanes(  # noqa: F821 - there when it is compiled
+        rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shape, n_turning, failed, report, limits, effort
     )  # fmt: skip
 
 
 @global_compiler_lock
 @cache
-def keeping_swim() -> Callable[..., None]:
-    """The entry point; `work` has a history in its field `kept`."""
-    globals()["swim_on_keeping_lanes"] = KeepingKernels()(swim_and_keep)
-    return _swim_and_keep
+def keeping_advance() -> Callable[..., None]:
+    """The entry point; its arguments are those of `advance`, and `work` has a history in its field `kept`."""
+    globals()["groups_on_keeping_lanes"] = kernel(KeepingKernels()(advance).py_func)
+    return _advance_and_keep

@@ -1,10 +1,11 @@
 """Reverse differentiation of a swim: its time steps once more, from the last to the first, on a tape.
 
-A step is replayed from what history.py has kept of it, on the lanes of simd/tape_lanes.py. Newton's solution of a stage
-is read instead of found, and is differentiated as solved exactly, as in implicit.py: q becomes q - H^-1 g, q and H
-constant, so no second slope is on the tape. The tape of H^-1 g holds the elimination of the star, so that reading it
-from its end is the transposed solution. What steps leave for each other (q, v and a) takes derivatives from each step
-to the one before.
+Steps are replayed from what history.py has kept of them, side by side on the lanes of simd/tape_lanes.py, as if each
+were of another robot. Newton's solution of a stage is read instead of found, and is differentiated as solved exactly,
+as in implicit.py: q becomes q - H^-1 g, q and H constant. The tape has g alone. It ends there, and goes on from q as
+from what has no parents. Where it is read, slopes s in q become slopes -H^-1 s in g, as H is symmetric; H is made and
+eliminated on the lanes of `Simulator`. The tape is read for one step after the other: what steps leave for each other
+(q, v and a) takes derivatives from each to the one before.
 """
 
 from collections.abc import Callable
@@ -16,17 +17,18 @@ from numba.core.compiler_lock import global_compiler_lock
 from numpy.typing import NDArray
 
 from seastar_gym.der import potential
-from seastar_gym.der.body.body import carry_roots, gather_roots, move_roots, place_roots
-from seastar_gym.der.contact.contact import PRESSED, SLOT_ROWS, add_gap_gradient, gap, n_listed
+from seastar_gym.der.body.body import move_roots, place_roots
 from seastar_gym.der.contact.coupled import solve_again_coupled
 from seastar_gym.der.energy import fill_moments
-from seastar_gym.der.linear import rigid_hub, star_matrix
-from seastar_gym.der.linear.star_matrix import eliminate_node, eliminate_root, store_root
-from seastar_gym.der.linear.star_solution import solve_again, substitute_star
+from seastar_gym.der.linear.star_matrix import load_pair, store_pair
+from seastar_gym.der.linear.star_solution import solve_again
 from seastar_gym.der.potential import factorise
+from seastar_gym.der.rods import Rods, Work
 from seastar_gym.der.stepping import steps
-from seastar_gym.der.stepping.momentum import correct_momentum
+from seastar_gym.der.stepping.schemes import Scheme
+from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.der.stepping.steps import Step, try_step
+from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.gradients.history import (
     FALLBACK,
     INTERVAL,
@@ -41,95 +43,113 @@ from seastar_gym.gradients.history import (
 )
 from seastar_gym.simd import compilation, tape_lanes
 from seastar_gym.simd.compilation import entry_point, kernel
-from seastar_gym.simd.lanes import any_lane, borrow, load, load_number, splat, store, store_number, subtract_product
+from seastar_gym.simd.lanes import N_LANES, any_lane, borrow, load, load_number, splat, store, store_number
 from seastar_gym.simd.modules import COMPILATION, LANES, KernelModules
 from seastar_gym.simd.tape_lanes import (
+    ENTRY,
+    FACTOR,
+    PLACE,
+    ROW,
+    at_place,
     begin_tape,
-    constant,
     end_of_tape,
-    less_step,
-    pause_tape,
-    resume_tape,
+    leave_places,
     tape_is_full,
 )
 
 
-@kernel
-def read_solution(rods, work, stage, active, tolerance, iteration_limit):
-    """What minimise has found in the stage at hand, from work.solution: a number for the stage, then what was kept."""
-    k, n = int(load_number(work.solution, 0)), 2 * rods.n_points
-    row = 1 + k * (OF_STAGE + n)
-    for coordinate in range(n):
-        store(work.q, coordinate, load_number(work.solution, row + OF_STAGE + coordinate))
-    store_number(work.solution, 0, k + 1.0)
-    phi, setbacks = load_number(work.solution, row + PHI), load_number(work.solution, row + SETBACKS)
-    return active, splat(phi), splat(0.0), splat(setbacks), splat(0.0)
+class Replayed(NamedTuple):
+    """What steps are replayed from, and what is left of their stages.
+
+    step, stages: What was kept of the steps, as rows on a tape: the first OF_STEP numbers and, behind them, the length
+    [s]; those of all stages. stage: Number of the stage at hand. first: Places of the stages' solutions begin here.
+    residual: g of every stage, as rows on a tape. memory: All rows of `work`. lists: All that is in it and that robots
+    share. of_stages, of_lists: The same when a stage was left, as rows of `Simulator`, in a slot for every stage.
+    """
+
+    step: NDArray[np.float64]
+    stages: NDArray[np.float64]
+    stage: NDArray[np.float64]
+    first: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    memory: NDArray[np.float64]
+    lists: NDArray[np.float64]
+    of_stages: NDArray[np.float64]
+    of_lists: NDArray[np.float64]
+    n_rows: int
+    n_lists: int
 
 
 @kernel
-def correct_on_tape(rods, work, scheme, k, stage, q_0, v_0, h, robots):
-    """Settle the momentum, see momentum.py, and put the solution of stage k of a step on the tape."""
-    pause_tape()
-    correct_momentum(rods, work, scheme, k, stage, q_0, v_0, h, robots)
-    resume_tape()
+def row_of_stage(rods, work):
+    return int(load_number(work.replayed.stage, 0)) * (OF_STAGE + 2 * rods.n_points)
+
+
+@kernel
+def read_minimum(rods, work, stage, active, tolerance, iteration_limit):
+    """What minimise has found in the stage at hand, but for the solution."""
+    stages, row = work.replayed.stages, row_of_stage(rods, work)
+    return active, load(stages, row + PHI), splat(0.0), load(stages, row + SETBACKS), splat(0.0)
+
+
+@kernel
+def put_solution(rods, work, scheme, k, stage, q_0, v_0, h, robots):
+    """Put the solution of stage k of a step on the tape, and what else stands in work beside it."""
+    replayed, n, row = work.replayed, 2 * rods.n_free, row_of_stage(rods, work) + OF_STAGE
+    store_number(replayed.stage, 0, load_number(replayed.stage, 0) + 1.0)
+    for coordinate in range(2 * rods.n_points):
+        store(work.q, coordinate, load(replayed.stages, row + coordinate))
+        store(work.q_hat, coordinate, load(stage.q_hat, coordinate))
+        store(work.v_hat, coordinate, load(stage.v_hat, coordinate))
+    place_roots(rods, work.q)
+    leave_work(replayed, k)
     factorise(rods, work, stage, None)
-    substitute_star(rods, work, work.step)
-    solve_contact(rods, work)
-    for row in range(2 * rods.n_nodes):
-        store(work.q, row, less_step(load(work.q, row), load(work.step, row)))
-    if rods.body is not None:
-        row = 2 * rods.n_nodes
-        arc = load(rods.body.scale, 0) * load(work.step, row)
-        store(work.q, row, less_step(load(work.q, row), arc))
+    first = end_of_tape()
+    leave_places(n)
+    store_number(replayed.first, k, float(first))
+    for coordinate in range(n):
+        store(replayed.residual, k * n + coordinate, load(work.step, coordinate))
+        store(work.q, coordinate, at_place(load(work.q, coordinate), first + coordinate))
     place_roots(rods, work.q)
 
 
 @kernel
-def solve_contact(rods, work):
-    """From x = H^-1 g of the star, in work.step, to the solution with contact's part of the Hessian, see coupled.py.
-
-    That is x - sum over the pairs of (H + C K C^T)^-1 c k (c x), c the gradient of a pair's gap: on the tape c x alone.
-    """
-    if work.contact is None or n_listed(work) == 0:
-        return
-    if not any_lane(load(work.contact.touching, 0) > 0.0):
-        return
-    rows, star, x, c = 2 * rods.n_free, work.contact.x, work.contact.ends, work.contact.seen
-    carry_roots(rods, work, work.step)
-    for row in range(2 * rods.n_points):
-        store(star, row, load(work.step, row))
-        store(x, row, load(work.step, row))
-    for slot in range(n_listed(work)):
-        k = load(work.contact.slots, SLOT_ROWS * slot + PRESSED)
-        if any_lane(k > 0.0):
-            y = k * gap(rods, work, slot, star)
-            pause_tape()
-            for row in range(2 * rods.n_points):
-                store(c, row, 0.0)
-            add_gap_gradient(rods, work, slot, splat(1.0), c)
-            gather_roots(rods, work, c)
-            solve_again(rods, work, c, work.step)
-            solve_again_coupled(rods, work, work.step)
-            resume_tape()
-            for row in range(rows):
-                store(x, row, subtract_product(load(x, row), y, load(work.step, row)))
-    for row in range(rows):
-        store(work.step, row, load(x, row))
+def leave_work(replayed, k):
+    """Copy what is in work to the slot of stage k."""
+    for row in range(replayed.n_rows):
+        for lane in range(N_LANES):
+            to = (k * replayed.n_rows + row) * N_LANES + lane
+            store_number(replayed.of_stages, to, load_number(replayed.memory, row * ROW + lane))
+    for number in range(replayed.n_lists):
+        store_number(replayed.of_lists, k * replayed.n_lists + number, load_number(replayed.lists, number))
 
 
 @kernel
-def replay_step(rods, work, scheme, fallback, actuation, q, v, a, numbers, h, limits, report):
-    """Take the step of these numbers (see history.py) again; returns whether it was accepted, as it was then."""
-    everybody = splat(0.0) < 1.0
-    retrying = everybody & (splat(load_number(numbers, RETRYING)) > 0.0)
-    size = load_number(numbers, SIZE)
-    limit = splat(load_number(numbers, LIMIT))
-    step = Step(splat(load_number(numbers, START)), splat(size), splat(h), limit, retrying)
-    tableau = scheme
-    if load_number(numbers, FALLBACK) > 0.0:
-        tableau = fallback
-    _, accepted, _ = try_step(rods, work, tableau, actuation, q, v, a, step, everybody, limits, report)
-    return any_lane(accepted)
+def factorise_stage(rods, work, scheme, k, h):
+    """Make and eliminate H of stage k of steps of length h [s], on the lanes of `Simulator`."""
+    gamma = load_number(scheme.a, k * scheme.n_stages + k) * load(h, 0)
+    factorise(rods, work, Stage(work.q_hat, work.v_hat, gamma, 1.0 / gamma, not scheme.stiffly_accurate), None)
+
+
+@kernel
+def solve_for_slopes(rods, work):
+    """From slopes in the solution of a stage to those in its g but for the sign, in work.step."""
+    if rods.body is not None:
+        row = 2 * rods.n_nodes
+        store(work.step, row, load(rods.body.scale, 0) * load(work.step, row))
+    solve_again(rods, work, work.step, work.step)
+    solve_again_coupled(rods, work, work.step)
+
+
+@kernel
+def replay_steps(rods, work, scheme, actuation, q, v, a, limits, report):
+    """Take the steps in work.replayed again; returns whether all were accepted, as they were then."""
+    step, everybody = work.replayed.step, splat(0.0) < 1.0
+    again = Step(
+        load(step, START), load(step, SIZE), load(step, OF_STEP), load(step, LIMIT), load(step, RETRYING) > 0.0
+    )
+    _, accepted, _ = try_step(rods, work, scheme, actuation, q, v, a, again, everybody, limits, report)
+    return not any_lane(~accepted)
 
 
 @kernel
@@ -145,40 +165,29 @@ def roots_on_tape(rods, q, v):
 
 
 @kernel
-def constant_block(block):
-    return constant(block[0]), constant(block[1]), constant(block[2])
+def leave_right_hand_side(work, node, D, B, C, r, D_1, B_1, D_2, r_1, r_2):
+    """In place of eliminate_node: the right-hand side goes to work.step, nothing is eliminated, the matrix is gone."""
+    zero = splat(0.0)
+    block, coupling = (zero, zero, zero), (zero, zero, zero, zero)
+    store_pair(work.step, 2 * node, r)
+    return block, coupling, block, r_1, r_2, zero, zero
 
 
 @kernel
-def constant_coupling(block):
-    return constant(block[0]), constant(block[1]), constant(block[2]), constant(block[3])
+def leave_right_hand_sides_of_hub(rods, work, D_hub, r_hub):
+    """In place of solve_hub: right-hand sides of it and of root nodes go to work.step."""
+    store_pair(work.step, 0, r_hub)
+    for limb in range(rods.n_limbs):
+        store_pair(work.step, 2 * (limb * rods.edges_per_limb + 1), load_pair(work.ring, 2 * limb))
+    if rods.body is not None:
+        store_pair(work.step, 2 * rods.n_nodes, (load(work.body.system, 3), splat(0.0)))
+    return splat(0.0), splat(0.0)
 
 
 @kernel
-def eliminate_right_hand_side(work, node, D, B, C, r, D_1, B_1, D_2, r_1, r_2):
-    """eliminate_node, with a matrix of constants."""
-    return eliminate_node(
-        work, node, constant_block(D), constant_coupling(B), constant_coupling(C), r, constant_block(D_1),
-        constant_coupling(B_1), constant_block(D_2), r_1, r_2,
-    )  # fmt: skip
-
-
-@kernel
-def eliminate_root_of_constants(
-    work, root, D, N, E, H, r, D_next, H_next, r_next, D_last, H_last, r_last, D_hub, r_hub
-):
-    """eliminate_root, with a matrix of constants."""
-    return eliminate_root(
-        work, root, constant_block(D), constant_coupling(N), constant_coupling(E), constant_coupling(H), r,
-        constant_block(D_next), constant_coupling(H_next), r_next, constant_block(D_last), constant_coupling(H_last),
-        r_last, constant_block(D_hub), r_hub,
-    )  # fmt: skip
-
-
-@kernel
-def store_root_of_constants(work, limb, D, H, r):
-    """store_root, with a matrix of constants."""
-    store_root(work, limb, constant_block(D), constant_coupling(H), r)
+def leave_right_hand_side_of_root(work, limb, D, H, r):
+    """In place of store_root: nothing but the right-hand side."""
+    store_pair(work.ring, 2 * limb, r)
 
 
 class TapeKernels(KernelModules):
@@ -186,38 +195,56 @@ class TapeKernels(KernelModules):
 
     def __init__(self) -> None:
         super().__init__({LANES: tape_lanes, COMPILATION: compilation})
-        instead = {
-            "minimise": self(read_solution),
-            "correct_momentum": self(correct_on_tape),
-            "eliminate_node": self(eliminate_right_hand_side),
-            "eliminate_root": self(eliminate_root_of_constants),
-            "store_root": self(store_root_of_constants),
+        of_steps = {"minimise": read_minimum, "correct_momentum": put_solution}
+        of_potential = {
+            "eliminate_node": leave_right_hand_side,
+            "store_root": leave_right_hand_side_of_root,
+            "solve_hub": leave_right_hand_sides_of_hub,
         }
-        for module in (steps, potential, star_matrix, rigid_hub):
-            names = vars(self._module_of(module.__name__))
-            names.update({name: own for name, own in instead.items() if name in names})
+        for module, instead in ((steps, of_steps), (potential, of_potential)):
+            vars(self._module_of(module.__name__)).update({name: self(own) for name, own in instead.items()})
 
 
-replay_step_on_tape: Any = None
+replay_steps_on_tape: Any = None
 fill_moments_on_tape: Any = None
 move_roots_on_tape: Any = None
 """Kernels on a tape, once somebody has asked for them."""
 
 
 @kernel
-def read_tape(entries, parents, slopes, first, end):
+def read_tape(tape, lane, first, end):
     """Take the slopes of what is on the tape to what stands at places below `first`, and leave zeros behind."""
-    for place in range(end - 1, first - 1, -1):
-        slope = slopes[place]
+    of_first, of_second = np.uint64(1 + lane), np.uint64(1 + N_LANES + lane)
+    for back in range(1, end - first + 1):
+        place = np.uint64(end - back)
+        slope = tape.slopes[place]
         if slope != 0.0:
-            slopes[place] = 0.0
-            slopes[parents[place, 0]] += entries[place, 1] * slope
-            slopes[parents[place, 1]] += entries[place, 2] * slope
-    slopes[0] = 0.0
+            tape.slopes[place] = 0.0
+            entry = place * np.uint64(ENTRY)
+            parents = entry + entry
+            tape.slopes[tape.parents[parents]] += tape.entries[entry + of_first] * slope
+            tape.slopes[tape.parents[parents + np.uint64(1)]] += tape.entries[entry + of_second] * slope
+    tape.slopes[0] = 0.0
+
+
+class Scene(NamedTuple):
+    """What kernels get on a tape; coefficients, memory and the length of steps on the lanes of `Simulator`."""
+
+    rods: Any
+    work: Any
+    scheme: Scheme
+    fallback: Scheme
+    actuation: Actuation
+    turned: Actuation
+    limits: Any
+    report: NDArray[np.float64]
+    own_rods: Rods
+    own_work: Work
+    own_h: NDArray[np.float64]
 
 
 class Rows(NamedTuple):
-    """Rows on a tape: q, v, a, the limbs' rotations at both ends of an interval, and moments, shape (.., 2) each.
+    """Rows on a tape: q, v, a, rotations at both ends of an interval, moments, g of all stages, shape (.., ROW) each.
 
     Or the same memory as whole numbers.
     """
@@ -228,17 +255,18 @@ class Rows(NamedTuple):
     start: NDArray[Any]
     end: NDArray[Any]
     moments: NDArray[Any]
+    residual: NDArray[Any]
 
 
 class Tape(NamedTuple):
     """Memory of a tape.
 
-    entries, parents: Its entries, and the same memory as int32. slopes: Those of all places.
+    entries, parents: Its entries, one after the other, and the same memory as uint32. slopes: Those of all places.
     first: Place of q; v, a and rotations stand behind it, coefficients before it, whose slopes are added up.
     """
 
     entries: NDArray[np.float64]
-    parents: NDArray[np.int32]
+    parents: NDArray[np.uint32]
     slopes: NDArray[np.float64]
     first: int
 
@@ -254,31 +282,26 @@ class Slopes(NamedTuple):
 
 
 @kernel
-def put_rows(rows, places, numbers, begin, first):
-    """Put numbers from `begin` on into rows, as what stands on the tape from place `first` on.
-
-    Returns the place behind them.
-    """
+def put_rows(rows, lane, numbers, begin):
+    """Put numbers from `begin` on into a lane of rows."""
     for row in range(rows.shape[0]):
-        rows[row, 0] = numbers[begin + row]
-        places[row, 1] = first + row
+        rows[row, lane] = numbers[begin + row]
+
+
+@kernel
+def place_rows(rows, places, first):
+    """Let rows stand on the tape from place `first` on; returns the place behind them."""
+    for row in range(rows.shape[0]):
+        places[row, PLACE] = first + row
+        rows[row, FACTOR:PLACE] = 1.0
     return first + rows.shape[0]
 
 
 @kernel
-def put_state(rows, places, step, first):
-    """Put q, v and a at the beginning of a step on the tape, see put_rows."""
-    n_q = rows.q.shape[0]
-    behind = put_rows(rows.q, places.q, step, OF_STEP, first)
-    behind = put_rows(rows.v, places.v, step, OF_STEP + n_q, behind)
-    return put_rows(rows.a, places.a, step, OF_STEP + 2 * n_q, behind)
-
-
-@kernel
-def seed(tape, places, of_rows):
-    """Give what stands in rows its slopes."""
-    for row in range(places.shape[0]):
-        tape.slopes[places[row, 1]] += of_rows[row]
+def seed(tape, rows, places, lane, of_rows):
+    """Give what stands in a lane of rows its slopes."""
+    for row in range(of_rows.shape[0]):
+        tape.slopes[places[row, PLACE]] += rows[row, FACTOR + lane] * of_rows[row]
         of_rows[row] = 0.0
 
 
@@ -292,50 +315,114 @@ def take_slopes(tape, first, of_rows):
 
 
 @kernel
-def pull_through_step(scene, tape, rows, places, step, h, start, end, of, k):
-    """Take slopes through a step of interval k, of length h [s]. start, end: Rotations at both ends of the interval.
-
-    Returns 0; 1 if the tape is too short, 2 if the step was not the one that was kept.
-    """
-    rods, work, scheme, fallback, actuation, limits, report = scene
-    at_start = put_state(rows, places, step, tape.first)
-    behind = put_rows(rows.end, places.end, end, 0, put_rows(rows.start, places.start, start, 0, at_start))
-    begin = OF_STEP + 2 * rows.q.shape[0] + rows.a.shape[0]
-    work.solution[0] = 0.0
-    for row in range(step.shape[0] - begin):
-        work.solution[1 + row] = step[begin + row]
-    report[:] = 0.0
-    begin_tape(tape.entries, behind)
-    same = replay_step_on_tape(
-        borrow(rods), borrow(work), borrow(scheme), borrow(fallback), borrow(actuation), borrow(rows.q),
-        borrow(rows.v), borrow(rows.a), borrow(step), h, borrow(limits), borrow(report),
-    )  # fmt: skip
-    if tape_is_full() != 0:
-        return 1
-    if not same:
-        return 2
-    seed(tape, places.q, of.q)
-    seed(tape, places.v, of.v)
-    seed(tape, places.a, of.a)
-    read_tape(tape.entries, tape.parents, tape.slopes, behind, end_of_tape())
-    at_a = take_slopes(tape, take_slopes(tape, tape.first, of.q), of.v)
-    at_end = take_slopes(tape, take_slopes(tape, at_a, of.a), of.shape[k])
-    take_slopes(tape, at_end, of.shape[k + 1])
-    return 0
+def put_step(scene, rows, lane, step, times, shape):
+    """Put what was kept of a step into a lane."""
+    n_q, n_a, k, replayed = rows.q.shape[0], rows.a.shape[0], int(step[INTERVAL]), scene.work.replayed
+    put_rows(rows.q, lane, step, OF_STEP)
+    put_rows(rows.v, lane, step, OF_STEP + n_q)
+    put_rows(rows.a, lane, step, OF_STEP + 2 * n_q)
+    put_rows(rows.start, lane, shape[k], 0)
+    put_rows(rows.end, lane, shape[k + 1], 0)
+    put_rows(replayed.stages, lane, step, OF_STEP + 2 * n_q + n_a)
+    put_rows(replayed.step[:OF_STEP], lane, step, 0)
+    replayed.step[OF_STEP, lane] = scene.own_h[0, lane] = step[SIZE] * (times[k + 1] - times[k])
 
 
 @kernel
-def pull_through_work(scene, tape, rows, places, step, shape, of, k):
-    """Take the slope in work to the state where interval k begins; returns 0, or 1 if the tape is too short.
+def has_guess(work):
+    """Whether the first guess of a stage, which is from `a`, has a part in what it solves."""
+    if work.normals is not None or work.current is not None:
+        return True
+    return work.contact is not None or work.body is not None
+
+
+@kernel
+def write_tape(scene, tableau, tape, rows, places, steps, times, shape):
+    """Replay steps, N_LANES or fewer, by a scheme. Returns (outcome, end): where the tape ends.
+
+    outcome: 0; 1 if the tape is too short, 2 if a step was not the one that was kept.
+    """
+    for lane in range(N_LANES):
+        put_step(scene, rows, lane, steps[min(lane, steps.shape[0] - 1)], times, shape)
+    behind = place_rows(rows.v, places.v, place_rows(rows.q, places.q, tape.first))
+    behind = place_rows(rows.a, places.a, behind)
+    if not has_guess(scene.own_work):
+        rows.a[:, FACTOR:] = 0.0
+    behind = place_rows(rows.end, places.end, place_rows(rows.start, places.start, behind))
+    scene.work.replayed.stage[0] = 0.0
+    scene.report[:] = 0.0
+    begin_tape(tape.entries, behind)
+    same = replay_steps_on_tape(
+        borrow(scene.rods), borrow(scene.work), borrow(tableau), borrow(scene.actuation), borrow(rows.q),
+        borrow(rows.v), borrow(rows.a), borrow(scene.limits), borrow(scene.report),
+    )  # fmt: skip
+    for k in range(tableau.n_stages):
+        take_slot(scene.work.replayed, k, -1)
+        factorise_stage(borrow(scene.own_rods), borrow(scene.own_work), borrow(tableau), k, borrow(scene.own_h))
+        take_slot(scene.work.replayed, -1, k)
+    return 1 if tape_is_full() != 0 else 0 if same else 2, end_of_tape()
+
+
+@kernel
+def take_slot(replayed, k, to):
+    """Copy slot k of the stages to another one, of which the last is that of the memory that kernels get (-1)."""
+    for memory, size in ((replayed.of_stages, replayed.n_rows * N_LANES), (replayed.of_lists, replayed.n_lists)):
+        slots = memory.reshape(-1, size) if size > 0 else memory.reshape(0, 1)
+        if slots.shape[0] > 1:
+            slots[to] = slots[k]
+
+
+@kernel
+def pull_through_stage(scene, tape, rows, places, lane, k, end):
+    """Take slopes from the end of the tape through the solution of stage k; returns where the tape ends before it."""
+    replayed, own_work, n = scene.work.replayed, scene.own_work, 2 * scene.rods.n_free
+    first = int(replayed.first[k])
+    read_tape(tape, lane, first + n, end)
+    take_slot(replayed, k, -1)
+    own_work.step[:] = 0.0
+    for row in range(n):
+        own_work.step[row, lane] = tape.slopes[first + row]
+        tape.slopes[first + row] = 0.0
+    solve_for_slopes(borrow(scene.own_rods), borrow(own_work))
+    for row in range(n):
+        of = k * n + row
+        tape.slopes[places.residual[of, PLACE]] -= rows.residual[of, FACTOR + lane] * own_work.step[row, lane]
+    return first
+
+
+@kernel
+def pull_through_step(scene, tableau, tape, rows, places, lane, end, of, k):
+    """Take slopes through a step of interval k that stands in a lane of the tape."""
+    seed(tape, rows.q, places.q, lane, of.q)
+    seed(tape, rows.v, places.v, lane, of.v)
+    seed(tape, rows.a, places.a, lane, of.a)
+    for stage in range(tableau.n_stages - 1, -1, -1):
+        end = pull_through_stage(scene, tape, rows, places, lane, stage, end)
+    n = 2 * of.q.shape[0] + of.a.shape[0] + 2 * of.shape.shape[1]
+    read_tape(tape, lane, tape.first + n, end)
+    at_a = take_slopes(tape, take_slopes(tape, tape.first, of.q), of.v)
+    at_end = take_slopes(tape, take_slopes(tape, at_a, of.a), of.shape[k])
+    take_slopes(tape, at_end, of.shape[k + 1])
+
+
+@kernel
+def pull_through_work(scene, tape, rows, places, step, shape, of, behind):
+    """Take the slope in work to the state where an interval begins; returns 0, or 1 if the tape is too short.
 
     The work is the sum of (m_k + m_k+1)(shape_k+1 - shape_k)/2, m the moments where intervals begin and end.
+    rows: Not those of steps. behind: Where the tape of steps ends, which stays as it is.
     """
-    rods, work, _, _, actuation, _, _ = scene
-    at_start = put_rows(rows.q, places.q, step, OF_STEP, tape.first)
-    at_end = put_rows(rows.start, places.start, shape[k], 0, at_start)
-    behind = put_rows(rows.end, places.end, shape[k], 0, at_end)
+    k = int(step[INTERVAL])
+    put_rows(rows.q, 0, step, OF_STEP)
+    put_rows(rows.start, 0, shape[k], 0)
+    put_rows(rows.end, 0, shape[k], 0)
+    at_start = place_rows(rows.q, places.q, tape.first)
+    at_end = place_rows(rows.start, places.start, at_start)
+    behind = max(behind, place_rows(rows.end, places.end, at_end))
     begin_tape(tape.entries, behind)
-    fill_moments_on_tape(borrow(rods), borrow(work), borrow(actuation), borrow(rows.q), borrow(rows.moments))
+    fill_moments_on_tape(
+        borrow(scene.rods), borrow(scene.work), borrow(scene.turned), borrow(rows.q), borrow(rows.moments)
+    )
     if tape_is_full() != 0:
         return 1
     for limb in range(shape.shape[1]):
@@ -343,10 +430,11 @@ def pull_through_work(scene, tape, rows, places, step, shape, of, k):
         for other in (k, k - 1):  # the intervals that begin and that end here
             if 0 <= other < shape.shape[0] - 1:
                 turned = shape[other + 1, limb] - shape[other, limb]
-                tape.slopes[places.moments[limb, 1]] += 0.5 * of.work * turned
+                slope = rows.moments[limb, FACTOR] * (0.5 * of.work * turned)
+                tape.slopes[places.moments[limb, PLACE]] += slope
                 of.shape[other + 1, limb] += half
                 of.shape[other, limb] -= half
-    read_tape(tape.entries, tape.parents, tape.slopes, behind, end_of_tape())
+    read_tape(tape, 0, behind, end_of_tape())
     take_slopes(tape, tape.first, of.q)
     take_slopes(tape, at_start, of.shape[k])
     take_slopes(tape, at_end, of.shape[k])
@@ -356,37 +444,55 @@ def pull_through_work(scene, tape, rows, places, step, shape, of, k):
 @kernel
 def pull_through_roots(scene, tape, rows, places, step, of):
     """Take slopes through what puts roots of limbs on a body before the first step."""
-    behind = put_state(rows, places, step, tape.first)
+    put_rows(rows.q, 0, step, OF_STEP)
+    put_rows(rows.v, 0, step, OF_STEP + rows.q.shape[0])
+    behind = place_rows(rows.v, places.v, place_rows(rows.q, places.q, tape.first))
     begin_tape(tape.entries, behind)
-    move_roots_on_tape(borrow(scene[0]), borrow(rows.q), borrow(rows.v))
-    seed(tape, places.q, of.q)
-    seed(tape, places.v, of.v)
-    read_tape(tape.entries, tape.parents, tape.slopes, behind, end_of_tape())
+    move_roots_on_tape(borrow(scene.rods), borrow(rows.q), borrow(rows.v))
+    seed(tape, rows.q, places.q, 0, of.q)
+    seed(tape, rows.v, places.v, 0, of.v)
+    read_tape(tape, 0, behind, end_of_tape())
     take_slopes(tape, take_slopes(tape, tape.first, of.q), of.v)
 
 
+@kernel
+def begins(kept, n):
+    """Whether an interval begins with step n, or behind the last."""
+    return n == 0 or kept[n - 1, INTERVAL] != kept[n, INTERVAL]
+
+
 @entry_point
-def _pull_back(scene, tape, rows, places, kept, times, shape, of):
+def _pull_back(scene, tape, rows, places, beside, places_beside, kept, times, shape, of):
     """Take slopes at the end of a swim through some intervals to its beginning, in place.
 
-    scene: rods, work, scheme, fallback, actuation, limits and report, on a tape.
+    rows, beside: Rows of steps, and of where intervals begin, and the same as whole numbers.
     kept: What history.py has kept of every step, shape (n_steps + 1, n_rows); the last begins where the swim ended.
     times, shape: Ends of the intervals [s], shape (n + 1,), and rotations then [rad], shape (n + 1, n_limbs).
     of: Slopes at the end, then at the beginning; those in rotations are added to.
 
     Returns 0; 1 if the tape is too short, 2 if a step was not the one that was kept.
     """
-    last = kept.shape[0] - 1
-    for n in range(last, -1, -1):
-        step, outcome = kept[n], 0
-        k = int(step[INTERVAL])
-        if n < last:
-            h = step[SIZE] * (times[k + 1] - times[k])
-            outcome = pull_through_step(scene, tape, rows, places, step, h, shape[k], shape[k + 1], of, k)
-        if outcome == 0 and of.work != 0.0 and (n == 0 or kept[n - 1, INTERVAL] != k):
-            outcome = pull_through_work(scene, tape, rows, places, step, shape, of, k)
+    n = kept.shape[0] - 1
+    if of.work != 0.0 and begins(kept, n):
+        outcome = pull_through_work(scene, tape, beside, places_beside, kept[n], shape, of, tape.first)
         if outcome != 0:
             return outcome
+    while n > 0:
+        first = n - 1
+        while first > max(0, n - N_LANES) and kept[first - 1, FALLBACK] == kept[n - 1, FALLBACK]:
+            first -= 1
+        tableau = scene.fallback if kept[first, FALLBACK] > 0.0 else scene.scheme
+        outcome, end = write_tape(scene, tableau, tape, rows, places, kept[first:n], times, shape)
+        if outcome != 0:
+            return outcome
+        for lane in range(n - first - 1, -1, -1):
+            step = kept[first + lane]
+            pull_through_step(scene, tableau, tape, rows, places, lane, end, of, int(step[INTERVAL]))
+            if of.work != 0.0 and begins(kept, first + lane):
+                outcome = pull_through_work(scene, tape, beside, places_beside, step, shape, of, end)
+                if outcome != 0:
+                    return outcome
+        n = first
     pull_through_roots(scene, tape, rows, places, kept[0], of)
     return 0
 
@@ -396,7 +502,7 @@ def _pull_back(scene, tape, rows, places, kept, times, shape, of):
 def pulling_back() -> Callable[..., int]:
     """The entry point."""
     kernels = TapeKernels()
-    globals()["replay_step_on_tape"] = kernels(replay_step)
+    globals()["replay_steps_on_tape"] = kernels(replay_steps)
     globals()["fill_moments_on_tape"] = kernels(moments_on_tape)
     globals()["move_roots_on_tape"] = kernels(roots_on_tape)
     return _pull_back

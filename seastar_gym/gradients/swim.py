@@ -12,7 +12,7 @@ from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.gradients.kernels import advance_slopes
 from seastar_gym.gradients.stencils import arrays_of
-from seastar_gym.gradients.unknowns import Rotations, Start, slopes_of_start, unknowns_of
+from seastar_gym.gradients.unknowns import Rotations, Start, slopes_of_start, strengths_of, unknowns_of
 from seastar_gym.model.rods import make_limits, make_rods
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_finite, require_kind, require_texts
@@ -21,7 +21,6 @@ from seastar_gym.simd.rows import aligned_rows, side_by_side
 from seastar_gym.simulator.drive import checked_commands
 from seastar_gym.simulator.report import SolverStatus
 from seastar_gym.simulator.schedule import require_duration
-from seastar_gym.simulator.simulator import Simulator
 from seastar_gym.simulator.state import State
 
 Floats = NDArray[np.float64]
@@ -131,9 +130,8 @@ def checked_swim(scene: Scene, commands: ArrayLike, duration: float | None) -> t
     told = as_finite("commands", commands, (None, scene.robot.n_limbs))
     length = scene.actuator.period if duration is None else duration
     require_duration(length, scene.numerics.step)
-    strengths = Simulator(scene, 1, threads=1).limb_strengths
     for command in told:
-        checked_commands(command[None], scene, strengths)
+        checked_commands(command[None], scene, strengths_of(scene))
     return told, float(length)
 
 

@@ -212,13 +212,18 @@ class Rotations:
 
 def _drive(scene: Scene, state: State | None) -> Drive:
     """Drive of one robot as `Simulator` would have it."""
-    simulator = Simulator(scene, 1, threads=1)
+    drive = Drive(scene.actuator, 1, scene.robot.n_limbs, scene.numerics.step)
+    drive.strengths = strengths_of(scene)
     if state is not None:
+        simulator = Simulator(scene, 1, threads=1)
         simulator.set_state(state)
-    drive, one = Drive(scene.actuator, 1, scene.robot.n_limbs, scene.numerics.step), simulator.get_state()
-    drive.strengths = simulator.limb_strengths
-    drive.put(*one[3:6])  # type: ignore[arg-type]
+        drive.put(*simulator.get_state()[3:6])  # type: ignore[arg-type]
     return drive
+
+
+def strengths_of(scene: Scene) -> Floats:
+    """Strengths of the limbs of one robot, shape (1, n_limbs)."""
+    return np.full((1, scene.robot.n_limbs), scene.limb_strengths or 1.0)
 
 
 def _turned(drive: Drive, commands: Floats, duration: float) -> tuple[Floats, Floats]:

@@ -67,7 +67,7 @@ def solution(n_limbs: int, nodes_per_limb: int, matrix: np.ndarray, r: np.ndarra
     measure = "opening" if n_limbs == 1 else "turning"
     robot = Seastar(n_limbs, nodes_per_limb, hub_hinge=measure, discretisation="chapter")
     rods = make_rods(Scene(robot, actuator=SmaPulse(0.0)))
-    work, edges = make_work(rods, 1), nodes_per_limb - 1
+    work, edges = make_work(rods, 1, again=True), nodes_per_limb - 1
     work.hub_coupling[:] = hub.reshape(-1, N_LANES)
 
     def at(i):
@@ -90,6 +90,9 @@ def solution(n_limbs: int, nodes_per_limb: int, matrix: np.ndarray, r: np.ndarra
         D_hub, r_hub = D[0], right[0]
     last = solve_ring.plain(work, n_limbs, D_hub, r_hub) if n_limbs > 1 else solve_lone_root.plain(work, D_hub, r_hub)
     substitute_star.plain(rods, work, work.step)
+    again = np.ascontiguousarray(r.T)
+    solve_again.plain(rods, work, again, again)
+    np.testing.assert_allclose(again, work.step, rtol=0.0, atol=1e-12 * np.abs(work.step).max())
     return nodes(work.step).reshape(N_LANES, -1), *plain((decrement + last[0], smaller.plain(pivot, last[1])))
 
 

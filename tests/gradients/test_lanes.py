@@ -6,7 +6,7 @@ import pytest
 
 from seastar_gym.gradients.implicit import correct_slopes
 from seastar_gym.gradients.kernels import DualKernels
-from seastar_gym.gradients.replay import TapeKernels, replay_step
+from seastar_gym.gradients.replay import TapeKernels, replay_steps
 from seastar_gym.simd import dual_lanes, tape_lanes
 from seastar_gym.simd.compilation import STRICT, Kernel
 
@@ -44,9 +44,7 @@ EXPECTED = {
 }
 OF_DUALS = {"slope_of(x)": (DIRECTION[0], 0.0), "with_slope(x, y)": (X, Y)}
 OF_TAPES = {
-    "constant(x)": (X, 0.0, 0.0, 0.0),
-    "less_step(x, y)": (X, 0.0, -1.0, 0.0),
-    "sqrt(constant(x) - constant(x))": (0.0, 0.0, 0.0, 0.0),
+    "at_place(x, 2)": (X, 0.0, 1.0, 0.0),
 }
 
 
@@ -74,51 +72,66 @@ def test_duals_have_the_slopes_of_calculus():
         np.testing.assert_allclose(found[n:], slope, rtol=1e-14, err_msg=line)
 
 
-WHILE_PAUSED = len(EXPECTED) + len(OF_TAPES)
-"""The row of what is computed while nothing is written down."""
-
-
 @pytest.fixture(scope="module")
 def on_tape():
-    """The operations on a tape of a given length: (values, places, entries, place behind the last, whether full)."""
-    behind = f"""\
-    pause_tape()
-    store(out, {WHILE_PAUSED}, load(rows, 1) * load(rows, 2))
-    resume_tape()
-    store(out, {WHILE_PAUSED + 1}, x * y)
-    return end_of_tape(), tape_is_full()
-"""
+    """The operations on a tape of a given length: (values, places, factors, entries, end, whether it is full)."""
+    behind = "    return end_of_tape(), tape_is_full()\n"
     function = compiled(tape_lanes, EXPECTED | OF_TAPES, f"    begin_tape(entries, {BEYOND})\n", behind)
 
     def run(capacity):
-        entries, results = np.zeros((capacity, tape_lanes.ENTRY)), np.full((WHILE_PAUSED + 2, tape_lanes.ROW), np.nan)
-        arguments = np.zeros((BEYOND, tape_lanes.ROW))
-        arguments[1:, 0], arguments.view(np.int64)[1:, 1] = POINT, range(1, BEYOND)
-        end, full = function(arguments, TABLE, results, entries)
-        return results[:, 0], results.view(np.int64)[:, 1], entries, end, full
+        n, entries = tape_lanes.N_LANES, np.zeros((capacity, tape_lanes.ENTRY))
+        arguments, results = (
+            np.zeros((BEYOND, tape_lanes.ROW)),
+            np.full((len(EXPECTED | OF_TAPES), tape_lanes.ROW), np.nan),
+        )
+        arguments[1:, :n], arguments[1:, n : 2 * n] = np.transpose([POINT]), 1.0
+        arguments.view(np.int64)[1:, tape_lanes.PLACE] = range(1, BEYOND)
+        end, full = function(arguments, TABLE, results, entries.ravel())
+        return results[:, :n], results.view(np.int64)[:, tape_lanes.PLACE], results[:, n : 2 * n], entries, end, full
 
     return run
 
 
-def swept(entries, place, end):
-    """Derivatives of what stands at a place in the three arguments."""
-    slopes, parents = np.zeros(end), entries.view(np.int32)
-    slopes[place] = 1.0
+def swept(entries, place, factors, end):
+    """Derivatives of a number with a place and factors in the three arguments, of every robot."""
+    n, slopes, parents = len(factors), np.zeros((end, len(factors))), entries.view(np.int32)
+    slopes[place] = factors
     for k in range(end - 1, BEYOND - 1, -1):
-        slopes[parents[k, 0]] += entries[k, 1] * slopes[k]
-        slopes[parents[k, 1]] += entries[k, 2] * slopes[k]
+        slopes[parents[k, 0]] += entries[k, 1 : 1 + n] * slopes[k]
+        slopes[parents[k, 1]] += entries[k, 1 + n :] * slopes[k]
     return slopes[1:BEYOND]
 
 
 def test_a_tape_has_the_derivatives_of_calculus(on_tape):
-    values, places, entries, end, full = on_tape(100)
+    values, places, factors, entries, end, full = on_tape(100)
     assert full == 0
-    paused = {"while paused": (X * Y, 0.0, 0.0, 0.0), "resumed": EXPECTED["x * y"]}
-    rows = zip(values, places, (EXPECTED | OF_TAPES | paused).items(), strict=True)
-    for found, place, (line, (value, *slopes)) in rows:
+    rows = zip(values, places, factors, (EXPECTED | OF_TAPES).items(), strict=True)
+    for found, place, factor, (line, (value, *slopes)) in rows:
         np.testing.assert_allclose(found, value, rtol=1e-15, err_msg=line)
-        expected = np.zeros(3) if place == 0 else swept(entries, place, end)
-        np.testing.assert_allclose(expected, slopes, rtol=1e-14, err_msg=line)
+        derivatives = np.zeros((3, 1)) if place == 0 else swept(entries, place, factor, end)
+        for derivative in derivatives.T:
+            np.testing.assert_allclose(derivative, slopes, rtol=1e-14, err_msg=line)
+
+
+def test_every_robot_has_the_derivatives_of_its_choice():
+    n, choices = tape_lanes.N_LANES, {"select(x > y, x, y)": (2.0, 0.0), "select(x > y, 3.0, x)": (0.0, 2.0)}
+    choices |= {"select(x > y, 5.0 * x, x)": (2.0 * 5.0, 2.0), "select(x > y, x * z, y)": (2.0 * Z, 0.0)}
+    entries, results = np.zeros(100 * tape_lanes.ENTRY), np.zeros((len(choices), tape_lanes.ROW))
+    arguments = np.zeros((BEYOND, tape_lanes.ROW))
+    arguments[1:, :n], arguments[1:, n : 2 * n] = np.transpose([POINT]), 2.0
+    arguments.view(np.int64)[1:, tape_lanes.PLACE] = range(1, BEYOND)
+    first = np.arange(n) % 2 == 0
+    arguments[1, :n] = np.where(first, Y + 1.0, Y - 1.0)
+    behind = "    return end_of_tape()\n"
+    end = compiled(tape_lanes, choices, f"    begin_tape(entries, {BEYOND})\n", behind)(
+        arguments, TABLE, results, entries
+    )
+    places = results.view(np.int64)[:, tape_lanes.PLACE]
+    for place, factors, (line, (when_true, when_false)) in zip(
+        places, results[:, n : 2 * n], choices.items(), strict=True
+    ):
+        of_x = swept(entries.reshape(-1, tape_lanes.ENTRY), place, factors, end)[0]
+        np.testing.assert_allclose(of_x, np.where(first, when_true, when_false), rtol=1e-14, err_msg=line)
 
 
 def test_a_tape_that_is_too_short_says_so(on_tape):
@@ -128,7 +141,7 @@ def test_a_tape_that_is_too_short_says_so(on_tape):
 
 @pytest.mark.parametrize(
     ("kind", "lanes", "outside"),
-    [(TapeKernels, tape_lanes, replay_step), (DualKernels, dual_lanes, correct_slopes)],
+    [(TapeKernels, tape_lanes, replay_steps), (DualKernels, dual_lanes, correct_slopes)],
 )
 def test_kernels_call_kernels_on_their_own_lanes_alone(kind, lanes, outside):
     """Others would write to rows of another width, into memory that is not theirs."""

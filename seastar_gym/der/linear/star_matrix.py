@@ -347,6 +347,8 @@ def solve_lone_root(work, D_hub, r_hub):
         work, 1, D, H, nothing, r, D_hub, nothing, (zero, zero, zero), r_hub, (zero, zero)
     )
     inverse_x, lower, inverse_y, wr, hub_pivot = pivots(D_hub, r_hub)
+    keep_pivots(work.root_pivots, 0, inverse_x, inverse_y)
+    keep_pivots(work.root_pivots, 1, lower, lower)
     y = wr * inverse_y
     x = subtract_product(r_hub[0] * inverse_x, lower, y)
     store_pair(work.root_solution, 2, (x, y))

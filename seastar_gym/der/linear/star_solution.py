@@ -44,7 +44,7 @@ def with_torque(work, limb, force, torque):
 
 @kernel
 def solve_again(rods, work, r, x):
-    """Write H^-1 r over rows x, H the matrix that was eliminated last; its pivots were kept (more limbs than one)."""
+    """Write H^-1 r over rows x, which may be r, H the matrix that was eliminated last; its pivots were kept."""
     edges, zero = rods.edges_per_limb, splat(0.0)
     r_hub, torque = load_pair(r, 0), zero
     if rods.body is not None:
@@ -59,10 +59,12 @@ def solve_again(rods, work, r, x):
         r_hub = add(r_hub, r_second)
         if rods.body is not None:
             torque = with_torque(work, limb, r_second, torque)
-    if rods.clamp is None:
+    if rods.clamp is not None:
+        solve_rigid_hub_again(rods, work, r_hub, torque)
+    elif rods.n_limbs > 1:
         solve_ring_again(work, rods.n_limbs, r_hub)
     else:
-        solve_rigid_hub_again(rods, work, r_hub, torque)
+        solve_lone_root_again(work, r_hub)
     substitute_star(rods, work, x)
 
 
@@ -101,6 +103,19 @@ def solve_ring_again(work, n_limbs, r_hub):
     lower = load(work.root_pivots, 2 * n_limbs)
     y = subtract_product(r_hub[1], lower, r_hub[0]) * inverse_y
     substitute_ring(work, n_limbs, (subtract_product(r_hub[0] * inverse_x, lower, y), y))
+
+
+@kernel
+def solve_lone_root_again(work, r_hub):
+    """Solve for root node and hub of a single limb, whose root's right-hand side is in work.ring."""
+    zero = splat(0.0)
+    r_hub, _ = eliminate_again(work, 1, load_pair(work.ring, 7), r_hub, (zero, zero))
+    inverse_x, inverse_y = load_pair(work.root_pivots, 0)
+    lower = load(work.root_pivots, 2)
+    y = subtract_product(r_hub[1], lower, r_hub[0]) * inverse_y
+    x = subtract_product(r_hub[0] * inverse_x, lower, y)
+    store_pair(work.root_solution, 2, (x, y))
+    store_pair(work.root_solution, 0, substitute_node(work, 1, x, y, zero, zero))
 
 
 @kernel
