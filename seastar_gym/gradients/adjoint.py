@@ -23,7 +23,8 @@ from seastar_gym.gradients.history import (
     keeping_advance,
     n_numbers,
 )
-from seastar_gym.gradients.replay import Replayed, Rows, Slopes, Tape, pulling_back
+from seastar_gym.gradients.on_tape import Replayed
+from seastar_gym.gradients.replay import Rows, Slopes, Tape, pulling_back
 from seastar_gym.gradients.replay import Scene as SceneOnTape
 from seastar_gym.gradients.stencils import arrays_of
 from seastar_gym.gradients.swim import (

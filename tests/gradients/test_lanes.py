@@ -6,7 +6,7 @@ import pytest
 
 from seastar_gym.gradients.implicit import correct_slopes
 from seastar_gym.gradients.kernels import DualKernels
-from seastar_gym.gradients.replay import TapeKernels, replay_steps
+from seastar_gym.gradients.on_tape import TapeKernels, replay_steps
 from seastar_gym.simd import dual_lanes, tape_lanes
 from seastar_gym.simd.compilation import STRICT, Kernel
 
