@@ -210,7 +210,8 @@ def take_slot(replayed, k, to):
     for memory, size in ((replayed.of_stages, replayed.n_rows * N_LANES), (replayed.of_lists, replayed.n_lists)):
         slots = memory.reshape(-1, size) if size > 0 else memory.reshape(0, 1)
         if slots.shape[0] > 1:
-            slots[to] = slots[k]
+            for number in range(size):
+                slots[to, number] = slots[k, number]
 
 
 @kernel

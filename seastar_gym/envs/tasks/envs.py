@@ -97,10 +97,12 @@ class SeastarTaskEnv(SeastarSwimEnv):
     ## Arguments
     task: Name of a challenge, or a challenge with numbers of your own, as an object or in plain form.
     split: Which episodes are drawn: "train" or "test".
+    actions, fidelity, decision_period: See `SeastarSwimEnv`.
     render_mode: See `SeastarSwimEnv`. Pictures show what the robot is not told.
+    frames_per_stroke: See `SeastarSwimEnv`.
     sight: See `SeastarSwimEnv`; `SimToReal` has one of its own. What a task shows besides the robot, such as prey, is
         not late.
-    actions, fidelity, decision_period, frames_per_stroke, action_delay: See `SeastarSwimEnv`.
+    action_delay: See `SeastarSwimEnv`.
     """
 
     _option = "instance"
