@@ -308,6 +308,7 @@ def crowd() -> Simulator:
     return simulator
 
 
+@pytest.mark.filterwarnings("ignore:Limbs of robot:RuntimeWarning")
 def test_iterations_of_the_linear_solver_count_where_limbs_touch(monkeypatch):
     """A crowd needs hundreds of them for a Newton iteration. It fails, and its neighbour keeps every bit."""
     commands = np.resize([1.0, -1.0], (2, 12))
