@@ -2,7 +2,7 @@
 
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
-from threading import Lock
+from threading import RLock
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,10 +57,14 @@ ENTRIES = 1 << 14
 MOST_KEPT = 64e6
 """Memory of the time steps that a record keeps [B]; others are swum once more."""
 
+Feedback = Callable[[int, Floats], tuple[Floats, Floats]]
+"""How commands depended on states: from the number of an interval and the slope in its command, shape (n_limbs,), the
+slopes that it has by that command in positions and velocities at the beginning, shape (n_nodes, 2) each."""
+
 WorkOfGradient = namedtuple("WorkOfGradient", (*Work._fields, "kept", "replayed"))  # type: ignore[misc]
 """`Work` with a history, see history.py, or with a step that is replayed, see replay.py."""
 
-_the_tape = Lock()
+_the_tape = RLock()
 
 
 class Gradient(NamedTuple):
@@ -154,11 +158,14 @@ class Record:
         """What gradients of this swim are of, in one sentence."""
         return sentence_of(self.status, {name: self._counts(name) for name in COUNTS})
 
-    def gradient(self, slopes: Mapping[str, ArrayLike], by: Sequence[str]) -> dict[str, Floats]:
+    def gradient(
+        self, slopes: Mapping[str, ArrayLike], by: Sequence[str], feedback: Feedback | None = None
+    ) -> dict[str, Floats]:
         """Gradient, by the names of unknowns, of a number with these slopes in quantities of the swim.
 
         slopes: By names of quantities, as in `gradient`; of those that are not there the number does not depend. by: As
-        in `differentiate`.
+        in `differentiate`. feedback: Of a policy that gave the commands, asked from the last interval to the first. A
+        change of the start or of a command then changes the later commands, too.
         """
         require_names(by)
         unknowns = unknowns_of(self._scene, self._commands, by)
@@ -167,7 +174,7 @@ class Record:
             return {unknown.name: np.full(unknown.shape, np.nan) for unknown in unknowns}
         beside = {u.name: slope_in_number(self._start, self._state, u) for u in unknowns if u.beside}
         with _the_tape:
-            sweep = _Sweep(self, given, list(beside.values()))
+            sweep = _Sweep(self, given, list(beside.values()), feedback, "commands" in by)
         of_rotations = self._through_rotations(unknowns, sweep.of_turns)
         found = {}
         for unknown in unknowns:
@@ -179,7 +186,7 @@ class Record:
                 rows = sweep.of_q if unknown.name == "positions" else sweep.of_v
                 found[unknown.name] = rows[: unknown.size].reshape(unknown.shape)
             else:
-                found[unknown.name] = of_rotations[unknown.name]
+                found[unknown.name] = np.reshape(sweep.of_commands, unknown.shape)
         return found
 
     def _checked(self, slopes: Mapping[str, ArrayLike]) -> dict[str, Floats]:
@@ -195,8 +202,8 @@ class Record:
         return {name: given.get(name, np.zeros(getattr(self.swim, name).shape)) for name in QUANTITIES}
 
     def _through_rotations(self, unknowns: Sequence[Unknown], of_turns: list[Floats]) -> dict[str, Floats]:
-        """What the gradients in commands and in numbers of the actuators owe to the limbs' rotations."""
-        some = [u for u in unknowns if u.name == "commands" or u.name.split(".")[0] in ("actuator", "limb_strengths")]
+        """What the gradients in numbers of the actuators owe to the limbs' rotations."""
+        some = [u for u in unknowns if u.name.split(".")[0] in ("actuator", "limb_strengths")]
         if not some:
             return {}
         drives = Rotations(self._scene, self._state, self._commands, some)
@@ -205,6 +212,19 @@ class Record:
             total = total + np.tensordot(of_turn, drives.interval(k, self._duration)[2], axes=2)
         parts = np.split(total, np.cumsum([u.size for u in some])[:-1])
         return {u.name: part.reshape(u.shape) for u, part in zip(some, parts, strict=True)}
+
+    def rises_by_commands(self) -> list[dict[int, Floats]]:
+        """Slopes of the rotations of every interval, by the numbers of the commands that limbs still feel in it.
+
+        Shape (n_times, n_limbs, n_limbs) each, the command's limb last.
+        """
+        commands, found = self._commands, list[dict[int, Floats]]()
+        drives = Rotations(self._scene, self._state, commands, [Unknown("commands", commands.shape)])
+        for k in range(len(commands)):
+            rises = drives.interval(k, self._duration)[2]
+            rises = rises.reshape(*rises.shape[:2], *commands.shape)
+            found.append({int(felt): rises[:, :, felt].copy() for felt in np.flatnonzero(rises.any(axis=(0, 1, 3)))})
+        return found
 
     def _counts(self, name: str) -> NDArray[np.int64]:
         return np.array([report[name] for report in self._reports], dtype=np.int64)
@@ -270,11 +290,19 @@ class _Sweep:
 
     given: Slopes in the quantities of the swim, all of QUANTITIES.
     changes: Changes of what the swim begins with, in whose direction `slope_along` will be asked for.
-    of_q, of_v: Slopes in rows of the state at the start. of_turns: Slopes in the rotations of every interval. of_rest:
-        Those in positions at rest.
+    feedback: As of `Record.gradient`. by_commands: Whether `of_commands` is asked for, too.
+    of_q, of_v: Slopes in rows of the state at the start. of_turns: Slopes in the rotations of every interval.
+    of_commands: Those in its command, shape (n_limbs,). of_rest: Those in positions at rest.
     """
 
-    def __init__(self, record: Record, given: Mapping[str, Floats], changes: Sequence[Start]):
+    def __init__(
+        self,
+        record: Record,
+        given: Mapping[str, Floats],
+        changes: Sequence[Start],
+        feedback: Feedback | None,
+        by_commands: bool,
+    ):
         self._record, one, stages = record, record._rods, record._scheme.n_stages
         # Shared coefficients, where nobody asks for slopes in them, are known as constants when kernels are compiled.
         self._rods = _on_tape(side_by_side([one] * N_LANES)) if changes else one
@@ -296,6 +324,8 @@ class _Sweep:
         n, held = 2 * one.n_nodes, record._held
         self.of_q, self.of_v = (np.zeros(n_q) for _ in range(2))
         self.of_turns: list[Floats] = []
+        self.of_commands: list[Floats] = []
+        rises = record.rises_by_commands() if by_commands or feedback is not None else []
         for k in range(len(record._turns), -1, -1):
             if k < len(record._turns):
                 kept_still = self.of_q[held].copy()
@@ -303,9 +333,20 @@ class _Sweep:
                 self.of_turns.insert(0, self._pull_back(k, float(given["work"][k])))
                 self.of_q[held] += kept_still
                 self.of_v[held] = 0.0
+                if rises:
+                    self.of_commands.insert(0, self._of_command(k, rises[k:]))
+                if feedback is not None:
+                    by_policy = _shaped(feedback(k, self.of_commands[0]), (one.n_nodes, 2))
+                    self.of_q[:n] += by_policy[0].ravel()
+                    self.of_v[:n] += by_policy[1].ravel()
             self.of_q[:n] += in_places[k].ravel()
             self.of_v[:n] += given["velocities"][k].ravel()
         self.of_coefficients: Floats = self._slopes[1 : 1 + self._n_coefficients]
+
+    def _of_command(self, k: int, rises: list[dict[int, Floats]]) -> Floats:
+        """Slopes in the command of interval k, which limbs feel in it and later. rises: Of it and the later ones."""
+        felt = [(turn, rise[k]) for turn, rise in zip(self.of_turns, rises, strict=True) if k in rise]
+        return np.sum([np.zeros(self._record._n_limbs), *(np.tensordot(turn, rise, 2) for turn, rise in felt)], axis=0)
 
     def slope_along(self, start: Start) -> float:
         """Slope of the number if what the swim begins with changes like this."""
@@ -350,6 +391,14 @@ class _Sweep:
             self._slopes[:first] = before
         self.of_q, self.of_v = of.q, of.v
         return of.shape
+
+
+def _shaped(answer: Sequence[ArrayLike], shape: tuple[int, int]) -> list[Floats]:
+    """What a feedback has answered, as arrays. ValueError for other shapes."""
+    parts = [as_floats("slopes by feedback", part) for part in answer]
+    if [part.shape for part in parts] != [shape, shape]:
+        raise ValueError(f"feedback must return slopes in positions and velocities, of shape {shape} each.")
+    return parts
 
 
 def _on_tape(bundle: Any) -> Any:

@@ -107,6 +107,49 @@ def test_a_swim_in_two_parts_has_the_gradient_of_the_whole():
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("actuator", [SMALL.actuator, SmaWires(0.6, 0.05, 0.3, period=0.1)])
+def test_commands_of_a_policy_pass_slopes_on(actuator):
+    """Of a closed loop: the gradient in the policy's offsets and in velocities at the start is that of differences."""
+    scene, rng = replace(SMALL, actuator=actuator), np.random.default_rng(2)
+    rest = np.array(scene.robot.nodes(0))
+    gains = rng.standard_normal((2, 5, *rest.shape)) * np.reshape([20.0, 2.0], (2, 1, 1, 1))
+    change = rng.standard_normal(rest.shape)
+
+    def command(places, velocities, offset):
+        return np.tanh(np.tensordot(gains[0], places - rest, 2) + np.tensordot(gains[1], velocities, 2) + offset)
+
+    def swim(share, of_start):
+        """Quantities of a swim, whose start or whose offsets are changed, and its commands."""
+        simulator = Simulator(scene, 1, threads=1, effort=True)
+        state = simulator.get_state()
+        state.velocities[0] += share * change * of_start
+        simulator.set_state(state)
+        seen, work, commands = [(simulator.positions[0], simulator.velocities[0], simulator.heading()[0])], [], []
+        for offset in COMMANDS:
+            commands.append(command(*seen[-1][:2], offset + share * (1.0 - of_start) * offset))
+            work.append(simulator.stroke(commands[-1][None]).work[0])
+            seen.append((simulator.positions[0], simulator.velocities[0], simulator.heading()[0]))
+        return *(np.array(each) for each in zip(*seen, strict=True)), np.array(work), np.array(commands)
+
+    commands = swim(0.0, 0.0)[-1]
+    recorded = record(scene, commands)
+    slopes, rises = slopes_of(recorded.swim), 1.0 - commands**2
+
+    def feedback(k, slope):
+        return tuple(np.tensordot(slope * rises[k], gain, 1) for gain in gains)
+
+    found = recorded.gradient(slopes, ["commands", "velocities"], feedback)
+    for of_start, mine in (
+        (0.0, (found["commands"] * rises * COMMANDS).sum()),
+        (1.0, (found["velocities"] * change).sum()),
+    ):
+        by_differences = differences(lambda share, of_start=of_start: swim(share, of_start)[:-1], 2e-5)
+        assert mine == pytest.approx(number_of(slopes, Motion(*by_differences)), rel=1e-6)
+    assert (found["commands"] * rises * COMMANDS).sum() != pytest.approx(
+        (recorded.gradient(slopes, ["commands"])["commands"] * rises * COMMANDS).sum(), rel=1e-2
+    )
+
+
 def test_a_tape_grows_where_a_step_needs_more(monkeypatch):
     slopes = slopes_of(record(SMALL, COMMANDS).swim)
     expected = record(SMALL, COMMANDS).gradient(slopes, ["robot.density"])
@@ -133,6 +176,12 @@ def test_a_swim_that_failed_has_no_gradient():
 def test_refusals_are_sentences(slopes, reason):
     with pytest.raises(ValueError, match=rf"{reason}.*\.$"):
         record(SMALL, COMMANDS).gradient(slopes, ["commands"])
+
+
+def test_feedback_of_another_shape_is_refused():
+    recorded = record(SMALL, COMMANDS)
+    with pytest.raises(ValueError, match=r"feedback must return slopes in .*, of shape \(21, 2\) each\."):
+        recorded.gradient({"hub": np.ones((4, 2))}, ["commands"], lambda k, slope: (slope, slope))
 
 
 def example(name):
