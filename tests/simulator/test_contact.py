@@ -301,6 +301,21 @@ def test_neighbours_thrown_at_each_other_bounce_or_stop_but_never_cross(numerics
     assert not crossings(simulator.positions, pairs=simulator.scene.robot.limbs_that_may_touch()).any()
 
 
+@DEEP
+@pytest.mark.parametrize("share", [-0.2, 0.2, 0.6])
+def test_the_overlap_with_a_body_is_over_the_limb_s_part_of_the_distance(share):
+    """A limb that is held around a disc, with its tip in it."""
+    robot = Seastar(nodes_per_limb=10, n_limbs=1, limbs=(Limb(direction=0.0),), body=Body(radius=0.02))
+    held = tuple(range(robot.n_nodes))
+    simulator = Simulator(Scene(robot, None, contact=Contact(), held_nodes=held))
+    state = simulator.get_state()
+    angles, radii = np.linspace(0.0, np.pi, len(held) - 1), np.full(len(held) - 1, 0.03)
+    radii[0], radii[-1] = state.positions[0, 1, 0], 0.02 + robot.rod_radius * (1.0 - share)
+    state.positions[0, 1:] = (radii * [np.cos(angles), np.sin(angles)]).T
+    simulator.set_state(state)
+    assert simulator.stroke(np.zeros((1, 1))).largest_overlap[0] == pytest.approx(max(share, 0.0), rel=1e-6)
+
+
 def test_thrown_limbs_that_overlap_too_much_warn_once_and_would_cross_at_twice_the_speed():
     numerics, contact, still = Numerics("sdirk2", 1e-3), Contact(layer=10e-3), np.zeros((2, 5))
     simulator = thrown(1.0, numerics, contact, 2)
