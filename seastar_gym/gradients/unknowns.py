@@ -1,5 +1,6 @@
 """Unknowns by which swims are differentiated, and the slopes in them of all that a swim begins with."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -114,16 +115,17 @@ def slope_in_number(start: Start, state: State | None, unknown: Unknown) -> Star
     if any([a.shape for a in one.coefficients] != [a.shape for a in start.coefficients] for one in beside):
         raise ValueError(f"There is no derivative in {unknown.name}, whose smallest change adds or removes a term.")
 
-    def slope(value: Floats, values: Sequence[Floats]) -> Floats:
-        known = np.isfinite(value)  # an infinite threshold has no slope
-        some = np.array([np.where(known, each, 0.0) for each in values])
-        return CENTRAL.slope(np.where(known, value, 0.0), some, unknown.step)
+    value, *values = (np.concatenate([array.ravel() for array in _arrays_of(one)]) for one in (start, *beside))
+    known = np.isfinite(value)  # an infinite threshold has no slope
+    slopes = CENTRAL.slope(np.where(known, value, 0.0), np.where(known, values, 0.0), unknown.step)
+    shapes = [array.shape for array in _arrays_of(start)]
+    parts = np.split(slopes, np.cumsum([math.prod(shape) for shape in shapes])[:-1])
+    *coefficients, q, v, rest = (part.reshape(shape) for part, shape in zip(parts, shapes, strict=True))
+    return Start(coefficients, q, v, rest)
 
-    arrays = zip(start.coefficients, *(one.coefficients for one in beside), strict=True)
-    return Start(
-        [slope(value, values) for value, *values in arrays],
-        *(slope(value, values) for value, *values in zip(start[1:], *(one[1:] for one in beside), strict=True)),
-    )
+
+def _arrays_of(start: Start) -> list[Floats]:
+    return [*start.coefficients, *start[1:]]
 
 
 FORGOTTEN = 4e-16

@@ -37,7 +37,9 @@ def make_mesh(limbs: Sequence[LimbShape], nodes_per_limb: int, density: float) -
 
 def sections(limbs: Sequence[LimbShape], density: float, share: Floats, shape: tuple[int, ...]) -> Sections:
     """Cross sections of all limbs at fractions of their lengths, as arrays of a shape."""
-    columns = np.array([cut for limb in limbs for cut in limb.cuts(density, share)]).T
+    unlike = {(limb.section, limb.youngs_modulus): limb for limb in limbs}
+    found = {each: limb.cuts(density, share) for each, limb in unlike.items()}
+    columns = np.array([cut for limb in limbs for cut in found[limb.section, limb.youngs_modulus]]).T
     return Sections(*columns.reshape(len(columns), *shape))
 
 

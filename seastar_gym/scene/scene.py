@@ -185,9 +185,10 @@ class Scene:
                 f"A step of {self.numerics.step:.4g} s makes more than {MAX_STEPS:,} steps of a stroke of "
                 f"{self.actuator.period:.4g} s: use a longer step."
             )
+        extremes = (min, max) if self.n_robots else (min,)
         try:
             with np.errstate(all="ignore"):
-                sound = all(self._has_sound_coefficients(choose) for choose in (min, max))
+                sound = all(self._has_sound_coefficients(choose) for choose in extremes)
         except (OverflowError, ZeroDivisionError):
             sound = False
         if not sound:
@@ -232,7 +233,8 @@ class Scene:
         """Whether squared lengths, stiffnesses and masses of edges, and their reciprocals, are positive and finite."""
         robot = chosen(self.robot, choose)
         numbers = []
-        for limb in robot.limb_shapes():
+        unlike = {(limb.length, limb.section, limb.youngs_modulus): limb for limb in robot.limb_shapes()}
+        for limb in unlike.values():
             for squared_length, EA_over_l, EI_over_l, mass in limb.extreme_edges(robot.nodes_per_limb, robot.density):
                 numbers += [squared_length, EA_over_l, EI_over_l, 0.5 * mass, robot.n_limbs * mass]
         found = np.array([*numbers, *(1.0 / number for number in numbers)])
