@@ -8,6 +8,7 @@ contact.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache, partial
@@ -105,7 +106,9 @@ def survives(touch: Contact, speed: float) -> bool:
     turning = np.repeat([1.0, -1.0, 0.0, 0.0, 0.0], 9) * speed / robot.limb_length
     state.velocities[0, 1:] = np.stack([-turning * y, turning * x], axis=1)
     simulator.set_state(state)
-    return not simulator.stroke(np.zeros((1, 5))).status.any()
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Limbs of robot", RuntimeWarning)
+        return not simulator.stroke(np.zeros((1, 5))).status.any()
 
 
 def examine(name: str) -> dict[str, Any]:

@@ -69,7 +69,7 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
         _draw_panel(panel, found["settings"], f"{name}: {which} of {found['sequences']} sequences", column)
     for each in small[len(problems) :]:
         each.set_axis_off()
-    figure.supxlabel("processor time per stroke of a robot, one core [ms]  (dearer →)", fontsize=11)
+    figure.supxlabel("processor time per stroke of a robot, one core [ms]  (slower →)", fontsize=11)
     figure.supylabel("largest distance from the path in the continuum, over its length", fontsize=11)
     figure.legend(*wide.get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False, fontsize=10)
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -137,8 +137,8 @@ def _doubt(problems: Mapping[str, Any]) -> str:
     for name, found in problems.items():
         if not settled(found):
             said += (
-                f" Not so for {name}, where {PERCENT * found['limit_error']:.2g} % are in doubt on the worst sequence: "
-                "it was measured with [cones near the hub](#contact). The picture shows medians there."
+                f" Not so for {name}, where {PERCENT * found['limit_error']:.2g} % are in doubt on the worst sequence. "
+                "The picture shows medians there."
             )
     return said.strip()
 

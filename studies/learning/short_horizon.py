@@ -360,11 +360,11 @@ def rules() -> dict[str, float]:
 
 
 FEW, MANY, OF_PAIRS = 3_072, 56_320, 18_432
-"""Decisions of a training by SHAC, of one by PPO that takes as long, and of one over pairs, until nothing changes."""
+"""Decisions of a training by SHAC, of one by PPO that takes longer, and of one over pairs, until nothing changes."""
 LEARNERS: dict[str, Callable[[int], Scores]] = {
     "SHAC": partial(by_shac, FEW),
     "PPO, as many decisions": partial(by_ppo, FEW),
-    "PPO, as long": partial(by_ppo, MANY),
+    "PPO, longer": partial(by_ppo, MANY),
     "PPO over pairs": partial(by_ppo, OF_PAIRS, actions="pairs"),
 }
 SEEDS = range(10)
