@@ -32,6 +32,8 @@ from fuzz.scenes import (
 from fuzz.sentences import assert_one_sentence
 from seastar_gym import Limited, SmaPulse, Water
 
+pytestmark = pytest.mark.filterwarnings("ignore:Limbs of robot:RuntimeWarning")
+
 
 @drawn(200, [*COMPILED, TOUCHED_BODY, BENT])
 def test_a_scene_is_accepted_or_refused_in_one_sentence(terms, seed):
@@ -132,6 +134,11 @@ def test_info_has_the_same_keys_on_reset_and_on_every_step(seed):
 
 
 # The long run: `pytest tests/fuzz --fuzz-minutes 60 -s`, and its failures one by one, by `--fuzz-case`.
+
+
+def test_overlaps_are_of_a_robot_s_own_pairs():
+    """Pairs that only others have on the list were counted, too, where one of them touched."""
+    hour.attempt(hour.Trial.named("bits alone/contact/26110000015"))
 
 
 def test_what_is_drawn_for_as_long_as_asked_keeps_every_promise(request, capsys):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from seastar_gym.der.contact.broad_phase import across_gap, thickness_of_pair
-from seastar_gym.der.contact.contact import edge_ends, members, n_listed
+from seastar_gym.der.contact.contact import SLOT_ROWS, THICKNESS, edge_ends, members, n_listed
 from seastar_gym.der.contact.near_body import height_over_body
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.star import corner_place, tail_node
@@ -166,8 +166,8 @@ def deepest_overlap(rods, work, q):
 
     1 where a node is on the centre line of another limb, or on the outline of a body; 0 where nobody touches.
     """
-    deepest = splat(0.0)
-    if not any_lane(load(work.contact.touching, 0) > 0.0):
+    deepest, touching = splat(0.0), load(work.contact.touching, 0) > 0.0
+    if not any_lane(touching):
         return deepest
     for slot in range(n_listed(work)):
         i, j, k = members(rods, work, slot)
@@ -179,7 +179,9 @@ def deepest_overlap(rods, work, q):
         thickness = thickness_of_pair(rods, i, j, k, s)
         nearest = subtract_product(thickness, deepest, own_thickness(rods, i, k, thickness))
         squared = add_product(dx * dx, dy, dy)
-        deeper = (nearest > 0.0) & (squared < nearest * nearest)
+        # Others have the pair on the list, too.
+        listed = touching & (load(work.contact.slots, SLOT_ROWS * slot + THICKNESS) > 0.0)
+        deeper = listed & (nearest > 0.0) & (squared < nearest * nearest)
         if any_lane(deeper):
             depth = thickness - sqrt(squared)
             deepest = select(deeper, depth / own_thickness(rods, i, k, thickness), deepest)
