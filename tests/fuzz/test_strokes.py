@@ -133,12 +133,12 @@ def test_info_has_the_same_keys_on_reset_and_on_every_step(seed):
     swims.check_info_keys(seed)
 
 
-# The long run: `pytest tests/fuzz --fuzz-minutes 60 -s`, and its failures one by one, by `--fuzz-case`.
-
-
 def test_overlaps_are_of_a_robot_s_own_pairs():
     """Pairs that only others have on the list were counted, too, where one of them touched."""
     hour.attempt(hour.Trial.named("bits alone/contact/26110000015"))
+
+
+# The long run: `pytest tests/fuzz --fuzz-minutes 60 -s`, and its failures one by one, by `--fuzz-case`.
 
 
 def test_what_is_drawn_for_as_long_as_asked_keeps_every_promise(request, capsys):
