@@ -25,6 +25,8 @@ from seastar_gym.envs.stations import heading_of
 from seastar_gym.scene.per_robot import side_by_side
 from seastar_gym.simd.lanes import N_LANES
 
+pytestmark = pytest.mark.filterwarnings("ignore:Limbs of robot:RuntimeWarning")
+
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
 KINDS = ("at rest", "shifted", "coinciding", "fast", "crossed", "crumpled", "far out", "no number")
 
