@@ -1,14 +1,13 @@
 """`record` and `gradient`: the gradient of a number of a swim in all unknowns, by one sweep back through the swim."""
 
-from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from threading import RLock
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.der.rods import Work, make_work
+from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.report import MOMENTS, REPORT_ROWS, SMALLEST_HUB_T, WORK
 from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
 from seastar_gym.der.terms.hub import Actuation
@@ -17,13 +16,12 @@ from seastar_gym.gradients.history import (
     COUNTERS,
     INTERVAL,
     N_STEPS,
-    OF_STAGE,
     OF_STEP,
     Kept,
     keeping_advance,
     n_numbers,
 )
-from seastar_gym.gradients.on_tape import Replayed
+from seastar_gym.gradients.memory import WorkOfGradient, as_rows_of_tape, with_places, works
 from seastar_gym.gradients.replay import Rows, Slopes, Tape, pulling_back
 from seastar_gym.gradients.replay import Scene as SceneOnTape
 from seastar_gym.gradients.stencils import arrays_of
@@ -39,10 +37,10 @@ from seastar_gym.gradients.swim import (
 from seastar_gym.gradients.unknowns import OF_START, Rotations, Start, Unknown, slope_in_number, start_of, unknowns_of
 from seastar_gym.model.rods import make_limits, make_rods
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import as_floats, shown
+from seastar_gym.scene.checks import as_floats, require_callable, shown
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import aligned_rows, side_by_side
-from seastar_gym.simd.tape_lanes import ENTRY, FACTOR, PLACE, ROW
+from seastar_gym.simd.tape_lanes import ENTRY, ROW
 from seastar_gym.simulator.state import State
 
 Floats = NDArray[np.float64]
@@ -60,9 +58,6 @@ MOST_KEPT = 64e6
 Feedback = Callable[[int, Floats], tuple[Floats, Floats]]
 """How commands depended on states: from the number of an interval and the slope in its command, shape (n_limbs,), the
 slopes that it has by that command in positions and velocities at the beginning, shape (n_nodes, 2) each."""
-
-WorkOfGradient = namedtuple("WorkOfGradient", (*Work._fields, "kept", "replayed"))  # type: ignore[misc]
-"""`Work` with a history, see history.py, or with a step that is replayed, see replay.py."""
 
 _the_tape = RLock()
 
@@ -168,6 +163,8 @@ class Record:
         change of the start or of a command then changes the later commands, too.
         """
         require_names(by)
+        if feedback is not None:
+            require_callable("feedback", feedback)
         unknowns = unknowns_of(self._scene, self._commands, by)
         given = self._checked(slopes)
         if self.status.any():
@@ -278,7 +275,7 @@ class Record:
             q[:] = v[:] = effort[:] = np.nan
         q[self._held, 0], v[self._held] = self._states[k][0][self._held], 0.0
         counts = {**dict(zip(REPORT_ROWS, report[0, :, 0].tolist(), strict=True)), "status": float(failed[0, 0, 0])}
-        return float(effort[0, WORK, 0]), counts, (q[:, 0].copy(), v[:, 0].copy()), found[: n + 1]
+        return float(effort[0, WORK, 0]), counts, (q[:, 0].copy(), v[:, 0].copy()), found[: n + 1].copy()
 
 
 def _actuation(n_limbs: int, n: int) -> Actuation:
@@ -305,17 +302,17 @@ class _Sweep:
     ):
         self._record, one, stages = record, record._rods, record._scheme.n_stages
         # Shared coefficients, where nobody asks for slopes in them, are known as constants when kernels are compiled.
-        self._rods = _on_tape(side_by_side([one] * N_LANES)) if changes else one
+        self._rods = as_rows_of_tape(side_by_side([one] * N_LANES)) if changes else one
         self._moved = [
             np.any([change.coefficients[k] != 0.0 for change in changes], axis=0) & np.full(len(rows), bool(changes))
             for k, rows in enumerate(arrays_of(self._rods))
         ]
-        self._n_coefficients = _number(self._rods, self._moved)
+        self._n_coefficients = with_places(self._rods, self._moved)
         n_q = record._start.q.size
         sizes = (n_q, n_q, record._n_a, *3 * (record._n_limbs,), 2 * one.n_free * stages)
         self._rows, self._beside = (Rows(*(np.zeros((n, ROW)) for n in sizes)) for _ in range(2))
         memory = make_work(one, stages, again=True)
-        self._work, self._own_work = _works(memory, self._rows.residual, stages, one.n_points)
+        self._work, self._own_work = works(memory, self._rows.residual, stages, one.n_points)
         self._grow(ENTRIES)
         of_places, of_rest = slopes_of_heading(record.swim.positions, record._start.rest)
         in_places = given["positions"] + given["heading"][:, None, None] * of_places
@@ -393,62 +390,9 @@ class _Sweep:
         return of.shape
 
 
-def _shaped(answer: Sequence[ArrayLike], shape: tuple[int, int]) -> list[Floats]:
+def _shaped(answer: object, shape: tuple[int, int]) -> list[Floats]:
     """What a feedback has answered, as arrays. ValueError for other shapes."""
-    parts = [as_floats("slopes by feedback", part) for part in answer]
+    parts = [as_floats("slopes by feedback", part) for part in answer] if isinstance(answer, tuple | list) else []
     if [part.shape for part in parts] != [shape, shape]:
         raise ValueError(f"feedback must return slopes in positions and velocities, of shape {shape} each.")
     return parts
-
-
-def _on_tape(bundle: Any) -> Any:
-    """A bundle whose rows of robots are rows of a tape: values, and factors and place, which are 0."""
-    if isinstance(bundle, np.ndarray) and bundle.ndim == 2:
-        rows = aligned_rows(len(bundle), ROW)
-        rows[:, :N_LANES] = bundle
-        return rows
-    if hasattr(bundle, "_fields"):
-        return bundle._replace(**{name: _on_tape(getattr(bundle, name)) for name in bundle._fields})
-    return bundle
-
-
-def _works(own: Work, residual: Floats, n_stages: int, n_points: int) -> tuple[Any, Work]:
-    """Memory on a tape, and on the lanes of `Simulator`; its rows stand one behind the other in both, see Replayed."""
-    n_lists, n_rows = (sum(len(part) for part in arrays_of(own) if part.ndim == n) for n in (1, 2))
-    memory, lists = np.zeros((n_rows, ROW)), np.zeros(n_lists)
-    slots = 1 if n_stages == 1 else n_stages + 1
-    of_stages, of_lists = aligned_rows(slots, n_rows, N_LANES), np.zeros((slots, n_lists))
-    replayed = Replayed(
-        np.zeros((OF_STEP + 1, ROW)), np.zeros((n_stages * (OF_STAGE + 2 * n_points), ROW)), np.zeros(1),
-        np.zeros(n_stages), residual, memory.ravel(), lists, of_stages.ravel(), of_lists.ravel(), n_rows, n_lists,
-    )  # fmt: skip
-    on_tape = WorkOfGradient(*_in_memory(own, memory, lists), None, replayed)  # type: ignore[call-arg]
-    return on_tape, _in_memory(own, of_stages[-1], of_lists[-1])
-
-
-def _in_memory(bundle: Any, rows: Floats, lists: Floats) -> Any:
-    """A bundle whose arrays stand in these, one behind the other: rows of robots, and what robots share."""
-    taken = [0, 0]
-
-    def placed(part: Any) -> Any:
-        if isinstance(part, np.ndarray):
-            begin = taken[part.ndim - 1]
-            taken[part.ndim - 1] += len(part)
-            return (lists, rows)[part.ndim - 1][begin : begin + len(part)]
-        if hasattr(part, "_fields"):
-            return part._replace(**{name: placed(getattr(part, name)) for name in part._fields})
-        return part
-
-    return placed(bundle)
-
-
-def _number(bundle: Any, moved: Sequence[NDArray[np.bool_]]) -> int:
-    """Give those rows of a tape that are moved their places, from 1 on, in the order of `arrays_of`; how many."""
-    n = 0
-    for rows, some in zip(arrays_of(bundle), moved, strict=True):
-        if rows.ndim == 2:
-            count = int(some.sum())
-            rows.view(np.int64)[some, PLACE] = np.arange(n + 1, n + 1 + count)
-            rows[some, FACTOR:PLACE] = 1.0
-            n += count
-    return n

@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import gymnasium as gym
@@ -31,13 +32,16 @@ from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model
 from seastar_gym import VectorSymmetryReduction
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.registry import load_agent
+from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.layout import N_STATIONS, VELOCITY_SCALE
 from seastar_gym.envs.paths import LINE_LENGTH
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import weights
 from seastar_gym.envs.symmetry import Symmetry
+from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.gradients import Record, record
 from seastar_gym.scene import Scene
@@ -49,8 +53,6 @@ Floats = NDArray[np.float64]
 Tensor = torch.Tensor
 Scores = list[list[float]]
 """Of a training: decisions so far, processor time [s] and return."""
-Act = Callable[[NDArray[np.float32]], NDArray[Any]]
-"""Actions of robots from their reduced observations."""
 
 EPISODE, HELD_OUT, HELD_OUT_SEED, SCORES = 24, 32, 10_000, 32
 """Decisions of an episode, number and first seed of the episodes of a score, and scores of a training."""
@@ -59,24 +61,18 @@ GOAL = torch.tensor([LINE_LENGTH, 0.0], dtype=torch.float64)
 OF_NODES = ("positions", "velocities")
 
 
-def swimmers(n: int, actions: str = "continuous") -> Any:
+def swimmers(n: int, actions: Actions = "continuous", mode: AutoresetMode = AutoresetMode.SAME_STEP) -> Any:
     """Robots of the task."""
     return gym.make_vec(
         "SeastarSwimContinuous-v0", n, vectorization_mode="vector_entry_point", fidelity="fast", path="line",
-        random_heading=True, max_episode_steps=EPISODE, threads=1, actions=actions,
-        autoreset_mode=AutoresetMode.SAME_STEP,
+        random_heading=True, max_episode_steps=EPISODE, threads=1, actions=actions, autoreset_mode=mode,
     )  # fmt: skip
 
 
-def score(act: Act, actions: str = "continuous") -> float:
+def score(policy: Policy, actions: Actions = "continuous") -> float:
     """Mean return of held-out episodes."""
-    env = VectorSymmetryReduction(swimmers(HELD_OUT, actions))
-    seen, total = env.reset(seed=HELD_OUT_SEED)[0], 0.0
-    for _ in range(EPISODE):
-        seen, reward, *_ = env.step(act(seen))
-        total += float(reward.mean())
-    env.close()
-    return total
+    env = VectorSymmetryReduction(swimmers(HELD_OUT, actions, AutoresetMode.NEXT_STEP))
+    return float(rollout(env, policy, seeds=HELD_OUT_SEED).returns.mean())
 
 
 class Stopwatch:
@@ -86,10 +82,10 @@ class Stopwatch:
         self.scores: Scores = []
         self._paused, self._began = 0.0, time.process_time()
 
-    def score(self, decisions: int, act: Act, actions: str = "continuous") -> None:
+    def score(self, decisions: int, policy: Policy, actions: Actions = "continuous") -> None:
         """Score what is learned so far."""
         began = time.process_time()
-        found = score(act, actions)
+        found = score(policy, actions)
         self.scores.append([decisions, rounded(began - self._began - self._paused, 4), rounded(found, 4)])
         self._paused += time.process_time() - began
 
@@ -142,7 +138,7 @@ class Swim:
 
 @dataclass(frozen=True)
 class Settings:
-    """Of SHAC.
+    """Numbers of a training by SHAC.
 
     robots: Number of robots. window: Decisions of each between updates; an episode has a whole number of windows.
     rates: Of Adam for actor and critic; they fall linearly to zero. log_deviation: Logarithm of the deviation at first.
@@ -186,7 +182,7 @@ class Window(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Of windows: mean return per decision, its slopes in weights, observations and rewards."""
+    """What windows return per decision in the mean, its slopes in the actor's weights, observations and rewards."""
 
     value: float
     slopes: tuple[Tensor, ...]
@@ -228,10 +224,10 @@ class Shac:
         self.steps = [torch.optim.Adam(each) for each in (self.weights, self.critic.parameters())]
         self.seen = self.env.reset(seed=seed)[0]
 
-    def act(self, seen: NDArray[np.float32]) -> NDArray[Any]:
-        """Mean actions, as of `Act`."""
+    def predict(self, observation: Any, *_: Any, **__: Any) -> tuple[NDArray[Any], None]:
+        """Mean actions by reduced observations, and no state, as policies do."""
         with torch.no_grad():
-            return np.asarray(torch.tanh(self.actor(torch.from_numpy(seen).double())).numpy())
+            return np.asarray(torch.tanh(self.actor(torch.from_numpy(observation).double())).numpy()), None
 
     def commands(self, seen: Tensor, noise: Tensor) -> Tensor:
         """Commands, shape (..., 5)."""
@@ -315,14 +311,14 @@ def by_shac(decisions: int, seed: int, settings: Settings = SETTINGS) -> Scores:
     for k in range(updates):
         learner.update(1.0 - k / updates)
         if (k + 1) * SCORES // updates > k * SCORES // updates:
-            watch.score((k + 1) * per, learner.act)
+            watch.score((k + 1) * per, learner)
     return watch.scores
 
 
 class Scoring(BaseCallback):
     """Scores during a training by PPO."""
 
-    def __init__(self, decisions: int, actions: str):
+    def __init__(self, decisions: int, actions: Actions):
         super().__init__()
         self._decisions, self._actions, self.watch = decisions, actions, Stopwatch()
 
@@ -332,30 +328,26 @@ class Scoring(BaseCallback):
     def _on_rollout_start(self) -> None:
         done = self.num_timesteps
         if done * SCORES // self._decisions > len(self.watch.scores):
-            self.watch.score(done, partial(decided, self.model), self._actions)
+            self.watch.score(done, self.model, self._actions)
 
 
-def by_ppo(decisions: int, seed: int, actions: str = "continuous", settings: Hyperparameters = OF_PPO) -> Scores:
+def by_ppo(decisions: int, seed: int, actions: Actions = "continuous", settings: Hyperparameters = OF_PPO) -> Scores:
     """Scores of a training by PPO."""
     env = BatchVecEnv(VectorSymmetryReduction(swimmers(settings.num_envs, actions)))
     model, scoring = make_model(env, settings, seed), Scoring(decisions, actions)
     model.learn(decisions, callback=scoring)
-    scoring.watch.score(model.num_timesteps, partial(decided, model), actions)
+    scoring.watch.score(model.num_timesteps, model, actions)
     return scoring.watch.scores
-
-
-def decided(policy: Any, seen: NDArray[np.float32]) -> NDArray[Any]:
-    """Actions of a policy, as of `Act`."""
-    return np.asarray(policy.predict(seen, deterministic=True)[0])
 
 
 def rules() -> dict[str, float]:
     """Scores of what does not learn here."""
     env, gait = SeastarSwimEnv(fidelity="fast"), np.tile(STRAIGHT, (HELD_OUT, 1))
-    found = {"the straight gait, steered": score(lambda seen: gait)}
+    straight: Any = SimpleNamespace(predict=lambda *_, **__: (gait, None))
+    found = {"the straight gait, steered": score(straight)}
     for name in ("greedy", "learned"):
         policy: Any = load_agent(name, env)
-        found[name] = score(partial(decided, policy), policy.actions)
+        found[name] = score(policy, policy.actions)
     return {name: rounded(each, 4) for name, each in found.items()}
 
 

@@ -178,10 +178,18 @@ def test_refusals_are_sentences(slopes, reason):
         record(SMALL, COMMANDS).gradient(slopes, ["commands"])
 
 
-def test_feedback_of_another_shape_is_refused():
+@pytest.mark.parametrize("answer", [lambda slope: (slope, slope), lambda slope: slope, lambda slope: None])
+def test_feedback_of_another_shape_is_refused(answer):
     recorded = record(SMALL, COMMANDS)
     with pytest.raises(ValueError, match=r"feedback must return slopes in .*, of shape \(21, 2\) each\."):
-        recorded.gradient({"hub": np.ones((4, 2))}, ["commands"], lambda k, slope: (slope, slope))
+        recorded.gradient({"hub": np.ones((4, 2))}, ["commands"], lambda k, slope: answer(slope))
+    with pytest.raises(ValueError, match=r"feedback must be a function, not 3\."):
+        recorded.gradient({"hub": np.ones((4, 2))}, ["commands"], 3)
+
+
+def test_memory_of_a_record_is_what_it_has_kept():
+    recorded = record(SMALL, COMMANDS)
+    assert all(kept.base is None for kept in map(recorded.history, range(len(COMMANDS))))
 
 
 def example(name):
