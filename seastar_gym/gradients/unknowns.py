@@ -14,7 +14,7 @@ from seastar_gym.scene.checks import is_finite_number, shown
 from seastar_gym.scene.per_robot import at, with_numbers
 from seastar_gym.simulator.drive import Drive
 from seastar_gym.simulator.simulator import Simulator
-from seastar_gym.simulator.state import State
+from seastar_gym.simulator.state import State, checked_state
 
 Floats = NDArray[np.float64]
 
@@ -217,9 +217,8 @@ def _drive(scene: Scene, state: State | None) -> Drive:
     drive = Drive(scene.actuator, 1, scene.robot.n_limbs, scene.numerics.step)
     drive.strengths = strengths_of(scene)
     if state is not None:
-        simulator = Simulator(scene, 1, threads=1)
-        simulator.set_state(state)
-        drive.put(*simulator.get_state()[3:6])  # type: ignore[arg-type]
+        checked = checked_state(state, np.asarray(scene.robot.nodes(0)), drive.at_rest, drive.longest)
+        drive.put(*checked[3:6])
     return drive
 
 
