@@ -462,7 +462,10 @@ class Swimming(ABC):
 
 
 def first_after(ends: list[float]) -> Callable[[float], float | None]:
-    """Of increasing times, only the first that is not before each of the ends: a function for `pausing`."""
+    """A function for `pausing`, which is asked about increasing times: it returns the first that has reached each end.
+
+    For all other times it returns None.
+    """
     left = iter(ends)
     end = next(left, np.inf)
 

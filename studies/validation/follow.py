@@ -99,7 +99,7 @@ class Swimmers:
         return way / ((STROKES - FIRST) * STEPS)
 
     def frame_drag(self, U: Floats) -> Floats:
-        """Of the frame at speeds U [m/s] [N]."""
+        """Drag of the frame [N] at speeds U [m/s]."""
         area = 0.5 * WATER * FRAME[1] * FRAME[2] * self.frame_coefficient
         return np.asarray(area * BODY ** (2.0 - self.law.frame) * np.abs(U) ** (self.law.frame - 1.0) * U)
 
