@@ -141,7 +141,9 @@ FOUND, COMPILED = (2.5, 1, 0), (2.5, 0, 1)
 @pytest.fixture
 def fresh(tmp_path, monkeypatch):
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
-    return Cached(tmp_path)
+    cached = Cached(tmp_path)
+    monkeypatch.setitem(sys.modules, "mine", cached.module)  # where code that is found looks for its module
+    return cached
 
 
 @pytest.fixture
