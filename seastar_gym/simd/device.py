@@ -21,8 +21,8 @@ from numba.core import config, types
 from numba.core.registry import cpu_target
 
 from seastar_gym.simd import compilation
+from seastar_gym.simd.linking import linked
 from seastar_gym.simd.modules import COMPILATION, WIDTH, KernelModules, made_module
-from seastar_gym.simd.pipeline import linked
 
 N_LANES = 32
 """Robots in a row of memory: as many as threads that run in step."""

@@ -1,37 +1,47 @@
-"""Numba's compiler as kernels need it: absent terms are constants, and a kernel is optimised in what calls it alone.
+"""Numba's compiler as kernels need it: absent terms are constants, and what is found out for one kernel holds for all.
 
-Numba would link, optimise and turn into machine code every kernel by itself, although only compiled code calls it; and
-it would look for what kernels do not have. Without that, the same bits are there in half the time.
+Numba would search its templates at every operator, look for what kernels do not have, and optimise every kernel by
+itself, although only compiled code calls it (linking.py). Without that, the same bits are there in a third of the time.
 """
 
+import functools
+import gc
 import operator
-from types import SimpleNamespace
 
 from numba.core import ir, types
-from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.compiler_machinery import FunctionPass, LoweringPass, register_pass
+from numba.core.compiler_machinery import (
+    FunctionPass,
+    LoweringPass,
+    PassManager,
+    _pass_registry,
+    register_pass,
+)
+from numba.core.interpreter import Interpreter, peep_hole_delete_with_exit, peep_hole_fuse_dict_add_updates
 from numba.core.ir_utils import get_definition, guard
 from numba.core.typed_passes import (
     InlineOverloads,
-    IRLegalization,
     NativeLowering,
+    NoPythonBackend,
     NopythonRewrites,
     NoPythonSupportedFeatureValidation,
-    PreLowerStripPhis,
+    NopythonTypeInference,
 )
 from numba.core.untyped_passes import (
+    DeadBranchPrune,
     FindLiterallyCalls,
+    FixupArgs,
+    GenericRewrites,
     InlineClosureLikes,
     InlineInlinables,
     LiteralUnroll,
     MakeFunctionToJitFunction,
-    ReconstructSSA,
     RewriteDynamicRaises,
     RewriteSemanticConstants,
     WithLifting,
 )
+
+from seastar_gym.simd.linking import Part, Whole
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)
@@ -81,79 +91,71 @@ def _type_of(function, arguments, value):
     return None
 
 
-MANGLED = "seastar_gym"
-"""Part of the name of every kernel."""
+class _Interpreter(Interpreter):
+    """Numba's reader of Python's bytecode, without the search for what no kernel has."""
+
+    def post_process(self, peepholes, func_ir):
+        needless = (peep_hole_delete_with_exit, peep_hole_fuse_dict_add_updates)
+        return super().post_process([each for each in peepholes if each not in needless], func_ir)
 
 
-class _Part(JITCodeLibrary):
-    """Code that compiled code alone calls: its own, without that of the kernels which it calls.
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Read(FunctionPass):
+    """Has a kernel's bytecode read."""
 
-    A `_Whole` optimises it and turns it into machine code. By itself it would be both for nothing.
+    _name = "read_kernel"
+
+    def __init__(self):
+        FunctionPass.__init__(self)
+
+    def run_pass(self, state):
+        state.func_ir = _Interpreter(state.func_id).interpret(state.bc)
+        return True
+
+
+class _Known:
+    """A typing context that remembers what numba's functions give, and attributes are, by the types that they get.
+
+    A kernel is a function of another type. It is compiled when first asked for, and keeps what it gives itself.
     """
 
-    def _optimize_functions(self, ll_module):
-        ll_module.data_layout = self._codegen._data_layout
-        passes, builder = self._codegen._function_pass_manager()
-        for function in ll_module.functions:
-            if not function.is_declaration:
-                passes.run(function, builder)
+    def __init__(self, context):
+        self.context, self._functions, self._attributes = context, {}, {}
 
-    def finalize(self):
-        self._raise_if_finalized()
-        self._finalize_dynamic_globals()
-        self._finalized = True
+    def __getattr__(self, name):
+        return getattr(self.context, name)
 
-    def get_pointer_to_function(self, name):
-        return 0
+    def resolve_function_type(self, func, args, kws):
+        if kws or not isinstance(func, types.Function):
+            return self.context.resolve_function_type(func, args, kws)
+        key = func, tuple(args)
+        if key not in self._functions:
+            self._functions[key] = self.context.resolve_function_type(func, args, kws)
+        return self._functions[key]
 
-    @property
-    def codegen(self):
-        """There is no machine code that an environment of Python's could be given to."""
-        return SimpleNamespace(set_env=lambda name, environment: None)
-
-
-class _Whole(JITCodeLibrary):
-    """Code that Python calls, with that of all kernels below it, each linked in once."""
-
-    def finalize(self):
-        self._linking_libraries = _reached(self)
-        super().finalize()
-
-    def _optimize_final_module(self):
-        """Optimise once: numba's first pass gathers reference counts, of which kernels have none."""
-        missing = [each.name for each in self._final_module.functions if each.is_declaration and MANGLED in each.name]
-        assert not missing, missing
-        passes, builder = self._codegen._module_pass_manager()
-        passes.run(self._final_module, builder)
+    def resolve_getattr(self, typ, attr):
+        key = typ, attr
+        if key not in self._attributes:
+            self._attributes[key] = self.context.resolve_getattr(typ, attr)
+        return self._attributes[key]
 
 
-def _reached(library):
-    """The libraries that one calls, and those that these call, each once and after all that call it.
-
-    LLVM's linker leaves out what nothing calls yet.
-    """
-    found, seen = [], set()
-
-    def visit(caller):
-        for called in reversed(caller._linking_libraries):
-            if called not in seen:
-                seen.add(called)
-                if isinstance(called, _Part):
-                    visit(called)
-                found.append(called)
-
-    visit(library)
-    return found[::-1]
+_known = functools.cache(_Known)
 
 
-def linked(kernel, signature):
-    """A compiled kernel's description, and its LLVM code with that of all that it calls."""
-    compiled = kernel.overloads[signature]
-    with global_compiler_lock:
-        module = compiled.library._get_module_for_linking().clone()
-        for called in _reached(compiled.library):
-            module.link_in(called._get_module_for_linking(), preserve=True)
-    return compiled.fndesc, module
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Typed(NopythonTypeInference):
+    """Numba's inference of types, asking what is known."""
+
+    _name = "typed_kernel"
+
+    def run_pass(self, state):
+        context = state.typingctx
+        state.typingctx = _known(context)
+        try:
+            return super().run_pass(state)
+        finally:
+            state.typingctx = context
 
 
 class _Lowered(LoweringPass):
@@ -168,14 +170,24 @@ class _Lowered(LoweringPass):
         return True
 
 
+@functools.cache
+def _size_of(target, kind):
+    """Bytes of one of LLVM's types, for which it would compile a variable of that type every time."""
+    return kind.get_abi_size(target)
+
+
 @register_pass(mutates_CFG=False, analysis_only=False)
 class _AsPart(_Lowered):
-    _name, library = "as_part", _Part
+    _name, library = "as_part", Part
+
+    def run_pass(self, state):
+        state.targetctx.get_abi_sizeof = functools.partial(_size_of, state.targetctx.target_data)
+        return super().run_pass(state)
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class _AsWhole(_Lowered):
-    _name, library = "as_whole", _Whole
+    _name, library = "as_whole", Whole
 
 
 NEEDLESS = frozenset({
@@ -183,28 +195,50 @@ NEEDLESS = frozenset({
     FindLiterallyCalls, LiteralUnroll, InlineOverloads, NopythonRewrites, NoPythonSupportedFeatureValidation,
 })  # fmt: skip
 """Numba's passes for what no compiled function of ours has: closures, `with`, exceptions, expressions of arrays."""
-NEEDLESS_IN_KERNELS = frozenset({ReconstructSSA, PreLowerStripPhis, IRLegalization})
-"""Those for variables of several types, and for counting references: what calls kernels owns the arrays."""
 
 
 class EntryCompiler(CompilerBase):
     """Compiler of functions that Python calls. Absent terms are constants before numba looks for dead branches."""
 
-    lowered = _AsWhole
-    needless = NEEDLESS
+    def compile_extra(self, func):
+        """Compile with all kernels below. Python's search for garbage would take an eighth of the time."""
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile_extra(func)
+        finally:
+            if collects:
+                gc.enable()
 
     def define_pipelines(self):
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.add_pass_after(_AbsentTerms, RewriteSemanticConstants)
-        passes.passes = [each for each in passes.passes if each[0] not in self.needless]
+        passes.passes = [each for each in passes.passes if each[0] not in NEEDLESS]
         lowering = [kind for kind, _ in passes.passes].index(NativeLowering)
-        passes.add_pass_after(self.lowered, passes.passes[lowering - 1][0])
+        passes.add_pass_after(_AsWhole, passes.passes[lowering - 1][0])
         passes.finalize()
         return [passes]
 
 
-class KernelCompiler(EntryCompiler):
+class _PlainPasses(PassManager):
+    """Passes one after the other. Numba's own are timed, told to listeners and looked at for printing."""
+
+    def run(self, state):
+        for kind, _ in self.passes:
+            _pass_registry.get(kind).pass_inst.run_pass(state)
+
+
+OF_KERNELS = (
+    _Read, FixupArgs, RewriteSemanticConstants, _AbsentTerms, DeadBranchPrune, GenericRewrites, _Typed, _AsPart,
+    NativeLowering, NoPythonBackend,
+)  # fmt: skip
+"""Numba's passes that kernels need: their variables have one type each, and what calls them owns the arrays."""
+
+
+class KernelCompiler(CompilerBase):
     """Compiler of kernels, which only compiled code calls."""
 
-    lowered = _AsPart
-    needless = NEEDLESS | NEEDLESS_IN_KERNELS
+    def define_pipelines(self):
+        passes = _PlainPasses("kernel")
+        passes.passes = [(kind, "") for kind in OF_KERNELS]
+        return [passes]
