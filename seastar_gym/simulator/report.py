@@ -42,9 +42,8 @@ class SolverStatus(IntEnum):
         }[self]
 
 
-COUNTS = ("newton_iterations", "regularised", "backtracks", "steps", "halvings", "rejections", "energy_cuts")
-
-
+COUNTS = ("status", "newton_iterations", "regularised", "backtracks", "steps", "halvings", "rejections", "energy_cuts")
+"""Whole numbers of a report."""
 MEASURED_IF_ASKED = ("error_estimate", "work", "peak_moment", "energy_growth")
 """Fields of a report that are NaN unless the simulator has `error_bars`, `effort` or numerics of your own."""
 
@@ -127,18 +126,16 @@ def make_report(
     angle = 2.0 * np.arctan(rows["smallest_hub_t"])
     if hub_hinge == "turning":
         angle += np.pi
+    counts = np.array([rows[name] for name in COUNTS], np.int64)
+    unasked = np.full((len(MEASURED_IF_ASKED), len(angle)), np.nan)
     return StrokeReport(
-        status=rows["status"].astype(np.int64),
+        **dict(zip(COUNTS, counts, strict=True)),
         covered=rows["covered"],
         smallest_opening_angle=angle,
         largest_overlap=rows["largest_overlap"],
-        error_estimate=rows["error_estimate"],
         heating_time=heating_time,
         energy=power * heating_time,
-        work=rows["work"],
-        peak_moment=rows["peak_moment"],
-        energy_growth=rows["energy_growth"],
-        **{name: rows[name].astype(np.int64) for name in COUNTS},
+        **{name: rows.get(name, nan) for name, nan in zip(MEASURED_IF_ASKED, unasked, strict=True)},
     )
 
 
