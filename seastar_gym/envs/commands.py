@@ -97,7 +97,7 @@ def to_commands(actions: Actions, n_limbs: int, action: object, n_robots: int) -
             f'With actions="{actions}" the actions of {n_robots} robot(s) are whole numbers of shape {shape}, '
             f"not {array.dtype} of shape {array.shape}."
         )
-    if array.size and (array.min() < 0 or array.max() >= len(table)):
+    if np.count_nonzero(array.astype(np.uint64) >= len(table)):  # numbers below 0 are large ones then
         raise ValueError(f'With actions="{actions}" an action is from 0 to {len(table) - 1}, not {array.tolist()}.')
     return np.asarray(table[array])
 

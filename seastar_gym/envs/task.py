@@ -10,6 +10,7 @@ from seastar_gym.envs.options import Path, SwimOptions
 from seastar_gym.envs.paths import cross_track_error, make_path
 from seastar_gym.envs.reward import reward_terms
 from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
+from seastar_gym.simd.rows import to_rows
 
 
 class Legs(NamedTuple):
@@ -24,6 +25,8 @@ class Legs(NamedTuple):
     """Length of the path from `following` to its end, shape (n_robots,)."""
     ends: Floats
     """`current` and `following`, shape (n_robots, 4)."""
+    end_rows: Floats
+    """The same as rows for kernels."""
 
 
 class SwimTask(Swimming):
@@ -101,7 +104,7 @@ class SwimTask(Swimming):
             start = np.where((leg == 0)[:, None], 0.0, self._waypoint(np.maximum(leg - 1, 0)))
             current, following = self._waypoint(k), self._waypoint(k + 1)
             ends = np.concatenate([current, following], axis=1)
-            self._known_legs = Legs(start, current, following, beyond, ends)
+            self._known_legs = Legs(start, current, following, beyond, ends, to_rows(ends))
         return self._known_legs
 
     def _measure_way_to_go(self, hub: Floats) -> Floats:
@@ -115,6 +118,9 @@ class SwimTask(Swimming):
 
     def _targets(self) -> Floats:
         return self._legs.ends
+
+    def _target_rows(self) -> Floats:
+        return self._legs.end_rows
 
     def _task_observation(self) -> Floats:
         if self._asked is None:
@@ -139,7 +145,7 @@ class SwimTask(Swimming):
     def _energy_per_metre(self) -> Floats:
         """Energy over the decrease of the way to go, both since the reset [J/m]; infinite where it did not decrease."""
         energy, progress = self._energy, self._way_at_reset - self._way_to_go
-        without = np.where(np.abs(energy) > 0.0, np.inf, energy)
+        without = np.where(energy > 0.0, np.inf, energy)
         return np.divide(energy, progress, out=without, where=progress > 0.0)
 
     def _pass_waypoints(self, hub: Floats) -> NDArray[np.int64]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.der.energy import energies, energies_in_water
 from seastar_gym.der.rods import Work, make_work
-from seastar_gym.der.stepping.report import MOMENTS, PEAK_MOMENT, REPORT_ROWS, SMALLEST_HUB_T, WORK
+from seastar_gym.der.stepping.report import COVERED, MOMENTS, PEAK_MOMENT, REPORT_ROWS, SMALLEST_HUB_T, WORK
 from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
 from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import Actuation
@@ -268,10 +268,11 @@ class Batch:
         """Time covered since the interval began [s], shape (n_robots,)."""
         return self.read(self.report)[:, REPORT_ROWS.index("covered")]
 
-    def end(self) -> dict[str, Floats]:
+    def end(self) -> dict[str, NDArray[Any]]:
         """End an interval: release held nodes, put lost robots at rest. Returns the report's rows, (n_robots,) each.
 
-        With them are the status, and work and peak_moment of the actuators if somebody asks for them.
+        With them are the status, and work and peak_moment of the actuators if somebody asks for them. Counts and status
+        are whole numbers.
         """
         if self._held_rows.size:
             self.q[:, self._held_rows] = self._held
@@ -279,8 +280,10 @@ class Batch:
         if np.count_nonzero(self.status):
             self._put_lost_robots_at_rest()
         self.last_hub = self.hub_position()
-        rows = dict(zip(REPORT_ROWS, self.read(self.report).T, strict=True))
-        rows["status"] = self.read(self.status)[:, 0]
+        report = self.read(self.report).T
+        rows: dict[str, NDArray[Any]] = dict(zip(REPORT_ROWS, report, strict=True))
+        rows |= zip(REPORT_ROWS, report[:COVERED].astype(np.int64), strict=False)
+        rows["status"] = self.read(self.status)[:, 0].astype(np.int64)
         if self.effort.size:
             rows["work"], rows["peak_moment"] = self.read(self.effort).T[[WORK, PEAK_MOMENT]]
         return rows

@@ -326,6 +326,11 @@ class Simulator:
         """Position of the hub [m], world frame, shape (n_robots, 2)."""
         return self._batch.hub_position()
 
+    @property
+    def last_hub(self) -> Floats:
+        """Position of the hub at the end of the last interval or reset [m], shape (n_robots, 2), a copy."""
+        return self._batch.last_hub.copy()
+
     def hub_velocity(self) -> Floats:
         """Velocity of the hub [m/s], world frame, shape (n_robots, 2)."""
         return self._batch.read(self.v[:, :2])
@@ -479,7 +484,7 @@ class Simulator:
 
     def _end_interval(self) -> StrokeReport:
         rows = self._batch.end()
-        failed = rows["status"] > 0.0
+        failed = rows["status"] > 0
         self._clock.end(failed, rows["covered"])
         self._drive.advance(len(self._batch.times) - 1)
         if self._bars is not None:
