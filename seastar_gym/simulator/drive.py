@@ -57,6 +57,8 @@ class Drive:
         """Continue with an actuator that differs only in numbers that may differ from robot to robot."""
         self._actuator = complete(actuator)
         self._has_memory = self._actuator.has_memory
+        # With memory: state at the end of the last interval, and rotations then of limbs of full strength.
+        self._turned: tuple[Floats | None, Floats] = None, self.strengths
         self._intervals: dict[tuple[float, float, bool], Steps] = {}
         rest = self._actuator.rest
         self.at_rest = np.broadcast_to(rest, (*self.strengths.shape, rest.shape[-1]))
@@ -85,6 +87,8 @@ class Drive:
             turned, after = self._actuator.respond(times, given, self.state)
         if commands is not None and self.phase > 0.0:
             self._refuse_jump(self.strengths * turned[0] if self._has_memory else self._none)
+        if self._has_memory:
+            self._turned = after, turned[-1]
         self.steps, self.commands, self.phase = steps, given, phase
         self._given, self._before, self._after = given, self.state, after
         self.heating_time = self._actuator.seconds_heated(times, given, self.state).sum(axis=1)
@@ -92,9 +96,10 @@ class Drive:
 
     def _refuse_jump(self, then: Floats) -> None:
         """ValueError if limbs cannot begin anew from where they are. then: Rotations that they would begin with."""
-        now = self.rotations()
+        state, turned = self._turned
+        now = self.strengths * turned if self.state is state else self.rotations()
         jumps = np.abs(then - now) > JUMP * column(self._actuator.peak_angle)
-        if jumps.any():
+        if np.count_nonzero(jumps):
             robot, limb = np.argwhere(jumps)[0]
             raise ValueError(
                 f"With these commands limbs would jump, such as limb {limb + 1} of robot {robot} by "
