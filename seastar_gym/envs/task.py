@@ -159,8 +159,9 @@ class SwimTask(Swimming):
             near = _length(self._legs.current - hub) <= self.waypoint_radius
             if self._asked is not None and heading is not None:
                 near &= self._asked.is_met(self.waypoint_index, heading)
-            if np.count_nonzero(near):
-                near &= self.waypoint_index < self.n_waypoints
+            if not np.count_nonzero(near):
+                return reached
+            near &= self.waypoint_index < self.n_waypoints
             if not np.count_nonzero(near):
                 return reached
             self.waypoint_index += near

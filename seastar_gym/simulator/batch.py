@@ -1,6 +1,7 @@
 """`Batch`: the numbers of all robots in memory, one robot per SIMD lane, and the kernels that advance them."""
 
 import functools
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
@@ -15,6 +16,7 @@ from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Scene
+from seastar_gym.simd.compilation import code_for
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import aligned_rows, from_rows, to_rows, write_rows
 from seastar_gym.simulator.report import SolverStatus
@@ -64,6 +66,7 @@ class Batch:
 
     def __init__(self, scene: Scene, n_robots: int, threads: int, effort: bool):
         self._scene, self.n_robots = scene, n_robots
+        self._compiled: dict[tuple[Any, ...], Callable[..., None]] = {}
         n_groups, n_limbs, n_rows = -(-n_robots // N_LANES), scene.robot.n_limbs, 2 * scene.robot.n_nodes
         self._scheme = scheme_of(scene.numerics.scheme, scene.numerics.damping)
         self.make_coefficients(scene)
@@ -214,7 +217,7 @@ class Batch:
         for group in range(len(self.q)):
             actuation.delta_psi_start[:] = actuation.delta_psi_end[:] = turned[group]
             rods = self.coefficients.rods(group)
-            energies(rods, work, actuation, self.q[group], self.v[group], both[0, group], both[1, group])
+            self._call(energies, rods, work, actuation, self.q[group], self.v[group], both[0, group], both[1, group])
         return self.read(both[0])[:, 0], self.read(both[1])[:, 0]
 
     def energy_in_water(self) -> Floats:
@@ -223,7 +226,8 @@ class Batch:
         relative, found = aligned_rows(*v.shape[1:]), np.zeros((len(q), 1, N_LANES))
         bounds = [0, len(q)] if self.coefficients.are_shared else range(len(q) + 1)
         for part in map(slice, bounds[:-1], bounds[1:]):
-            energies_in_water(self.coefficients.rods(part.start), q[part], v[part], relative, found[part])
+            rods = self.coefficients.rods(part.start)
+            self._call(energies_in_water, rods, q[part], v[part], relative, found[part])
         return self.read(found)[:, 0]
 
     def begin(self, times: Floats, peaks: Floats, shape: Floats) -> None:
@@ -249,13 +253,21 @@ class Batch:
         def swim(thread: int, part: slice) -> None:
             work, actuation = self.memory[thread]
             shape, n_turning = self._shape_of(part, begin, end)
-            advance(
-                self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"], actuation,
+            self._call(
+                advance, self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"], actuation,
                 self.q[part], self.v[part], self.a[part], self.peaks[part], times, shape, n_turning,
                 self.status[part], self.report[part], self.coefficients.limits(part.start), self.effort[part],
+                kind=shape.ndim,
             )  # fmt: skip
 
         self.workers.run(swim, parts(len(self.q), self.workers.n, self.coefficients.are_shared))
+
+    def _call(self, entry: Callable[..., None], *args: Any, kind: int = 0) -> None:
+        """Call compiled code with arguments whose types differ only by `kind`, and by what robots share."""
+        key = entry, kind, self.coefficients.are_shared
+        if key not in self._compiled:
+            self._compiled[key] = code_for(entry, *args)
+        self._compiled[key](*args)
 
     def _shape_of(self, part: slice, begin: int, end: int) -> tuple[Floats, int]:
         """Rows of the shape from time `begin` to `end` for kernels, and number of the limbs that have rows."""

@@ -116,7 +116,7 @@ class Drive:
             corners = self._actuator.corners if is_new or phase > 0.0 else (0.0,)
             times = interval_times(corners, self._step, phase, duration)
             over = times >= self.longest - SAME_TIME * self._step
-            curve = np.zeros(0) if self._has_memory else stroke_at(self._actuator, times)
+            curve = np.zeros(0) if self._has_memory else np.array(stroke_at(self._actuator, times), np.float64)
             curve = curve[:, :, None] if curve.ndim > 1 else curve
             self._intervals[key] = Steps(times, np.where(over, 0.0, times).tolist(), curve)
         return self._intervals[key]
