@@ -12,7 +12,7 @@ from seastar_gym.envs.observation import body_axes, observe, observe_group
 from seastar_gym.envs.stations import stations_of
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Seastar
-from seastar_gym.simd.compilation import code_for
+from seastar_gym.simd.dispatch import code_for
 from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator
 

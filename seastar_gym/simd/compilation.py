@@ -216,17 +216,6 @@ def _say_that_it_compiles(how_often):
     )
 
 
-def code_for(entry, *args):
-    """Machine code of an entry point for arguments of the types of these, to be called with no others.
-
-    A call of the entry point itself looks at every array of every bundle to find out the types: 65 us for those of a
-    stroke. It returns what is no compiled entry point as it is.
-    """
-    if not isinstance(entry, CPUDispatcher):
-        return entry
-    return entry.compile(tuple(map(entry.typeof_pyval, args)))
-
-
 def entry_point(function):
     """Compile `function` for calls from Python, with the GIL released and the machine code kept on disk."""
     if numba.config.DISABLE_JIT:

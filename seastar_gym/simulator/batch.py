@@ -1,6 +1,5 @@
 """`Batch`: the numbers of all robots in memory, one robot per SIMD lane, and the kernels that advance them."""
 
-import functools
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
@@ -16,7 +15,7 @@ from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Scene
-from seastar_gym.simd.compilation import code_for
+from seastar_gym.simd.dispatch import code_for
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import aligned_rows, from_rows, to_rows, write_rows
 from seastar_gym.simulator.report import SolverStatus
@@ -33,15 +32,6 @@ ROWS = ("q", "v", "status")
 """Arrays of shape (n_groups, k, N_LANES) that an interval changes and the next one does not make anew."""
 MOVED = (*ROWS, "last_hub")
 """All such arrays of a batch."""
-
-
-@functools.cache
-def parts(n_groups: int, threads: int, are_shared: bool) -> tuple[slice, ...]:
-    """Lane groups of each part of a batch. Coefficients hold for a whole part. are_shared: By all groups."""
-    n_parts = 1 if threads == 1 else min(n_groups, PARTS_PER_THREAD * threads)
-    n_parts = max(n_parts, -(-n_groups // LARGEST_PART)) if are_shared else n_groups
-    bounds = [n_groups * k // n_parts for k in range(n_parts + 1)]
-    return tuple(map(slice, bounds[:-1], bounds[1:]))
 
 
 class Batch:
@@ -66,6 +56,7 @@ class Batch:
 
     def __init__(self, scene: Scene, n_robots: int, threads: int, effort: bool):
         self._scene, self.n_robots = scene, n_robots
+        self._known_parts: dict[bool, list[slice]] = {}  # by whether coefficients are shared
         self._compiled: dict[tuple[Any, ...], Callable[..., None]] = {}
         n_groups, n_limbs, n_rows = -(-n_robots // N_LANES), scene.robot.n_limbs, 2 * scene.robot.n_nodes
         self._scheme = scheme_of(scene.numerics.scheme, scene.numerics.damping)
@@ -260,7 +251,17 @@ class Batch:
                 kind=shape.ndim,
             )  # fmt: skip
 
-        self.workers.run(swim, parts(len(self.q), self.workers.n, self.coefficients.are_shared))
+        self.workers.run(swim, self._parts())
+
+    def _parts(self) -> list[slice]:
+        """Lane groups of each part of the batch. Coefficients hold for a whole part."""
+        are_shared, n_groups, threads = self.coefficients.are_shared, len(self.status), self.workers.n
+        if are_shared not in self._known_parts:
+            n_parts = 1 if threads == 1 else min(n_groups, PARTS_PER_THREAD * threads)
+            n_parts = max(n_parts, -(-n_groups // LARGEST_PART)) if are_shared else n_groups
+            bounds = [n_groups * k // n_parts for k in range(n_parts + 1)]
+            self._known_parts[are_shared] = list(map(slice, bounds[:-1], bounds[1:]))
+        return self._known_parts[are_shared]
 
     def _call(self, entry: Callable[..., None], *args: Any, kind: int = 0) -> None:
         """Call compiled code with arguments whose types differ only by `kind`, and by what robots share."""
