@@ -16,5 +16,5 @@ def of_some(values: NDArray[Any], mask: NDArray[np.bool_]) -> NDArray[Any]:
 
 
 def with_masks(values: dict[str, NDArray[Any]], mask: NDArray[np.bool_]) -> Info:
-    """Info of a batch in Gymnasium's form: beside every array, a mask of the robots for which it is valid."""
-    return values | {f"_{name}": mask.copy() for name in values}
+    """Info of a batch in Gymnasium's form: a copy of every array, and a mask of the robots for which it is valid."""
+    return {name: array.copy() for name, array in values.items()} | {f"_{name}": mask.copy() for name in values}

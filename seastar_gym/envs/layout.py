@@ -109,17 +109,17 @@ class Layout:
         """Velocity of the hub [VELOCITY_SCALE]."""
         return self._places[2]
 
-    @property
+    @cached_property
     def stations_and_hub(self) -> slice:
         """The positions, the velocities and the hub's velocity."""
         return slice(0, self.hub_velocity.stop)
 
-    @property
+    @cached_property
     def actuators(self) -> slice:
         """Numbers of the limbs, limb after limb: the memory of its actuator, and what a task adds to it."""
         return self._places[3]
 
-    @property
+    @cached_property
     def further(self) -> slice:
         """Further entries."""
         return self._places[4]
@@ -140,12 +140,12 @@ class Layout:
         """Next waypoint relative to the hub [limb lengths]."""
         return self._places[6]
 
-    @property
+    @cached_property
     def waypoints(self) -> slice:
         """The current waypoint and the next."""
         return slice(self.current_waypoint.start, self.next_waypoint.stop)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Length of the observation."""
         return int(self.next_waypoint.stop)

@@ -122,4 +122,5 @@ def body_axes(rest, q, stations, out):
 
 def to_float32(rows: NDArray[np.float64], n_robots: int) -> NDArray[np.float32]:
     """Rows (n_groups, size, N_LANES) as a fresh float32 array of shape (n_robots, size)."""
-    return rows.transpose(0, 2, 1).reshape(-1, rows.shape[1])[:n_robots].astype(np.float32)
+    by_robot = rows[0].T if len(rows) == 1 else rows.transpose(0, 2, 1).reshape(-1, rows.shape[1])
+    return by_robot[:n_robots].astype(np.float32, order="C")

@@ -1,6 +1,7 @@
 """What the kernels of `observation.py` see of the robots of a simulator, as rows of numbers."""
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from seastar_gym.envs.observation import body_axes, observe, observe_group
 from seastar_gym.envs.stations import stations_of
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Seastar
+from seastar_gym.simd.dispatch import code_for
 from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator
 
@@ -20,13 +22,21 @@ Floats = NDArray[np.float64]
 def observed_rows(simulator: Simulator, targets: Floats) -> Floats:
     """Rows that the kernel fills, shape (n_groups, k, N_LANES), k = `Layout(n_limbs).size`.
 
-    targets: Two points of every robot in the world frame [m], shape (n_robots, 4).
+    targets: Rows of two points of every robot in the world frame [m], shape (n_groups, 4, N_LANES).
     """
-    own, robot, target_rows = simulator.coefficients, simulator.scene.robot, to_rows(targets)
-    out = np.empty((len(target_rows), _size(robot.n_limbs), target_rows.shape[2]))
+    own, robot = simulator.coefficients, simulator.scene.robot
+    out = np.empty((len(targets), _size(robot.n_limbs), targets.shape[2]))
     places = stations_of(robot)
-    observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
+    args = own.rest, own.limb_length, simulator.q, simulator.v, places, targets, VELOCITY_SCALE, out
+    kind = observe, places.root_weights is None
+    if kind not in _codes:
+        _codes[kind] = code_for(observe, *args)
+    _codes[kind](*args)
     return out
+
+
+_codes: dict[tuple[Any, bool], Callable[..., None]] = {}
+"""Machine code of `observe` for limbs on a body and for others."""
 
 
 def rows_on_device(simulator: Simulator, targets: Floats) -> Any:
@@ -44,7 +54,7 @@ def observing(own: Coefficients, robot: Seastar, targets: Floats) -> tuple[Any, 
     rest, length = (rows[0, :, 0] if own.are_shared else rows for rows in (own.rest, own.limb_length))
     numbers = {
         "rest": rest, "limb_length": length, "n_limbs": robot.n_limbs, "stations": stations_of(robot),
-        "targets": to_rows(targets), "velocity_scale": VELOCITY_SCALE,
+        "targets": targets, "velocity_scale": VELOCITY_SCALE,
     }  # fmt: skip
     return observe_group, numbers, _size(robot.n_limbs)
 
@@ -70,6 +80,6 @@ def lengths_of(simulator: Simulator) -> Floats:
 
 def pictures_of(simulator: Simulator, columns: NDArray[np.intp]) -> Floats:
     """Pictures of the robots, shape (n_robots, k), see tracker.py. columns: Of a `Tracker`."""
-    rows = observed_rows(simulator, np.zeros((simulator.n_robots, 4)))
+    rows = observed_rows(simulator, to_rows(np.zeros((simulator.n_robots, 4))))
     of_robots = rows.transpose(0, 2, 1).reshape(-1, rows.shape[1])[: simulator.n_robots]
     return np.concatenate([simulator.hub_position(), axes_of(simulator).T, of_robots[:, columns]], axis=1)

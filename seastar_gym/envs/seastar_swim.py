@@ -293,9 +293,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         """
         require_seed(seed)
         super().reset(seed=None if seed is None else int(seed))
-        with self._until_whole():
-            asked = checked_options(options, {self._option}).get(self._option)
-            self._task.reset(np.ones(1, bool), [self.np_random], asked)
+        asked = checked_options(options, {self._option}).get(self._option)
+        self._to_the_end(self._task.reset, np.ones(1, bool), [self.np_random], asked)
         self._command = np.zeros_like(self._command)
         self._trail = self.simulator.hub_position()
         self._frames = []
@@ -311,13 +310,13 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
             raise gym.error.ResetNeeded(
                 "The episode has not begun, is over or was interrupted: call reset() before step()."
             )
-        command = to_commands(self.actions, self.scene.robot.n_limbs, [action], 1)
+        actions = action[None] if isinstance(action, np.ndarray) else [action]
+        command = to_commands(self.actions, self.scene.robot.n_limbs, actions, 1)
         self._command = self._task.followed(command)[0]
-        with self._until_whole():
-            outcome = self._swim(command)
-        terminated = bool(outcome.terminated[0])
+        outcome = self._to_the_end(self._swim, command)
+        terminated = outcome.terminated.item()
         self._running = not terminated
-        return self._task.observe()[0], float(outcome.reward[0]), terminated, False, _of_one_robot(outcome.info)
+        return self._task.observe()[0], outcome.reward.item(), terminated, False, _of_one_robot(outcome.info)
 
     def _swim(self, command: NDArray[np.float64]) -> Outcome:
         if self.render_mode in (None, "rgb_array"):
@@ -383,5 +382,5 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
 
 
 def _of_one_robot(info: dict[str, NDArray[Any]]) -> dict[str, Any]:
-    """Info of robot 0 as plain numbers, its vectors as arrays."""
-    return {name: values[0] if values.ndim > 1 else values.tolist()[0] for name, values in info.items()}
+    """Info of robot 0 as plain numbers, its vectors as arrays, copies."""
+    return {name: values[0].copy() if values.ndim > 1 else values.item() for name, values in info.items()}

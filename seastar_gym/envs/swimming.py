@@ -37,6 +37,7 @@ from seastar_gym.envs.sight import Lateness, Sees, bounds_of, entries_of, statio
 from seastar_gym.envs.tracker import Tracker
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror, complete
+from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
 from seastar_gym.simulator.growth import is_watched
 from seastar_gym.simulator.pauses import completed, pausing
@@ -122,7 +123,8 @@ class Swimming(ABC):
         self._effort = effort
         self.certificate = read_certificate(options.certificate, scene, unless_strokes(self.decision_period, scene))
         self._names_of_errors = tuple(self._errors_of(self.simulator.scene))
-        self._known: tuple[Any, ...] = None, b"", {}  # scene and strengths of limbs, and the errors of both
+        # Scene and strengths of limbs, and the errors of both.
+        self._known: tuple[Scene | None, bytes, dict[str, Floats]] = None, b"", {}
         peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
         if scene.robot.hub_hinge == "turning" and 2 * peak >= scene.robot.opening_angle * (1 - 1e-9):
             raise ValueError(
@@ -133,6 +135,7 @@ class Swimming(ABC):
         self.waypoint_index = np.zeros(n_robots, np.int64)  # the waypoint to swim to; 0 in tasks without
         self.last_commands = np.zeros((n_robots, scene.robot.n_limbs))
         self._energy = np.zeros(n_robots)  # since the reset [J]
+        self._no_messages = np.full(n_robots, "", dtype=object)
         delay, n_limbs = options.late[ACTION_DELAY], scene.robot.n_limbs
         self._lateness = Lateness(options.late, n_robots)
         is_late = options.sight is not None or bounds_of(delay)[1] > 0.0
@@ -152,6 +155,10 @@ class Swimming(ABC):
     @abstractmethod
     def _targets(self) -> Floats:
         """Two points of every robot's observation in the world frame [m], shape (n_robots, 4)."""
+
+    def _target_rows(self) -> Floats:
+        """The targets as rows for kernels, shape (n_groups, 4, N_LANES)."""
+        return to_rows(self._targets())
 
     @abstractmethod
     def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
@@ -245,7 +252,7 @@ class Swimming(ABC):
         """`observe` as a fresh array of the simulator's device. What a `Sight` shows is copied there."""
         if self._tracker is not None:
             return self.simulator.arrays.asarray(self.observe())
-        seen = to_float32(rows_on_device(self.simulator, self._targets()), self.n_robots)
+        seen = to_float32(rows_on_device(self.simulator, self._target_rows()), self.n_robots)
         return self._with_more(seen, self.simulator.arrays)
 
     def _with_more(self, seen: Any, arrays: ModuleType) -> Any:
@@ -270,7 +277,7 @@ class Swimming(ABC):
 
     def _seen_now(self) -> NDArray[np.float32]:
         """Observations of what the kernel fills, without delay, shape (n_robots, k)."""
-        return to_float32(observed_rows(self.simulator, self._targets()), self.n_robots)
+        return to_float32(observed_rows(self.simulator, self._target_rows()), self.n_robots)
 
     def seen_hub(self) -> Floats:
         """Hubs as robots are seen by who decides [m], shape (n_robots, 2), a copy."""
@@ -389,7 +396,7 @@ class Swimming(ABC):
 
     def _judge(self, commands: Floats, followed: Floats, report: StrokeReport) -> Outcome:
         """Outcome of a decision. commands: Those that were given. followed: Those that were followed."""
-        hub = self.simulator.hub_position()
+        hub = self.simulator.last_hub
         self._energy += report.energy
         self.last_commands = followed
         if self._tracker is not None:
@@ -405,39 +412,42 @@ class Swimming(ABC):
             **({"masked_limbs": (followed != commands).sum(axis=1)} if self._can_be_masked else {}),
             "newton_iterations": report.newton_iterations,
             "solver_status": report.status,
-            "solver_message": _messages(report.status),
+            "solver_message": self._messages(report.status),
             "smallest_opening_angle": report.smallest_opening_angle,
             **({} if self.scene.contact is None else {"largest_overlap": report.largest_overlap}),
             **score.terms,
         }
         reward = functools.reduce(operator.add, score.terms.values())
-        return Outcome(reward, score.over | report.status.astype(bool), info, followed)
+        return Outcome(reward, score.over | (report.status != 0), info, followed)
 
     def first_info(self) -> dict[str, NDArray[Any]]:
-        """Info before the first decision, with the names and types of a decision's info."""
+        """Info before the first decision, with the names and types of a decision's info. Arrays are shared."""
         counts, none = np.zeros(self.n_robots, np.int64), np.zeros(self.n_robots)
         return {
             **self.facts(),
             "is_success": np.zeros(self.n_robots, bool),
             "limbs_heated": counts,
             "heating_time": none,
-            "energy": none.copy(),
-            **({"work": none.copy(), "peak_moment": none.copy()} if self._effort else {}),
-            **({"masked_limbs": counts.copy()} if self._can_be_masked else {}),
-            "newton_iterations": counts.copy(),
-            "solver_status": counts.copy(),
-            "solver_message": _messages(counts),
+            "energy": none,
+            **({"work": none, "peak_moment": none} if self._effort else {}),
+            **({"masked_limbs": counts} if self._can_be_masked else {}),
+            "newton_iterations": counts,
+            "solver_status": counts,
+            "solver_message": self._messages(counts),
             "smallest_opening_angle": np.full(self.n_robots, min(self.scene.robot.opening_angle, np.pi)),
-            **({} if self.scene.contact is None else {"largest_overlap": none.copy()}),
-            **{name: none.copy() for name in self.TERMS},
+            **({} if self.scene.contact is None else {"largest_overlap": none}),
+            **dict.fromkeys(self.TERMS, none),
         }
 
     def facts(self, hub: Floats | None = None) -> dict[str, NDArray[Any]]:
-        """What is known of every robot now; arrays over robots, units as in the environment's docstring."""
+        """What is known of every robot now; arrays over robots, units as in the environment's docstring.
+
+        Who shows them to a user copies them: some are the same from one decision to the next.
+        """
         hub = self.simulator.hub_position() if hub is None else hub
         return {
             "time": self.simulator.time,
-            "hub_position": hub.copy(),
+            "hub_position": hub,
             **self._task_info(hub),
             **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
             **(self._errors() if self._tells_errors else {}),
@@ -452,13 +462,22 @@ class Swimming(ABC):
         return errors_in_info(scene, self.certificate, unless_strokes(self.decision_period, self.scene))
 
     def _errors(self) -> dict[str, Floats]:
-        """Measured errors and speed, shape (n_robots,) each; NaN for robots with weak limbs."""
+        """Measured errors and speed, shape (n_robots,) each, not copies; NaN for robots with weak limbs."""
         scene, strengths = self.simulator.scene, self.simulator.limb_strengths
         if scene is not self._known[0] or strengths.tobytes() != self._known[1]:
             known, strong = self._errors_of(scene), (strengths == 1.0).all(axis=1)
             errors = {name: np.where(strong, known.get(name, np.nan), np.nan) for name in self._names_of_errors}
             self._known = scene, strengths.tobytes(), errors
-        return {name: values.copy() for name, values in self._known[2].items()}
+        return self._known[2]
+
+    def _messages(self, status: NDArray[np.int64]) -> NDArray[Any]:
+        """Sentences on what to do about each status, shape (n_robots,); empty where the solver converged."""
+        if not np.count_nonzero(status):
+            return self._no_messages
+        messages = self._no_messages.copy()
+        for robot in status.nonzero()[0]:
+            messages[robot] = SolverStatus(status[robot]).sentence
+        return messages
 
 
 def first_after(ends: list[float]) -> Callable[[float], float | None]:
@@ -478,11 +497,3 @@ def first_after(ends: list[float]) -> Callable[[float], float | None]:
         return time
 
     return look
-
-
-def _messages(status: NDArray[np.int64]) -> NDArray[Any]:
-    """Sentences on what to do about each status, shape (n_robots,); empty where the solver converged."""
-    messages = np.full(len(status), "", dtype=object)
-    for robot in status.nonzero()[0]:
-        messages[robot] = SolverStatus(status[robot]).sentence
-    return messages

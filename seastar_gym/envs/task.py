@@ -1,6 +1,6 @@
 """The task behind `SeastarSwim-v0`: robots that swim along waypoints, each on a path of its own."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,23 @@ from seastar_gym.envs.options import Path, SwimOptions
 from seastar_gym.envs.paths import cross_track_error, make_path
 from seastar_gym.envs.reward import reward_terms
 from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
+from seastar_gym.simd.rows import to_rows
+
+
+class Legs(NamedTuple):
+    """Where robots swim between two of their waypoints [m], shape (n_robots, 2) each but for `beyond`."""
+
+    start: Floats
+    """Waypoint before the current one, or the origin."""
+    current: Floats
+    following: Floats
+    """Waypoint after the current one; the current one on the last leg."""
+    beyond: Floats
+    """Length of the path from `following` to its end, shape (n_robots,)."""
+    ends: Floats
+    """`current` and `following`, shape (n_robots, 4)."""
+    end_rows: Floats
+    """The same as rows for kernels."""
 
 
 class SwimTask(Swimming):
@@ -30,6 +47,7 @@ class SwimTask(Swimming):
         self.waypoints = np.zeros((n_robots, 1, 2))
         self._way_after = np.zeros((n_robots, 1))  # from waypoint k to the last [m]
         self.n_waypoints = np.ones(n_robots, np.int64)
+        self._known_legs: Legs | None = None  # until a robot reaches a waypoint, or gets other ones
         self._way_to_go, self._way_at_reset = np.zeros(n_robots), np.zeros(n_robots)  # [m]
         self._turn_to_go = np.zeros(n_robots)  # [rad]
 
@@ -41,6 +59,7 @@ class SwimTask(Swimming):
 
     def _begin(self, robots: Flags) -> None:
         self.waypoint_index[robots] = 0
+        self._known_legs = None
         self._way_to_go[robots] = self._measure_way_to_go(self.simulator.hub_position())[robots]
         self._way_at_reset[robots] = self._way_to_go[robots]
         if self._asked is not None:
@@ -58,6 +77,12 @@ class SwimTask(Swimming):
         self._way_after[robot] = 0.0
         self._way_after[robot, : n - 1] = np.cumsum(legs[::-1])[::-1]
         self.n_waypoints[robot] = n
+        self._known_legs = None
+
+    def move_waypoints(self, by: Floats) -> None:
+        """Move all waypoints of every robot by a vector [m], shape (n_robots, 2)."""
+        self.waypoints += by[:, None]
+        self._known_legs = None
 
     def waypoints_of(self, robot: int) -> Floats:
         """Waypoints of a robot's present episode [m], shape (n, 2), a copy."""
@@ -71,20 +96,31 @@ class SwimTask(Swimming):
         """Waypoint k of every robot [m], the last one beyond the end; shape (n_robots, 2)."""
         return np.asarray(self.waypoints[self._robots, np.minimum(k, self.waypoints.shape[1] - 1)])
 
+    @property
+    def _legs(self) -> Legs:
+        if self._known_legs is None:
+            k, last = self.waypoint_index, self.n_waypoints - 1
+            leg, beyond = np.minimum(k, last), self._way_after[self._robots, np.minimum(k + 1, last)]
+            start = np.where((leg == 0)[:, None], 0.0, self._waypoint(np.maximum(leg - 1, 0)))
+            current, following = self._waypoint(k), self._waypoint(k + 1)
+            ends = np.concatenate([current, following], axis=1)
+            self._known_legs = Legs(start, current, following, beyond, ends, to_rows(ends))
+        return self._known_legs
+
     def _measure_way_to_go(self, hub: Floats) -> Floats:
         """Length [m], shape (n_robots,), of the rewarded route from hub positions [m], shape (n_robots, 2), to the end.
 
         It passes the circle of the current waypoint on the way to the next; from there it leads from centre to centre.
         A route through the centre of the current waypoint would pay for corners that need not be swum.
         """
-        k = self.waypoint_index
-        to_next = self.reward.way_to_next(hub, self._waypoint(k), self._waypoint(k + 1), self.waypoint_radius)
-        return np.asarray(to_next + self._way_after[self._robots, np.minimum(k + 1, self.n_waypoints - 1)])
+        legs = self._legs
+        return self.reward.way_to_next(hub, legs.current, legs.following, self.waypoint_radius) + legs.beyond
 
     def _targets(self) -> Floats:
-        targets = np.empty((self.n_robots, 4))
-        targets[:, :2], targets[:, 2:] = self._waypoint(self.waypoint_index), self._waypoint(self.waypoint_index + 1)
-        return targets
+        return self._legs.ends
+
+    def _target_rows(self) -> Floats:
+        return self._legs.end_rows
 
     def _task_observation(self) -> Floats:
         if self._asked is None:
@@ -109,8 +145,8 @@ class SwimTask(Swimming):
     def _energy_per_metre(self) -> Floats:
         """Energy over the decrease of the way to go, both since the reset [J/m]; infinite where it did not decrease."""
         energy, progress = self._energy, self._way_at_reset - self._way_to_go
-        found = np.divide(energy, progress, out=np.full(self.n_robots, np.inf), where=progress > 0.0)
-        return np.where(np.isnan(energy) | (energy == 0.0), energy, found)
+        without = np.where(energy > 0.0, np.inf, energy)
+        return np.divide(energy, progress, out=without, where=progress > 0.0)
 
     def _pass_waypoints(self, hub: Floats) -> NDArray[np.int64]:
         """Move on while the current waypoint is within its radius, and its heading met if one is asked for.
@@ -120,23 +156,24 @@ class SwimTask(Swimming):
         heading = None if self._asked is None else self.heading()
         reached = np.zeros(self.n_robots, np.int64)
         while True:
-            near = _length(self._waypoint(self.waypoint_index) - hub) <= self.waypoint_radius
-            near &= self.waypoint_index < self.n_waypoints
+            near = _length(self._legs.current - hub) <= self.waypoint_radius
             if self._asked is not None and heading is not None:
                 near &= self._asked.is_met(self.waypoint_index, heading)
-            if not near.any():
+            if not np.count_nonzero(near):
+                return reached
+            near &= self.waypoint_index < self.n_waypoints
+            if not np.count_nonzero(near):
                 return reached
             self.waypoint_index += near
             reached += near
+            self._known_legs = None
 
     def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
-        current = self._waypoint(self.waypoint_index)
-        leg = np.minimum(self.waypoint_index, self.n_waypoints - 1)
-        start = np.where((leg == 0)[:, None], 0.0, self._waypoint(np.maximum(leg - 1, 0)))
+        legs = self._legs
         return {
             "waypoint_index": self.waypoint_index.copy(),
-            "distance": _length(current - hub),
-            "cross_track_error": cross_track_error(hub, start, current),
+            "distance": _length(legs.current - hub),
+            "cross_track_error": cross_track_error(hub, legs.start, legs.current),
             "energy_per_metre": self._energy_per_metre(),
             **self._heading_facts(),
         }

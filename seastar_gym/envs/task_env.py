@@ -1,8 +1,7 @@
 """Common base of the environments of one robot and of a batch: task, action mode, and options of a reset."""
 
-import contextlib
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from gymnasium import spaces
@@ -18,6 +17,9 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror
 from seastar_gym.scene.checks import shown
 from seastar_gym.simulator import Simulator
+
+P = ParamSpec("P")
+Result = TypeVar("Result")
 
 
 class TaskEnv(PlainSpec):
@@ -38,16 +40,16 @@ class TaskEnv(PlainSpec):
         self.command_table = command_table(self.actions, n_limbs) if has_table else None
         return actions_of_one, spaces.Box(-np.inf, np.inf, (task.layout.size,), np.float32)
 
-    @contextlib.contextmanager
-    def _until_whole(self) -> Iterator[None]:
-        """Context of a step or reset: after an interruption, robots and task disagree, and only a reset helps."""
+    def _to_the_end(self, change: Callable[P, Result], *args: P.args, **kwargs: P.kwargs) -> Result:
+        """What a step or reset returns: after an interruption, robots and task disagree, and only a reset helps."""
         was_running, self._running = self._running, False
         try:
-            yield
+            result = change(*args, **kwargs)
         except ValueError:  # refused before anything changed
             self._running = was_running
             raise
         self._running = True
+        return result
 
     @property
     def decision_period(self) -> float:

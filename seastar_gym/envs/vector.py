@@ -149,8 +149,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         for robot in np.flatnonzero(mask):
             if seeds[robot] is not None:
                 self._generators[robot], self._seeds[robot] = seeding.np_random(seeds[robot])
-        with self._until_whole():
-            self._begin_episodes(mask, chosen.get(self._option))
+        self._to_the_end(self._begin_episodes, mask, chosen.get(self._option))
         return self._observe(), with_masks(self._task.first_info(), mask)
 
     def _checked_mask(self, mask: Any) -> Flags:
@@ -192,8 +191,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         commands = to_commands(self.actions, self.simulator.scene.robot.n_limbs, actions, self.num_envs)
         commands[resting] = 0.0
         self.closed = False
-        with self._until_whole():
-            results, info = self._step(commands, resting)
+        results, info = self._to_the_end(self._step, commands, resting)
         if out is None:
             return *results, info
         out.take(results)
@@ -262,11 +260,11 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
 
     def _info(self, strokes: dict[str, NDArray[Any]], begun: Flags) -> Info:
         """Info of the decision, and of the reset for robots in the mask of those that have `begun` an episode."""
-        info = {name: values.copy() for name, values in strokes.items()}
+        info = with_masks(strokes, np.ones_like(begun))
         if begun.any():
             for name, values in self._task.first_info().items():
                 info[name][begun] = values[begun]
-        return with_masks(info, np.ones_like(begun))
+        return info
 
 
 def checked_seeds(seed: object, n_robots: int) -> list[int | None]:

@@ -113,7 +113,7 @@ class DisturbedTask(SwimTask):
         """
         lost = self._rng.random(len(commands)) < self.disturbance.lost
         drift = self._current * self.decision_period
-        self.waypoints -= drift[:, None]
+        self.move_waypoints(-drift)
         self._carried += drift
         outcome = super().step(np.where(lost[:, None], 0.0, commands))
         return outcome._replace(terminated=outcome.info["is_success"])

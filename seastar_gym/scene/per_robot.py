@@ -20,7 +20,9 @@ MISSING = ...
 
 def column(numbers: Numbers, n_axes: int = 1) -> Any:
     """Numbers of each robot as an array of shape (n_robots, 1, ..), with n_axes axes of length 1; others unchanged."""
-    return numbers if np.ndim(numbers) == 0 else np.asarray(numbers, dtype=float).reshape(-1, *(1,) * n_axes)
+    if isinstance(numbers, float) or np.ndim(numbers) == 0:
+        return numbers
+    return np.asarray(numbers, dtype=float).reshape(-1, *(1,) * n_axes)
 
 
 def of_robot(numbers: Numbers, index: int) -> float:

@@ -26,15 +26,18 @@ def to_rows(values: np.ndarray) -> np.ndarray:
 
 def write_rows(rows: np.ndarray, values: np.ndarray) -> None:
     """Write numbers of every robot over rows (n_groups, k, N_LANES); lanes left over keep theirs."""
-    (n_full, n_left), by_robot = divmod(len(values), N_LANES), rows.transpose(0, 2, 1)
-    each = values.reshape(len(values), by_robot.shape[2])
-    by_robot[:n_full] = each[: n_full * N_LANES].reshape(n_full, N_LANES, by_robot.shape[2])
+    (n_full, n_left), n_rows = divmod(len(values), N_LANES), rows.shape[1]
+    each = values.reshape(len(values), n_rows)
+    if n_full:
+        rows.transpose(0, 2, 1)[:n_full] = each[: n_full * N_LANES].reshape(n_full, N_LANES, n_rows)
     if n_left:
-        by_robot[n_full, :n_left] = each[n_full * N_LANES :]
+        rows[n_full, :, :n_left] = each[n_full * N_LANES :].T
 
 
 def from_rows(rows: np.ndarray, n_robots: int) -> np.ndarray:
     """Rows (n_groups, k, N_LANES) as numbers of every robot, shape (n_robots, k), a copy."""
+    if len(rows) == 1:
+        return rows[0, :, :n_robots].T.copy()
     return np.ascontiguousarray(rows.transpose(0, 2, 1)).reshape(-1, rows.shape[1])[:n_robots]
 
 

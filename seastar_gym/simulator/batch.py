@@ -1,5 +1,6 @@
 """`Batch`: the numbers of all robots in memory, one robot per SIMD lane, and the kernels that advance them."""
 
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
@@ -8,12 +9,13 @@ from numpy.typing import NDArray
 
 from seastar_gym.der.energy import energies, energies_in_water
 from seastar_gym.der.rods import Work, make_work
-from seastar_gym.der.stepping.report import MOMENTS, PEAK_MOMENT, REPORT_ROWS, SMALLEST_HUB_T, WORK
+from seastar_gym.der.stepping.report import COVERED, MOMENTS, PEAK_MOMENT, REPORT_ROWS, SMALLEST_HUB_T, WORK
 from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
 from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Scene
+from seastar_gym.simd.dispatch import code_for
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import aligned_rows, from_rows, to_rows, write_rows
 from seastar_gym.simulator.report import SolverStatus
@@ -26,10 +28,10 @@ PARTS_PER_THREAD = 8
 its share to the others."""
 LARGEST_PART = 64
 """Lane groups in a part at most. An interrupt waits for the parts under way."""
-ROWS = ("q", "v", "a", "peaks", "rotations", "status", "report")
-"""Arrays of a batch, each of shape (n_groups, k, N_LANES)."""
-MOVED = ("q", "v", "peaks", "rotations", "status", "last_hub")
-"""Arrays of a batch that an interval changes and the next one does not make anew."""
+ROWS = ("q", "v", "status")
+"""Arrays of shape (n_groups, k, N_LANES) that an interval changes and the next one does not make anew."""
+MOVED = (*ROWS, "last_hub")
+"""All such arrays of a batch."""
 
 
 class Batch:
@@ -46,7 +48,6 @@ class Batch:
     times: Ends of the time steps of the present interval [s], shape (n_times,).
     shape: Rotation of limbs at `times`, per unit of `peaks`: shape (n_times,), or
         (n_groups, n_times, n_limbs, N_LANES) if it differs between limbs.
-    rotations: Rotations of the limbs by their actuators now [rad], k = n_limbs.
     status: SolverStatus, k = 1.
     report: Counts of the present interval, k = len(REPORT_ROWS).
     effort: Work and moments of the actuators in the present interval, k = MOMENTS + n_limbs; 0 if nobody asks.
@@ -55,6 +56,8 @@ class Batch:
 
     def __init__(self, scene: Scene, n_robots: int, threads: int, effort: bool):
         self._scene, self.n_robots = scene, n_robots
+        self._known_parts: dict[bool, list[slice]] = {}  # by whether coefficients are shared
+        self._compiled: dict[tuple[Any, ...], Callable[..., None]] = {}
         n_groups, n_limbs, n_rows = -(-n_robots // N_LANES), scene.robot.n_limbs, 2 * scene.robot.n_nodes
         self._scheme = scheme_of(scene.numerics.scheme, scene.numerics.damping)
         self.make_coefficients(scene)
@@ -68,7 +71,6 @@ class Batch:
         self.a = aligned_rows(n_groups, (n_free_rows + 1) * self._scheme.n_stages + 2 + n_shares, N_LANES)
         self.peaks = np.zeros((n_groups, n_limbs, N_LANES))
         self.times = self.shape = np.zeros(1)
-        self.rotations = np.zeros((n_groups, n_limbs, N_LANES))
         self.status = np.zeros((n_groups, 1, N_LANES))
         self.report = np.zeros((n_groups, len(REPORT_ROWS), N_LANES))
         self.effort = np.zeros((n_groups, MOMENTS + n_limbs if effort else 0, N_LANES))
@@ -94,7 +96,7 @@ class Batch:
 
     def read(self, rows: Floats) -> Floats:
         """Copy of rows (n_groups, k, N_LANES) robot by robot, shape (n_robots, k)."""
-        return np.asarray(from_rows(rows, self.n_robots))
+        return from_rows(rows, self.n_robots)
 
     def _shape_rows(self, shape: Floats) -> Floats:
         """Rotations of shape (n_times, n_robots, n_limbs) as rows for the kernels; shape (n_times,) stays as it is."""
@@ -158,8 +160,7 @@ class Batch:
         x, y = c * nodes[:, 0] - s * nodes[:, 1], s * nodes[:, 0] + c * nodes[:, 1]
         self.put_nodes(robot, np.stack([x, y], axis=1), angle)
         group, lane = divmod(robot, N_LANES)
-        for rows in (self.peaks, self.rotations, self.status):
-            rows[group, :, lane] = 0.0
+        self.status[group, :, lane] = 0.0
         self.last_hub[robot] = 0.0
 
     def _place_roots(self) -> None:
@@ -185,7 +186,6 @@ class Batch:
                 write_rows(rows[:, self.n_node_rows, None], angle)
                 rows[:, self.n_node_rows] *= self._scales
             self._place_roots()
-        self.peaks[:] = 0.0
         self.status[:] = 0.0
         self.last_hub = self.hub_position()
 
@@ -198,14 +198,17 @@ class Batch:
         for name, values in moved.items():
             getattr(self, name)[:] = values
 
-    def energies(self) -> tuple[Floats, Floats]:
-        """Elastic energy at the present rotations (13.14) and kinetic energy [J], shape (n_robots,) each."""
-        work, actuation = self.memory[0]
+    def energies(self, rotations: Floats) -> tuple[Floats, Floats]:
+        """Elastic energy (13.14) and kinetic energy [J], shape (n_robots,) each.
+
+        rotations: Rotations of the limbs by their actuators [rad], shape (n_robots, n_limbs).
+        """
+        (work, actuation), turned = self.memory[0], to_rows(rotations)
         both = np.zeros((2, len(self.q), 1, N_LANES))
         for group in range(len(self.q)):
-            actuation.delta_psi_start[:] = actuation.delta_psi_end[:] = self.rotations[group]
+            actuation.delta_psi_start[:] = actuation.delta_psi_end[:] = turned[group]
             rods = self.coefficients.rods(group)
-            energies(rods, work, actuation, self.q[group], self.v[group], both[0, group], both[1, group])
+            self._call(energies, rods, work, actuation, self.q[group], self.v[group], both[0, group], both[1, group])
         return self.read(both[0])[:, 0], self.read(both[1])[:, 0]
 
     def energy_in_water(self) -> Floats:
@@ -214,7 +217,8 @@ class Batch:
         relative, found = aligned_rows(*v.shape[1:]), np.zeros((len(q), 1, N_LANES))
         bounds = [0, len(q)] if self.coefficients.are_shared else range(len(q) + 1)
         for part in map(slice, bounds[:-1], bounds[1:]):
-            energies_in_water(self.coefficients.rods(part.start), q[part], v[part], relative, found[part])
+            rods = self.coefficients.rods(part.start)
+            self._call(energies_in_water, rods, q[part], v[part], relative, found[part])
         return self.read(found)[:, 0]
 
     def begin(self, times: Floats, peaks: Floats, shape: Floats) -> None:
@@ -240,14 +244,31 @@ class Batch:
         def swim(thread: int, part: slice) -> None:
             work, actuation = self.memory[thread]
             shape, n_turning = self._shape_of(part, begin, end)
-            advance(
-                self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"], actuation,
+            self._call(
+                advance, self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"], actuation,
                 self.q[part], self.v[part], self.a[part], self.peaks[part], times, shape, n_turning,
                 self.status[part], self.report[part], self.coefficients.limits(part.start), self.effort[part],
+                kind=shape.ndim,
             )  # fmt: skip
 
-        bounds = self._part_bounds()
-        self.workers.run(swim, map(slice, bounds[:-1], bounds[1:]))
+        self.workers.run(swim, self._parts())
+
+    def _parts(self) -> list[slice]:
+        """Lane groups of each part of the batch. Coefficients hold for a whole part."""
+        are_shared, n_groups, threads = self.coefficients.are_shared, len(self.status), self.workers.n
+        if are_shared not in self._known_parts:
+            n_parts = 1 if threads == 1 else min(n_groups, PARTS_PER_THREAD * threads)
+            n_parts = max(n_parts, -(-n_groups // LARGEST_PART)) if are_shared else n_groups
+            bounds = [n_groups * k // n_parts for k in range(n_parts + 1)]
+            self._known_parts[are_shared] = list(map(slice, bounds[:-1], bounds[1:]))
+        return self._known_parts[are_shared]
+
+    def _call(self, entry: Callable[..., None], *args: Any, kind: int = 0) -> None:
+        """Call compiled code with arguments whose types differ only by `kind`, and by what robots share."""
+        key = entry, kind, self.coefficients.are_shared
+        if key not in self._compiled:
+            self._compiled[key] = code_for(entry, *args)
+        self._compiled[key](*args)
 
     def _shape_of(self, part: slice, begin: int, end: int) -> tuple[Floats, int]:
         """Rows of the shape from time `begin` to `end` for kernels, and number of the limbs that have rows."""
@@ -256,39 +277,29 @@ class Batch:
         rows = np.ascontiguousarray(self.shape[part, begin : end + 1])
         return rows.reshape(len(rows), -1, N_LANES), rows.shape[2]
 
-    def _part_bounds(self) -> NDArray[np.int64]:
-        """Lane groups at which one part of the batch ends and the next begins. Coefficients hold for a whole part."""
-        n_groups, threads = len(self.q), self.workers.n
-        n_parts = 1 if threads == 1 else min(n_groups, PARTS_PER_THREAD * threads)
-        n_parts = max(n_parts, -(-n_groups // LARGEST_PART))
-        if not self.coefficients.are_shared:
-            n_parts = n_groups
-        return np.asarray(n_groups * np.arange(n_parts + 1) // n_parts)
-
     def covered(self) -> Floats:
         """Time covered since the interval began [s], shape (n_robots,)."""
         return self.read(self.report)[:, REPORT_ROWS.index("covered")]
 
-    def show_rotations(self, end: int) -> None:
-        """Set the rotations of the limbs to those at the time step `end` of the interval."""
-        self.rotations[:] = self.peaks * (self.shape[end] if self.shape.ndim == 1 else self.shape[:, end])
-
-    def end(self) -> dict[str, Floats]:
+    def end(self) -> dict[str, NDArray[Any]]:
         """End an interval: release held nodes, put lost robots at rest. Returns the report's rows, (n_robots,) each.
 
-        With them are the status, and work and peak_moment of the actuators, NaN if nobody asks for them.
+        With them are the status, and work and peak_moment of the actuators if somebody asks for them. Counts and status
+        are whole numbers.
         """
         if self._held_rows.size:
             self.q[:, self._held_rows] = self._held
             self.v[:, self._held_rows] = 0.0
-        if self.status.any():
+        if np.count_nonzero(self.status):
             self._put_lost_robots_at_rest()
         self.last_hub = self.hub_position()
-        effort = np.full((2, self.n_robots), np.nan)
+        report = self.read(self.report).T
+        rows: dict[str, NDArray[Any]] = dict(zip(REPORT_ROWS, report, strict=True))
+        rows |= zip(REPORT_ROWS, report[:COVERED].astype(np.int64), strict=False)
+        rows["status"] = self.read(self.status)[:, 0].astype(np.int64)
         if self.effort.size:
-            effort = self.read(self.effort).T[[WORK, PEAK_MOMENT]]
-        rows = dict(zip(REPORT_ROWS, self.read(self.report).T, strict=True))
-        return {**rows, "status": self.read(self.status)[:, 0], "work": effort[0], "peak_moment": effort[1]}
+            rows["work"], rows["peak_moment"] = self.read(self.effort).T[[WORK, PEAK_MOMENT]]
+        return rows
 
     def _put_lost_robots_at_rest(self) -> None:
         """Put failed robots whose state is not finite at rest where their hub was last."""

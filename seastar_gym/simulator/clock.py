@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 COUNTED = ("start", "lost", "intervals", "within")
-"""Arrays of a clock."""
+"""Arrays of a clock. None is written into: `dict(vars(clock))` is what it shows, however long it is kept."""
 
 
 class Clock:
@@ -34,44 +34,35 @@ class Clock:
 
     def set(self, chosen: NDArray[np.bool_] | slice, time: Floats | float) -> None:
         """Set the time [s] of the chosen robots, between intervals."""
-        self.start[chosen] = time
-        for counted in (self.lost, self.intervals, self.within):
-            counted[chosen] = 0
+        for name, value in zip(COUNTED, (time, 0, 0, 0), strict=True):
+            counted = getattr(self, name).copy()
+            counted[chosen] = value
+            setattr(self, name, counted)
 
     def begin(self, duration: float) -> None:
         """Begin an interval of this length [s] now, even where the last one was not completed."""
         if duration != self.duration:
             self._add(np.asarray(self.intervals * self.duration))
-            self.intervals[:] = 0
+            self.intervals = np.zeros_like(self.intervals)
             self.duration = duration
-        if self.within.any():
+        if np.count_nonzero(self.within):
             self._add(self.within)
-            self.within[:] = 0.0
+            self.within = np.zeros_like(self.within)
 
     def _add(self, time: Floats) -> None:
         """Add to the start, and keep what rounding leaves out [s] (Knuth's two-sum), shape (n_robots,)."""
         total = self.start + time
         added = total - self.start
-        self.lost += (self.start - (total - added)) + (time - added)
-        self.start[:] = total
+        self.lost = self.lost + ((self.start - (total - added)) + (time - added))
+        self.start = total
 
     def advance_to(self, covered: Floats) -> None:
         """Advance to this time since the interval began [s], shape (n_robots,)."""
-        self.within[:] = covered
+        self.within = covered
 
     def end(self, failed: NDArray[np.bool_], covered: Floats) -> None:
         """Count the interval, or add the time covered [s] for robots that failed; shapes (n_robots,)."""
-        self.intervals += ~failed
-        self.within = np.where(failed, covered, 0.0)
-
-    def copy(self) -> "Clock":
-        """A clock of its own that shows the same time."""
-        clock = Clock.__new__(Clock)
-        vars(clock).update({name: getattr(self, name).copy() for name in COUNTED}, duration=self.duration)
-        return clock
-
-    def restore(self, other: "Clock") -> None:
-        """Show the time of another clock."""
-        self.duration = other.duration
-        for name in COUNTED:
-            getattr(self, name)[:] = getattr(other, name)
+        if np.count_nonzero(failed):
+            self.intervals, self.within = self.intervals + ~failed, np.where(failed, covered, 0.0)
+        else:
+            self.intervals, self.within = self.intervals + 1, np.zeros(len(failed))

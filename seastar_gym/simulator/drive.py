@@ -1,7 +1,6 @@
 """`Drive`: the actuators of a batch of robots, from commands, which are checked here, to rotations of limbs."""
 
-import operator
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +17,18 @@ KNOWN_INTERVALS = 64
 """Largest number of intervals whose time steps are kept."""
 
 
+class Steps(NamedTuple):
+    """Time steps of an interval.
+
+    times: Their ends since the commands were given [s]. phases: Phase of the drive then [s], 0 where commands are over.
+    curve: Rotations by command 1 at these times [rad], empty for an actuator with memory.
+    """
+
+    times: Floats
+    phases: list[float]
+    curve: Floats
+
+
 class Drive:
     """Actuators of a batch of robots, one for each limb.
 
@@ -27,7 +38,7 @@ class Drive:
     at_rest: State of the actuators at rest, of the shape of `state`.
     commands: Commands under way, shape (n_robots, n_limbs); 0 where none are.
     phase: Time since they were given [s], 0 if none are under way.
-    times: Ends of the time steps of the present interval, since the commands were given [s].
+    steps: Time steps of the present interval.
     heating_time: Time for which each robot's wires are heated in the present interval [s], shape (n_robots,).
     """
 
@@ -36,16 +47,19 @@ class Drive:
         self.strengths = np.ones((n_robots, n_limbs))
         self.commands = self._given = np.zeros((n_robots, n_limbs))
         self.phase = 0.0
-        self.times, self.heating_time = np.zeros(1), np.zeros(n_robots)
+        self.steps, self.heating_time = Steps(np.zeros(1), [0.0], np.zeros(0)), np.zeros(n_robots)
+        self._none = np.zeros((n_robots, n_limbs))  # commands where none are under way
         self.set_actuator(actuator)
         self.state = self.at_rest.copy()
-        self._turned: tuple[tuple[Any, ...], Floats] = (None,) * 5, self.strengths  # rotations, behind what gives them
         self._before = self._after = self.state  # at the beginning and the end of the present interval
 
     def set_actuator(self, actuator: Actuator) -> None:
         """Continue with an actuator that differs only in numbers that may differ from robot to robot."""
         self._actuator = complete(actuator)
-        self._intervals: dict[tuple[float, float, bool], tuple[Floats, Floats]] = {}
+        self._has_memory = self._actuator.has_memory
+        # With memory: state at the end of the last interval, and rotations then of limbs of full strength.
+        self._turned: tuple[Floats | None, Floats] = None, self.strengths
+        self._intervals: dict[tuple[float, float, bool], Steps] = {}
         rest = self._actuator.rest
         self.at_rest = np.broadcast_to(rest, (*self.strengths.shape, rest.shape[-1]))
 
@@ -67,22 +81,25 @@ class Drive:
         (n_times, n_robots, n_limbs).
         """
         given, phase = (self.commands, self.phase) if commands is None else (commands, 0.0)
-        times, turned = self._interval(phase, duration, commands is not None)
-        after = self.state
-        if self._actuator.has_memory:
+        steps = self._interval(phase, duration, commands is not None)
+        times, turned, after = steps.times, steps.curve, self.state
+        if self._has_memory:
             turned, after = self._actuator.respond(times, given, self.state)
         if commands is not None and self.phase > 0.0:
-            self._refuse_jump(self.strengths * turned[0] if self._actuator.has_memory else np.zeros_like(commands))
-        self.times, self.commands, self.phase = times, given, phase
+            self._refuse_jump(self.strengths * turned[0] if self._has_memory else self._none)
+        if self._has_memory:
+            self._turned = after, turned[-1]
+        self.steps, self.commands, self.phase = steps, given, phase
         self._given, self._before, self._after = given, self.state, after
         self.heating_time = self._actuator.seconds_heated(times, given, self.state).sum(axis=1)
-        return times, self.strengths if self._actuator.has_memory else given * self.strengths, turned
+        return times, self.strengths if self._has_memory else given * self.strengths, turned
 
     def _refuse_jump(self, then: Floats) -> None:
         """ValueError if limbs cannot begin anew from where they are. then: Rotations that they would begin with."""
-        now = self.rotations()
+        state, turned = self._turned
+        now = self.strengths * turned if self.state is state else self.rotations()
         jumps = np.abs(then - now) > JUMP * column(self._actuator.peak_angle)
-        if jumps.any():
+        if np.count_nonzero(jumps):
             robot, limb = np.argwhere(jumps)[0]
             raise ValueError(
                 f"With these commands limbs would jump, such as limb {limb + 1} of robot {robot} by "
@@ -90,27 +107,29 @@ class Drive:
                 f"way ends, in {self.longest - self.phase:.4g} s, or use an actuator with memory such as SmaWires."
             )
 
-    def _interval(self, phase: float, duration: float, is_new: bool) -> tuple[Floats, Floats]:
-        """Ends of the time steps [s] and, unless it takes memory, rotations by command 1 at those times [rad]."""
+    def _interval(self, phase: float, duration: float, is_new: bool) -> Steps:
+        """Time steps of an interval [s] that begins at a phase [s]. is_new: Whether commands are given with it."""
         key = phase, duration, is_new
         if key not in self._intervals:
             if len(self._intervals) >= KNOWN_INTERVALS:
                 self._intervals.clear()
             corners = self._actuator.corners if is_new or phase > 0.0 else (0.0,)
             times = interval_times(corners, self._step, phase, duration)
-            curve = np.zeros(0) if self._actuator.has_memory else stroke_at(self._actuator, times)
-            self._intervals[key] = times, curve[:, :, None] if curve.ndim > 1 else curve
+            over = times >= self.longest - SAME_TIME * self._step
+            curve = np.zeros(0) if self._has_memory else np.array(stroke_at(self._actuator, times), np.float64)
+            curve = curve[:, :, None] if curve.ndim > 1 else curve
+            self._intervals[key] = Steps(times, np.where(over, 0.0, times).tolist(), curve)
         return self._intervals[key]
 
     def advance(self, end: int) -> None:
         """Bring the actuators to the time step `end` of the present interval."""
-        if end == len(self.times) - 1:
+        times = self.steps.times
+        if end == len(times) - 1:
             self.state = self._after
-        elif self._actuator.has_memory:
-            self.state = self._actuator.respond(self.times[: end + 1], self._given, self._before)[1]
-        is_over = self.times[end] >= self.longest - SAME_TIME * self._step
-        self.phase = 0.0 if is_over else float(self.times[end])
-        self.commands = np.zeros_like(self._given) if is_over else self._given
+        elif self._has_memory:
+            self.state = self._actuator.respond(times[: end + 1], self._given, self._before)[1]
+        self.phase = self.steps.phases[end]
+        self.commands = self._given if self.phase > 0.0 else self._none
 
     def observe(self) -> Floats:
         """State as numbers of order one, shape (n_robots, k), limb after limb; k = 0 without memory."""
@@ -122,7 +141,7 @@ class Drive:
         known = self._actuator.refractory_wires(self.state)
         if known is not None:
             return known
-        must_wait = not self._actuator.has_memory and bool(self.rotations().any())
+        must_wait = not self._has_memory and bool(self.rotations().any())
         return np.full((*self.strengths.shape, 2), must_wait)
 
     def checked_strengths(self, strengths: ArrayLike) -> Floats:
@@ -134,13 +153,8 @@ class Drive:
 
     def rotations(self) -> Floats:
         """Rotations of limbs between two intervals [rad], shape (n_robots, n_limbs)."""
-        now = self._actuator, self.strengths, self.commands, self.state, self.phase
-        if not all(map(operator.is_, now, self._turned[0])):
-            self._turned = now, self._rotations(np.full(1, self.phase))
-        return self._turned[1]
-
-    def _rotations(self, now: Floats) -> Floats:
-        if self._actuator.has_memory:
+        now = np.full(1, self.phase)
+        if self._has_memory:
             return self.strengths * self._actuator.respond(now, self.commands, self.state)[0][0]
         if self.phase == 0.0:
             return np.zeros_like(self.strengths)
@@ -165,7 +179,7 @@ def checked_commands(commands: ArrayLike, scene: Scene, strengths: Floats, name:
     if array.shape != strengths.shape:
         raise ValueError(f"{name} must have shape (n_robots, n_limbs) = {strengths.shape}, not {array.shape}.")
     good = np.abs(array) <= 1.0
-    if not good.all():
+    if np.count_nonzero(good) < good.size:
         robot, limb = np.argwhere(~good)[0]
         raise ValueError(
             f"{name} must be numbers in [-1, 1]; robot {robot} has {shown(array[robot, limb])} for limb {limb + 1}."

@@ -33,10 +33,15 @@ class StrokeLock:
         self._thread: tuple[int, int] | None = None
         self.broken = False
 
-    def acquire(self) -> object:
-        """Begin a change. Returns its holder for `resume`; RuntimeError while another change is under way."""
+    def acquire(self, intact: bool = False) -> object:
+        """Begin a change. Returns its holder for `resume`; RuntimeError while another change is under way.
+
+        intact: Whether to refuse it after a change that was interrupted, too.
+        """
         with self._lock:
             self._refuse_others()
+            if intact and self.broken:
+                raise RuntimeError(BROKEN_OFF)
             self._holder, self._thread = object(), _this_thread()
             return self._holder
 

@@ -42,9 +42,6 @@ class SolverStatus(IntEnum):
         }[self]
 
 
-COUNTS = ("newton_iterations", "regularised", "backtracks", "steps", "halvings", "rejections", "energy_cuts")
-
-
 MEASURED_IF_ASKED = ("error_estimate", "work", "peak_moment", "energy_growth")
 """Fields of a report that are NaN unless the simulator has `error_bars`, `effort` or numerics of your own."""
 
@@ -117,7 +114,7 @@ def report_of_pieces(pieces: Sequence[StrokeReport]) -> StrokeReport:
 
 
 def make_report(
-    rows: Mapping[str, Floats], hub_hinge: str, heating_time: Floats, power: float
+    rows: Mapping[str, NDArray[Any]], hub_hinge: str, heating_time: Floats, power: float
 ) -> StrokeReport:
     """Report of an interval from the kernels' numbers, shape (n_robots,) each.
 
@@ -127,19 +124,14 @@ def make_report(
     angle = 2.0 * np.arctan(rows["smallest_hub_t"])
     if hub_hinge == "turning":
         angle += np.pi
-    return StrokeReport(
-        status=rows["status"].astype(np.int64),
-        covered=rows["covered"],
-        smallest_opening_angle=angle,
-        largest_overlap=rows["largest_overlap"],
-        error_estimate=rows["error_estimate"],
-        heating_time=heating_time,
-        energy=power * heating_time,
-        work=rows["work"],
-        peak_moment=rows["peak_moment"],
-        energy_growth=rows["energy_growth"],
-        **{name: rows[name].astype(np.int64) for name in COUNTS},
-    )
+    fields: dict[str, NDArray[Any]] = {
+        **dict(zip(MEASURED_IF_ASKED, np.full((len(MEASURED_IF_ASKED), len(angle)), np.nan), strict=True)),
+        **rows,
+        "smallest_opening_angle": angle,
+        "heating_time": heating_time,
+        "energy": power * heating_time,
+    }
+    return StrokeReport._make(map(fields.__getitem__, StrokeReport._fields))
 
 
 def warn_of_overlap(overlaps: Floats) -> None:

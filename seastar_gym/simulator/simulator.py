@@ -18,7 +18,6 @@ from seastar_gym.scene.checks import as_array, as_finite, as_floats, require_cho
 from seastar_gym.scene.contact import LARGEST_OVERLAP
 from seastar_gym.scene.numerics import MAX_STEPS
 from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simd.rows import write_rows
 from seastar_gym.simulator.batch import Batch
 from seastar_gym.simulator.body_frame import best_fit_heading, root_places
 from seastar_gym.simulator.clock import Clock
@@ -38,10 +37,10 @@ MAX_ROBOTS, MAX_THREADS = 100_000_000, 4096
 
 
 class Snapshot(NamedTuple):
-    """Copies of what an interval changes, made before it."""
+    """What an interval changes, before it. Arrays of clock and drive are never written into."""
 
     rows: dict[str, Any]
-    clock: Clock
+    clock: dict[str, Any]
     drive: dict[str, Any]
     bars: Any
 
@@ -84,6 +83,7 @@ class Simulator:
         self._drive = Drive(scene.actuator, self.n_robots, scene.robot.n_limbs, scene.numerics.step)
         self._clock = Clock(self.n_robots)
         self._lock = StrokeLock()
+        self._known_duration: float | None = None  # of the last interval [s]
         watched = is_watched(scene) and device == "cpu"
         self._growth: EnergyGrowth | None = EnergyGrowth(self.n_robots, scene.actuator.period) if watched else None
         self._may_warn_of_overlap = scene.contact is not None
@@ -174,7 +174,7 @@ class Simulator:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(*state["arguments"])  # type: ignore[misc]
         self._batch.put_rows(state["rows"])
-        self._clock.restore(state["clock"])
+        vars(self._clock).update(vars(state["clock"]))
         vars(self._drive).update(state["drive"])
         self._bars, self._growth, self._may_warn_of_overlap = (state[each] for each in ("bars", "growth", "may_warn"))
 
@@ -221,7 +221,6 @@ class Simulator:
             self._batch.put_state(positions, velocities, orientation, spin)
             self._clock.set(slice(None), time)
             self._drive.put(actuators, commands, phase)
-            write_rows(self._batch.rotations, self._drive.rotations())
             if self._bars is not None:
                 self._bars.lose()
             if self._growth is not None:
@@ -327,6 +326,11 @@ class Simulator:
         """Position of the hub [m], world frame, shape (n_robots, 2)."""
         return self._batch.hub_position()
 
+    @property
+    def last_hub(self) -> Floats:
+        """Position of the hub at the end of the last interval or reset [m], shape (n_robots, 2), a copy."""
+        return self._batch.last_hub.copy()
+
     def hub_velocity(self) -> Floats:
         """Velocity of the hub [m/s], world frame, shape (n_robots, 2)."""
         return self._batch.read(self.v[:, :2])
@@ -349,14 +353,14 @@ class Simulator:
 
     def elastic_energy(self) -> Floats:
         """Stretching and bending energy (13.14) at the present actuation [J], shape (n_robots,)."""
-        return self._batch.energies()[0]
+        return self._batch.energies(self._drive.rotations())[0]
 
     def kinetic_energy(self, relative_to_water: bool = False) -> Floats:
         """Kinetic energy [J], shape (n_robots,).
 
         relative_to_water: With the velocity of every node less that of the water there.
         """
-        return self._batch.energy_in_water() if relative_to_water else self._batch.energies()[1]
+        return self._batch.energy_in_water() if relative_to_water else self._batch.energies(self._drive.rotations())[1]
 
     def stroke(self, commands: ArrayLike) -> StrokeReport:
         """Advance all robots by one actuation period.
@@ -387,9 +391,12 @@ class Simulator:
         which is another discretisation: limbs that ring faster than steps resolve then ring otherwise, by 4 % of the
         largest speed at fidelity "fast" and 11 % at "balanced", and the hub is 4e-6 and 4e-5 limb lengths away.
         """
-        with self._whole_interval(duration, commands):
-            self._batch.advance(0, len(self._batch.times) - 1)
-            return self._end_interval()
+        try:
+            next(self._advance_pausing(duration, commands))
+        except StopIteration as over:
+            report: StrokeReport = over.value
+            return report
+        raise AssertionError("It does not pause.")
 
     def advance_in_parts(
         self, duration: float, commands: ArrayLike | None, parts: int
@@ -414,44 +421,51 @@ class Simulator:
         return (yield from self._advance_pausing(duration, commands, ends_of))
 
     def _advance_pausing(
-        self, duration: float, commands: ArrayLike | None, ends_of: Callable[[Floats], NDArray[np.intp]]
+        self, duration: float, commands: ArrayLike | None, ends_of: Callable[[Floats], NDArray[np.intp]] | None = None
     ) -> Generator[float, None, StrokeReport]:
-        """Advance, and pause at steps that follow from the ends of all steps [s]."""
-        with self._whole_interval(duration, commands) as interval:
-            times = self._batch.times - self._batch.times[0]
-            for begin, end in pairwise([0, *ends_of(times)]):
-                self._batch.advance(begin, end)
-                self._clock.advance_to(self._batch.covered())
-                self._drive.advance(end)
-                self._batch.show_rotations(end)
-                self._lock.pause()
-                yield float(times[end])
-                self._lock.resume(interval)
-            return self._end_interval()
+        """Advance, and pause at steps that follow from the ends of all steps [s], or never.
 
-    @contextmanager
-    def _whole_interval(self, duration: float, commands: ArrayLike | None) -> Iterator[object]:
-        """Context of an interval, which is undone if it is not completed."""
-        require_duration(duration, self.scene.numerics.step)
+        An interval that is not completed is undone.
+        """
+        if duration is not self._known_duration:
+            require_duration(duration, self.scene.numerics.step)
+            self._known_duration = duration
         checked = None if commands is None else checked_commands(commands, self.scene, self._drive.strengths)
-        self._lock.require_intact()
-        interval = self._lock.acquire()
+        interval = self._lock.acquire(intact=True)
         bars = None if self._bars is None else self._bars.save()
-        before = Snapshot(self._batch.save(), self._clock.copy(), dict(vars(self._drive)), bars)
+        before = Snapshot(self._batch.save(), dict(vars(self._clock)), dict(vars(self._drive)), bars)
         try:
             self._begin_interval(float(duration), checked)
-            yield interval
+            if ends_of is None:
+                self._batch.advance(0, len(self._batch.times) - 1)
+            else:
+                yield from self._advance_in_pieces(interval, ends_of)
+            report = self._end_interval()
             self._lock.release()
+            return report
         except BaseException:
             self._restore(interval, before)
             raise
+
+    def _advance_in_pieces(
+        self, interval: object, ends_of: Callable[[Floats], NDArray[np.intp]]
+    ) -> Generator[float, None, None]:
+        """Advance through an interval that has begun, with a pause after each piece."""
+        times = self._batch.times - self._batch.times[0]
+        for begin, end in pairwise([0, *ends_of(times)]):
+            self._batch.advance(begin, end)
+            self._clock.advance_to(self._batch.covered())
+            self._drive.advance(end)
+            self._lock.pause()
+            yield float(times[end])
+            self._lock.resume(interval)
 
     def _restore(self, interval: object, before: Snapshot) -> None:
         """Undo an interval, unless robots were put into another state since."""
         try:
             if self._lock.resume(interval):
                 self._batch.restore(before.rows)
-                self._clock.restore(before.clock)
+                vars(self._clock).update(before.clock)
                 vars(self._drive).update(before.drive)
                 if self._bars is not None:
                     self._bars.restore(before.bars)
@@ -470,16 +484,16 @@ class Simulator:
 
     def _end_interval(self) -> StrokeReport:
         rows = self._batch.end()
-        failed = rows["status"] > 0.0
+        failed = rows["status"] > 0
         self._clock.end(failed, rows["covered"])
         self._drive.advance(len(self._batch.times) - 1)
-        write_rows(self._batch.rotations, self._drive.rotations())
         if self._bars is not None:
             self._bars.compare(self.hub_position(), failed)
+            rows["error_estimate"] = self.error_estimate
         if self._growth is not None:
             self._growth.end(lambda: self.kinetic_energy(relative_to_water=True), self.time)
+            rows["energy_growth"] = self.energy_growth
         if self._may_warn_of_overlap and rows["largest_overlap"].max() > LARGEST_OVERLAP:
             self._may_warn_of_overlap = False
             warn_of_overlap(rows["largest_overlap"])
-        rows |= {"error_estimate": self.error_estimate, "energy_growth": self.energy_growth}
         return make_report(rows, self.scene.robot.hub_hinge, self._drive.heating_time, self._drive.heating_power)

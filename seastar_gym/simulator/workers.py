@@ -28,12 +28,11 @@ class Workers:
 
         If a part fails or the caller is interrupted, all threads have stopped before the exception is raised.
         """
-        waiting = iter(list(parts))
         if self.n == 1:
-            for part in waiting:
+            for part in parts:
                 work(0, part)
             return
-        pool, at_work = self._get_pool(), self._at_work
+        waiting, (pool, at_work) = iter(list(parts)), (self._get_pool(), self._at_work)
 
         def take_parts(thread: int) -> None:
             with at_work[thread]:

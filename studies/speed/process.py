@@ -17,6 +17,7 @@ from seastar_gym.der.stepping import stroke
 from seastar_gym.envs import observation, pictures
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene
+from seastar_gym.simd.dispatch import code_for
 from seastar_gym.simulator import Simulator, batch
 
 
@@ -48,8 +49,8 @@ def environment_share(n_robots: int, seconds: float) -> list[float]:
 def step_of_one(id: str, n: int, unwrapped: bool = False) -> tuple[float, float]:
     """Processor time of a step of one environment beyond its kernels, and in them [s], means of n random steps.
 
-    Kernels are those of the strokes and of the observation, as Python calls them. unwrapped: Without Gymnasium's
-    wrappers.
+    Kernels are the machine code of the strokes and of the observation, as Python calls it. unwrapped: Without
+    Gymnasium's wrappers.
     """
     env: Any = gym.make(
         f"seastar_gym:{id}", fidelity="fast", max_episode_steps=10**9, path=[[10.0, 0.0], [10.0, 10.0]]
@@ -62,10 +63,14 @@ def step_of_one(id: str, n: int, unwrapped: bool = False) -> tuple[float, float]
     in_kernels = 0.0
 
     def timed(kernel: Callable[..., None]) -> Callable[..., None]:
+        codes: list[Callable[..., None]] = []
+
         def call(*arguments: Any) -> None:
             nonlocal in_kernels
+            if not codes:
+                codes.append(code_for(kernel, *arguments))
             start = time.thread_time()
-            kernel(*arguments)
+            codes[0](*arguments)
             in_kernels += time.thread_time() - start
 
         return call

@@ -20,6 +20,7 @@ from numba.core import caching
 from seastar_gym import Numerics, Scene, Simulator
 from seastar_gym.simd import compilation
 from seastar_gym.simd.compilation import PACKAGE, entry_point, kernel_sources, source_digest
+from seastar_gym.simd.dispatch import code_for
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
@@ -322,6 +323,18 @@ def test_digest_changes_with_whatever_machine_code_depends_on(tmp_path, monkeypa
         case package:
             monkeypatch.setattr(getattr(compilation, {"numpy": "np"}.get(package, package)), "__version__", "0")
     assert source_digest(tmp_path) != before
+
+
+def test_code_for_arguments_is_that_of_the_entry_point_for_their_types():
+    @entry_point
+    def twice(pair, out):
+        out[0] = 2.0 * pair[0][0]
+
+    out = np.zeros(1)
+    code = code_for(twice, (np.ones(1), 3), out)
+    assert code is code_for(twice, (np.zeros(2), 1), out)
+    code((np.full(1, 4.0), 5), out)
+    assert out == 8.0 and code_for(len, ()) is len
 
 
 def test_a_stroke_releases_the_gil():

@@ -70,16 +70,17 @@ def test_time_is_set_for_the_chosen_robots_only():
     np.testing.assert_array_equal(clock.time, [4 * PERIOD, 7.0 + PERIOD, 4 * PERIOD])
 
 
-def test_a_copy_keeps_its_time_and_puts_the_clock_back():
+def test_what_a_clock_shows_can_be_kept_and_puts_it_back():
     clock = after(3)
-    before = clock.copy()
-    clock.begin(PERIOD)
-    clock.advance_to(np.full(3, 0.05))
-    np.testing.assert_array_equal(before.time, 3 * PERIOD)
-    clock.restore(before)
-    np.testing.assert_array_equal(clock.time, before.time)
-    clock.advance_to(np.full(3, 0.05))
-    np.testing.assert_array_equal(before.time, 3 * PERIOD)
+    before = dict(vars(clock))
+    for _ in range(2):
+        clock.begin(2 * PERIOD)
+        clock.advance_to(np.full(3, 0.05))
+        clock.end(FAILED, np.full(3, 0.07))
+        clock.set(FAILED, 5.0)
+        assert (clock.time != 3 * PERIOD).all()
+        vars(clock).update(before)
+        np.testing.assert_array_equal(clock.time, 3 * PERIOD)
 
 
 # No time step straddles a corner of the pulse.
