@@ -31,6 +31,7 @@ from seastar_gym.controllers.learned import LearnedPolicy, bundled_file, load
 from seastar_gym.controllers.scripted import GAITS as SCRIPTED
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.symmetry import VectorFrameStack
+from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.identify import Measurement, identify
 from seastar_gym.plant.guard import Limits
@@ -259,17 +260,10 @@ def teach(results: Mapping[str, Any]) -> LearnedPolicy:
 def run_to_the_end(policy: Policy, scene: Scene, path: str, seed: int) -> float:
     """Time of a swim in the tank [s], TIME_LIMIT if it does not arrive."""
     env = environment(scene, seed, path)
-    observation, info = env.reset(seed=0)
-    state, begins = None, np.ones(1, bool)
-    while info["time"] < TIME_LIMIT:
-        action, state = policy.predict(observation, state, begins, deterministic=True)
-        observation, _, arrived, stopped, info = env.step(int(np.squeeze(action)))
-        begins = np.zeros(1, bool)
-        if stopped:
-            raise RuntimeError(f"The run ended early: {info['plant_message']}")
-        if arrived:
-            return float(info["time"])
-    return TIME_LIMIT
+    swum = rollout(env, policy, seeds=0, record=["time"], on_step=lambda info: bool(info["time"] >= TIME_LIMIT))
+    if env.stopped:
+        raise RuntimeError(f"The run ended early: {env.stopped}")
+    return float(swum.last("time")[0]) if swum.success[0] else TIME_LIMIT
 
 
 def runs(results: Mapping[str, Any]) -> dict[str, Any]:

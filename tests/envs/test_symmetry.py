@@ -1,5 +1,6 @@
 """A robot turned by a sector or mirrored is the same robot: observations, commands and actions say so."""
 
+import dataclasses
 import math
 import pickle
 from dataclasses import replace
@@ -521,6 +522,13 @@ ASYMMETRIC = {
     "drawn lengths": (Scene(TAPERED), OWN_LENGTHS, "robot.limbs.1.length is drawn"),
 }
 """Scene, draws, and words of the refusal."""
+
+
+def test_every_field_of_a_scene_but_its_numerics_is_tried():
+    scenes = [*SYMMETRIC.values(), *(scene for scene, _, _ in ASYMMETRIC.values())]
+    names = {field.name for field in dataclasses.fields(Scene)}
+    tried = {name for name in names for scene in scenes if getattr(scene, name) != getattr(Scene(), name)}
+    assert tried == names - {"numerics"}
 
 
 def pairs_for(scene, n):

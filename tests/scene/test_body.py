@@ -11,6 +11,7 @@ from seastar_gym import Attachment, Body, DomainRandomization, Limb, Scene, Seas
 from seastar_gym.identify.parameters import get_parameter
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.outline import Outline, is_convex
+from seastar_gym.scene.shape import lines_cross
 
 TRIANGLE = ((0.03, -0.01), (-0.01, 0.02), (-0.02, -0.02))
 HEXAGON = tuple((0.02 * math.cos(a), 0.02 * math.sin(a)) for a in np.arange(6) * math.pi / 3.0)
@@ -30,6 +31,25 @@ def test_moments_of_an_outline_are_those_of_points_in_it(points):
     cx, cy = outline.centre
     about = ((x - cx) ** 2 + (y - cy) ** 2)[inside].sum() * cell
     assert outline.second_moment == pytest.approx(about, rel=5e-3)
+
+
+def test_heights_are_over_the_nearest_side_or_corner():
+    plate, places = Body.rectangle(0.06, 0.02).shape, [[0.02, 0.02], [-0.04, 0.0], [0.033, 0.014], [0.0, 5e-3]]
+    np.testing.assert_allclose(plate.height_over(np.array(places)), [0.01, 0.01, 5e-3, -5e-3], rtol=1e-12)
+    np.testing.assert_allclose(Body(radius=0.02).shape.height_over(np.array([[0.03, -0.04]])), [0.03], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "other, cross",
+    [
+        ([[1.5, -1.0], [1.5, 1.0]], True), ([[0.5, 1.0], [0.5, -1.0], [9.0, -1.0]], True),
+        ([[0.0, 1.0], [2.0, 1.0]], False), ([[1.5, 1.0], [1.5, 0.5]], False),
+        ([[-1.0, -1.0], [-1.0, 1.0]], False), ([[3.0, -1.0], [3.0, 1.0]], False),
+    ],
+)  # fmt: skip
+def test_lines_cross_within_their_edges(other, cross):
+    line = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
+    assert lines_cross(line, np.array(other)) == lines_cross(np.array(other), line) == cross
 
 
 def test_a_disc_and_a_rectangle_have_the_mass_and_inertia_of_textbooks():

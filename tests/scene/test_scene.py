@@ -8,6 +8,7 @@ import pickle
 import numpy as np
 import pytest
 
+from declared import assert_declared_as_recorded
 from oracle import Star
 from refusals import assert_refused
 from seastar_gym import (
@@ -27,6 +28,10 @@ from seastar_gym.model.rods import make_rods
 
 SAMPLED = GridCurrent((0.0, 0.0), 0.1, np.zeros((3, 2, 2)))
 FIDELITIES = ("fast", "balanced", "accurate", "reference", "chapter")
+
+
+def test_defaults_and_constants_are_declared_as_recorded():
+    assert_declared_as_recorded("seastar_gym.scene")
 
 
 # The chapter's values

@@ -272,8 +272,10 @@ def test_what_cannot_be_modelled_is_refused():
         Seastar(along=1.0)
     with assert_refused("from 0 to 1"):
         AlongLimb(1.2)
-    with assert_refused("bend it to one side"):
-        AlongLimb(profile=(1.0, -1.0))
+    for profile in ((1.0, -1.0), (-1.0, 0.9)):
+        with assert_refused("bend it to one side"):
+            AlongLimb(profile=profile)
+    AlongLimb(profile=(3.0, -2.0))
     with assert_refused("finite numbers"):
         AlongLimb(profile=(1.0, float("nan")))
     with assert_refused("more nodes per limb"):

@@ -303,7 +303,7 @@ def test_a_limit_that_is_never_reached_changes_no_bit():
     "change",
     [
         {"water_temperature": 22.0}, {"austenite_start": 80.0}, {"martensite_start": 80.0}, {"martensite_finish": 24.0},
-        {"time_constant": 0.9e-3}, {"largest_temperature": 20.0},
+        {"austenite_start": 70.5}, {"time_constant": 0.9e-3}, {"largest_temperature": 20.0},
     ],
 )  # fmt: skip
 def test_wires_that_cannot_be_are_refused(change):
