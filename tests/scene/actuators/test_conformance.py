@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from every_part import ACTUATORS
@@ -40,6 +40,7 @@ def after_some(actuator, rng, n, shape):
     seed=st.integers(0, 1000),
     before=st.integers(0, 3),
 )
+@example(cuts=[0.01, 0.02, 0.03, 0.06, 0.2, 0.9], seed=0, before=0)  # several within the heating of a wire
 @settings(max_examples=30)
 def test_pieces_of_an_interval_are_the_whole(name, cuts, seed, before):
     """Angles, state and seconds of heating."""
