@@ -18,7 +18,7 @@ from seastar_gym.scene.actuators.actuator import Mirror
 from seastar_gym.scene.checks import shown
 from seastar_gym.simulator import Simulator
 
-P = ParamSpec("P")
+_P = ParamSpec("_P")
 Result = TypeVar("Result")
 
 
@@ -40,7 +40,7 @@ class TaskEnv(PlainSpec):
         self.command_table = command_table(self.actions, n_limbs) if has_table else None
         return actions_of_one, spaces.Box(-np.inf, np.inf, (task.layout.size,), np.float32)
 
-    def _to_the_end(self, change: Callable[P, Result], *args: P.args, **kwargs: P.kwargs) -> Result:
+    def _to_the_end(self, change: Callable[_P, Result], *args: _P.args, **kwargs: _P.kwargs) -> Result:
         """What a step or reset returns: after an interruption, robots and task disagree, and only a reset helps."""
         was_running, self._running = self._running, False
         try:
