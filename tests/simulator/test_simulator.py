@@ -12,7 +12,9 @@ import pytest
 
 from hubs import TEN, robot_with
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, Water
+from seastar_gym.simd.dispatch import code_for
 from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simulator.batch import Batch
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
 from strokes import assert_same_bits, finished
 
@@ -509,3 +511,20 @@ def test_vacuum_and_water_without_density_give_the_same_bits():
         simulator.stroke(STRAIGHT)
         ends.append(simulator.positions)
     np.testing.assert_array_equal(*ends)
+
+
+def test_machine_code_that_is_kept_is_that_for_its_arguments(monkeypatch):
+    """A robot for all, then each with numbers of its own; commands of pulses, with and without pauses; energies."""
+    call = Batch._call
+
+    def checked(self, entry, *args, kind=0):
+        call(self, entry, *args, kind=kind)
+        assert self._compiled[entry, kind, self.coefficients.are_shared] is code_for(entry, *args)
+
+    monkeypatch.setattr(Batch, "_call", checked)
+    simulator = Simulator(Scene(numerics=Numerics(step=0.05)), 2)
+    for density in (1000.0, np.array([900.0, 1100.0]), 1000.0):
+        simulator.set_scene(Scene(Seastar(density=density), numerics=Numerics(step=0.05)))
+        simulator.stroke(np.ones((2, 5)))
+        finished(simulator.advance_in_parts(1.0, np.ones((2, 5)), 2))
+        assert (simulator.elastic_energy() >= 0.0).all() and (simulator.kinetic_energy() > 0.0).all()
