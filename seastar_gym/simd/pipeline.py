@@ -225,7 +225,9 @@ class _PlainPasses(PassManager):
 
     def run(self, state):
         for kind, _ in self.passes:
-            _pass_registry.get(kind).pass_inst.run_pass(state)
+            each = _pass_registry.get(kind).pass_inst
+            each.analysis = self._analysis
+            each.run_pass(state)
 
 
 OF_KERNELS = (
@@ -241,4 +243,5 @@ class KernelCompiler(CompilerBase):
     def define_pipelines(self):
         passes = _PlainPasses("kernel")
         passes.passes = [(kind, "") for kind in OF_KERNELS]
+        passes.finalize()
         return [passes]
