@@ -64,9 +64,6 @@ def command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
     return _command_table(actions, n_limbs)
 
 
-_known_table = functools.cache(command_table)  # without its checks for whoever asks with every decision
-
-
 @functools.cache
 def _command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
     if actions == "joint":
@@ -94,7 +91,7 @@ def to_commands(actions: Actions, n_limbs: int, action: object, n_robots: int) -
     if actions == "continuous":
         return _checked_shares(array, (n_robots, n_limbs))
     shape = (n_robots, n_limbs) if actions == "limbs" else (n_robots,)
-    table = LIMB_COMMANDS if actions == "limbs" else _known_table(actions, n_limbs)
+    table = LIMB_COMMANDS if actions == "limbs" else command_table(actions, n_limbs)
     if array.dtype.kind not in "iu" or array.shape != shape:
         raise ValueError(
             f'With actions="{actions}" the actions of {n_robots} robot(s) are whole numbers of shape {shape}, '

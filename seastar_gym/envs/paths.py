@@ -13,9 +13,10 @@ A path of one's own needs no name: environments take arrays of waypoints. With a
     env = gym.make("SeastarSwim-v0", path="zigzag")
 """
 
+import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -150,10 +151,9 @@ def cross_track_error(position: ArrayLike, start: ArrayLike, end: ArrayLike) -> 
     >>> float(cross_track_error([0.1, 0.03], [0.0, 0.0], [0.2, 0.0]))
     0.03
     """
-    position, start, end = _as_points(position), _as_points(start), _as_points(end)
+    position, start, end = (np.asarray(point, dtype=np.float64) for point in (position, start, end))
     if _are_few(position, start, end):
-        points = zip(position.tolist(), start.tolist(), end.tolist(), strict=True)
-        return np.array([_cross_track_of_one(*each) for each in points])
+        return _of_each(_cross_track_of_one, position, start, end)
     # Written out by component: the same bits for one robot and for a batch of them.
     leg_x, leg_y = end[..., 0] - start[..., 0], end[..., 1] - start[..., 1]
     away_x, away_y = position[..., 0] - start[..., 0], position[..., 1] - start[..., 1]
@@ -186,10 +186,9 @@ def shortest_way(position: ArrayLike, waypoint: ArrayLike, after: ArrayLike, rad
     comes near enough, and so wherever `after` equals waypoint. Otherwise it touches the circle where it is reflected,
     at an angle between those of position and `after` that is found by bisection.
     """
-    p, w, n = _as_points(position), _as_points(waypoint), _as_points(after)
+    p, w, n = (np.asarray(point, dtype=np.float64) for point in (position, waypoint, after))
     if _are_few(p, w, n):
-        points = zip(p.tolist(), w.tolist(), n.tolist(), strict=True)
-        return np.array([_way_of_one(radius, *each) for each in points])
+        return _of_each(functools.partial(_way_of_one, radius), p, w, n)
     p_x, p_y, n_x, n_y = p[..., 0] - w[..., 0], p[..., 1] - w[..., 1], n[..., 0] - w[..., 0], n[..., 1] - w[..., 1]
     begin = np.arctan2(p_y, p_x)
     arc = np.remainder(np.arctan2(n_y, n_x) - begin + np.pi, 2.0 * np.pi) - np.pi
@@ -207,13 +206,15 @@ def shortest_way(position: ArrayLike, waypoint: ArrayLike, after: ArrayLike, rad
     return np.where(is_near, straight, to_p + to_n)
 
 
-def _as_points(points: ArrayLike) -> Floats:
-    return np.asarray(points, np.float64)
+def _are_few(*points: Floats) -> bool:
+    """Whether all points have one shape (n, 2) and are so few that arrays take longer than plain numbers."""
+    shape = points[0].shape
+    return len(shape) == 2 and shape[0] <= FEW and all(each.shape == shape for each in points)
 
 
-def _are_few(one: Floats, two: Floats, three: Floats) -> bool:
-    """Whether points have one shape (n, 2), n > 0, and are so few that arrays take longer than plain numbers."""
-    return one.ndim == 2 and 0 < len(one) <= FEW and one.shape == two.shape == three.shape
+def _of_each(measure: Callable[..., float], *points: Floats) -> Floats:
+    """A measure of points of shape (n, 2) each, one after the other; shape (n,)."""
+    return np.array(list(map(measure, *(each.tolist() for each in points))), np.float64)
 
 
 def _cross_track_of_one(position: Point, start: Point, end: Point) -> float:
@@ -241,18 +242,20 @@ def _way_of_one(radius: float, position: Point, waypoint: Point, after: Point) -
 
 def _touch_of_one(p_x: float, p_y: float, n_x: float, n_y: float, begin: float, arc: float, radius: float) -> float:
     """Share of the arc at which a route from p to n touches a circle about the origin."""
-    cos, sin, hypot = math.cos, math.sin, math.hypot
-    undecided = DECIDED * (hypot(p_x, p_y) + radius) * (hypot(n_x, n_y) + radius)
+
+    def slope(angle: float, cos: Any, sin: Any, hypot: Any) -> float:
+        c, s = cos(angle), sin(angle)
+        to_p, to_n = hypot(p_x - radius * c, p_y - radius * s), hypot(n_x - radius * c, n_y - radius * s)
+        grows: float = ((p_x * s - p_y * c) * to_n + (n_x * s - n_y * c) * to_p) * sign
+        return grows
+
+    undecided = DECIDED * (math.hypot(p_x, p_y) + radius) * (math.hypot(n_x, n_y) + radius)
     sign, middle, half = math.copysign(1.0, arc), 0.5, 0.25
     for _ in range(TOUCH_BISECTIONS - 1):
         angle = begin + middle * arc
-        c, s = cos(angle), sin(angle)
-        to_p, to_n = hypot(p_x - radius * c, p_y - radius * s), hypot(n_x - radius * c, n_y - radius * s)
-        grows = ((p_x * s - p_y * c) * to_n + (n_x * s - n_y * c) * to_p) * sign
+        grows = slope(angle, math.cos, math.sin, math.hypot)
         if not abs(grows) > undecided:
-            c, s = np.cos(angle), np.sin(angle)
-            to_p, to_n = np.hypot(p_x - radius * c, p_y - radius * s), np.hypot(n_x - radius * c, n_y - radius * s)
-            grows = ((p_x * s - p_y * c) * to_n + (n_x * s - n_y * c) * to_p) * sign
+            grows = slope(angle, np.cos, np.sin, np.hypot)
         middle += -half if grows > 0.0 else half
         half *= 0.5
     return middle

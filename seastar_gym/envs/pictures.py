@@ -1,7 +1,6 @@
 """What the kernels of `observation.py` see of the robots of a simulator, as rows of numbers."""
 
 import functools
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from seastar_gym.envs.observation import body_axes, observe, observe_group
 from seastar_gym.envs.stations import stations_of
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Seastar
-from seastar_gym.simd.dispatch import code_for
+from seastar_gym.simd.dispatch import KnownCode
 from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator
 
@@ -27,16 +26,12 @@ def observed_rows(simulator: Simulator, targets: Floats) -> Floats:
     own, robot = simulator.coefficients, simulator.scene.robot
     out = np.empty((len(targets), _size(robot.n_limbs), targets.shape[2]))
     places = stations_of(robot)
-    args = own.rest, own.limb_length, simulator.q, simulator.v, places, targets, VELOCITY_SCALE, out
-    kind = observe, places.root_weights is None
-    if kind not in _codes:
-        _codes[kind] = code_for(observe, *args)
-    _codes[kind](*args)
+    seen = own.rest, own.limb_length, simulator.q, simulator.v
+    _known.call(places.root_weights is None, observe, *seen, places, targets, VELOCITY_SCALE, out)
     return out
 
 
-_codes: dict[tuple[Any, bool], Callable[..., None]] = {}
-"""Machine code of `observe` for limbs on a body and for others."""
+_known = KnownCode()
 
 
 def rows_on_device(simulator: Simulator, targets: Floats) -> Any:

@@ -12,8 +12,6 @@ from seastar_gym.scene.serial import register_part
 
 PULSE = 0.1
 """Heating time of one wire [s] that `RewardWeights.effort` is the price of."""
-ROUNDED = 1e12
-"""Shares of a pulse below one over this are rounding."""
 
 
 @register_part
@@ -84,6 +82,6 @@ def pulses_of(heating_time: NDArray[np.float64], commands: NDArray[np.float64]) 
         does not say it: a command then counts as its share of a pulse.
     commands: Shape (n_robots, n_limbs).
     """
-    whole = np.rint(heating_time / PULSE * ROUNDED) / ROUNDED  # sums of tenths of a second are whole pulses again
+    whole = (heating_time / PULSE).round(12)  # sums of tenths of a second are whole pulses again
     unknown = np.isnan(heating_time)
-    return np.where(unknown, np.abs(commands).sum(axis=1), whole) if np.count_nonzero(unknown) else whole
+    return np.where(unknown, np.abs(commands).sum(axis=1), whole) if np.count_nonzero(unknown) else np.asarray(whole)

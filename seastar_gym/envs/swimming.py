@@ -396,7 +396,7 @@ class Swimming(ABC):
 
     def _judge(self, commands: Floats, followed: Floats, report: StrokeReport) -> Outcome:
         """Outcome of a decision. commands: Those that were given. followed: Those that were followed."""
-        hub = self.simulator.last_hub
+        hub = self.simulator.hub_position()
         self._energy += report.energy
         self.last_commands = followed
         if self._tracker is not None:

@@ -162,7 +162,7 @@ def require_numbers(name: str, values: object, unit: str) -> None:
 
 def require_unmasked(name: str, value: object) -> None:
     """Refuse masked arrays with masked entries, also in lists: numpy would take the numbers that they hide."""
-    if type(value) is not np.ndarray and _is_masked(value, DEEPEST):
+    if _is_masked(value, DEEPEST):
         raise ValueError(f"{name} must be without masked entries: fill them, or leave them out.")
 
 

@@ -22,7 +22,7 @@ class Part(JITCodeLibrary):
         super().add_ir_module(ir_module)
 
     def add_llvm_module(self, ll_module):
-        """Keep the module, simplified: LLVM would inline less of what is not, and strokes take 5 to 7 % longer."""
+        """Keep the module, simplified: LLVM would inline less of what is not, and fast strokes take 5 to 7 % longer."""
         ll_module.data_layout = self._codegen._data_layout
         passes, builder = self._codegen._function_pass_manager()
         for function in ll_module.functions:

@@ -1,7 +1,7 @@
 """Numba's compiler as kernels need it: absent terms are constants, and what is found out for one kernel holds for all.
 
 Numba would search its templates at every operator, look for what kernels do not have, and optimise every kernel by
-itself, although only compiled code calls it (linking.py). Without that, the same bits are there in a third of the time.
+itself, although only compiled code calls it (linking.py). None of that changes a bit.
 """
 
 import functools
@@ -172,7 +172,7 @@ class _Lowered(LoweringPass):
 
 @functools.cache
 def _size_of(target, kind):
-    """Bytes of one of LLVM's types, for which it would compile a variable of that type every time."""
+    """Bytes of one of LLVM's types; llvmlite has a module with such a variable parsed to find out."""
     return kind.get_abi_size(target)
 
 

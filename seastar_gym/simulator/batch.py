@@ -15,7 +15,7 @@ from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Scene
-from seastar_gym.simd.dispatch import code_for
+from seastar_gym.simd.dispatch import KnownCode
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import aligned_rows, from_rows, to_rows, write_rows
 from seastar_gym.simulator.report import SolverStatus
@@ -57,7 +57,7 @@ class Batch:
     def __init__(self, scene: Scene, n_robots: int, threads: int, effort: bool):
         self._scene, self.n_robots = scene, n_robots
         self._known_parts: dict[bool, list[slice]] = {}  # by whether coefficients are shared
-        self._compiled: dict[tuple[Any, ...], Callable[..., None]] = {}
+        self._code = KnownCode()
         n_groups, n_limbs, n_rows = -(-n_robots // N_LANES), scene.robot.n_limbs, 2 * scene.robot.n_nodes
         self._scheme = scheme_of(scene.numerics.scheme, scene.numerics.damping)
         self.make_coefficients(scene)
@@ -265,10 +265,7 @@ class Batch:
 
     def _call(self, entry: Callable[..., None], *args: Any, kind: int = 0) -> None:
         """Call compiled code with arguments whose types differ only by `kind`, and by what robots share."""
-        key = entry, kind, self.coefficients.are_shared
-        if key not in self._compiled:
-            self._compiled[key] = code_for(entry, *args)
-        self._compiled[key](*args)
+        self._code.call((kind, self.coefficients.are_shared), entry, *args)
 
     def _shape_of(self, part: slice, begin: int, end: int) -> tuple[Floats, int]:
         """Rows of the shape from time `begin` to `end` for kernels, and number of the limbs that have rows."""

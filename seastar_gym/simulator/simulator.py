@@ -326,11 +326,6 @@ class Simulator:
         """Position of the hub [m], world frame, shape (n_robots, 2)."""
         return self._batch.hub_position()
 
-    @property
-    def last_hub(self) -> Floats:
-        """Position of the hub at the end of the last interval or reset [m], shape (n_robots, 2), a copy."""
-        return self._batch.last_hub.copy()
-
     def hub_velocity(self) -> Floats:
         """Velocity of the hub [m/s], world frame, shape (n_robots, 2)."""
         return self._batch.read(self.v[:, :2])
@@ -427,9 +422,9 @@ class Simulator:
 
         An interval that is not completed is undone.
         """
-        if duration is not self._known_duration:
+        if type(duration) is not float or duration != self._known_duration:
             require_duration(duration, self.scene.numerics.step)
-            self._known_duration = duration
+            self._known_duration = float(duration)
         checked = None if commands is None else checked_commands(commands, self.scene, self._drive.strengths)
         interval = self._lock.acquire(intact=True)
         bars = None if self._bars is None else self._bars.save()

@@ -32,7 +32,8 @@ class Workers:
             for part in parts:
                 work(0, part)
             return
-        waiting, (pool, at_work) = iter(list(parts)), (self._get_pool(), self._at_work)
+        waiting = iter(list(parts))
+        pool, at_work = self._get_pool(), self._at_work
 
         def take_parts(thread: int) -> None:
             with at_work[thread]:

@@ -12,9 +12,10 @@ import pytest
 
 from hubs import TEN, robot_with
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, Water
-from seastar_gym.simd.dispatch import code_for
+from seastar_gym.envs.pictures import observed_rows
+from seastar_gym.simd.dispatch import KnownCode, code_for
 from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simulator.batch import Batch
+from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
 from strokes import assert_same_bits, finished
 
@@ -515,16 +516,19 @@ def test_vacuum_and_water_without_density_give_the_same_bits():
 
 def test_machine_code_that_is_kept_is_that_for_its_arguments(monkeypatch):
     """A robot for all, then each with numbers of its own; commands of pulses, with and without pauses; energies."""
-    call = Batch._call
+    call, entries = KnownCode.call, set()
 
-    def checked(self, entry, *args, kind=0):
-        call(self, entry, *args, kind=kind)
-        assert self._compiled[entry, kind, self.coefficients.are_shared] is code_for(entry, *args)
+    def checked(self, kind, entry, *args):
+        call(self, kind, entry, *args)
+        assert self._codes[entry, kind] is code_for(entry, *args)
+        entries.add(entry)
 
-    monkeypatch.setattr(Batch, "_call", checked)
+    monkeypatch.setattr(KnownCode, "call", checked)
     simulator = Simulator(Scene(numerics=Numerics(step=0.05)), 2)
     for density in (1000.0, np.array([900.0, 1100.0]), 1000.0):
         simulator.set_scene(Scene(Seastar(density=density), numerics=Numerics(step=0.05)))
         simulator.stroke(np.ones((2, 5)))
         finished(simulator.advance_in_parts(1.0, np.ones((2, 5)), 2))
         assert (simulator.elastic_energy() >= 0.0).all() and (simulator.kinetic_energy() > 0.0).all()
+        observed_rows(simulator, to_rows(np.zeros((2, 4))))
+    assert {entry.__name__ for entry in entries} == {"advance", "energies", "observe"}
