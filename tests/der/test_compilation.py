@@ -85,8 +85,8 @@ def test_an_edited_kernel_never_runs_from_the_cache_and_an_unchanged_one_always_
 
 def test_a_kernel_is_compiled_before_any_entry_point_is(copy):
     """As for a device."""
-    code = "from seastar_gym.der.geometry import convex_part as kernel; from seastar_gym.simd.lanes import lanes, mask; "
-    assert copy.run(code + "kernel.compile((mask, lanes)); print(len(kernel.overloads))") == [1]
+    code = "from seastar_gym.der.geometry import convex_part as part\nfrom seastar_gym.simd.lanes import lanes, mask\n"
+    assert copy.run(code + "part.compile((mask, lanes)); print(len(part.overloads))") == [1]
 
 
 def test_code_of_another_lane_width_is_another_code(copy):

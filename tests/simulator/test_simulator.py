@@ -531,4 +531,4 @@ def test_machine_code_that_is_kept_is_that_for_its_arguments(monkeypatch):
         finished(simulator.advance_in_parts(1.0, np.ones((2, 5)), 2))
         assert (simulator.elastic_energy() >= 0.0).all() and (simulator.kinetic_energy() > 0.0).all()
         observed_rows(simulator, to_rows(np.zeros((2, 4))))
-    assert {entry.__name__ for entry in entries} == {"advance", "energies", "observe"}
+    assert {entry.__name__ for entry in entries} == {"advance", "energies", "energies_in_water", "observe"}
