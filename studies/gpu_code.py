@@ -21,7 +21,6 @@ from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simd.compilation import kept_code
 from seastar_gym.simd.device import Program
-from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator.device_batch import DeviceBatch, program_of
 from studies.frame import Results, Study
 from studies.gpu import EVERYTHING, scenes
@@ -51,7 +50,7 @@ def code_of(scene: Scene) -> str:
 def code_of_observations(scene: Scene) -> str:
     """The code for GPUs (PTX) of the observations of a scene's robot, likewise."""
     batch = DeviceBatch(scene, 1, "scalar", effort=False)
-    return _kept(batch.filling(*observing(batch.coefficients, scene.robot, to_rows(np.zeros((1, 4))))))
+    return _kept(batch.filling(*observing(batch.coefficients, scene.robot, np.zeros((1, 4)))))
 
 
 def _kept(program: Program) -> str:

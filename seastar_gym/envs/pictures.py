@@ -21,13 +21,13 @@ Floats = NDArray[np.float64]
 def observed_rows(simulator: Simulator, targets: Floats) -> Floats:
     """Rows that the kernel fills, shape (n_groups, k, N_LANES), k = `Layout(n_limbs).size`.
 
-    targets: Rows of two points of every robot in the world frame [m], shape (n_groups, 4, N_LANES).
+    targets: Two points of every robot in the world frame [m], shape (n_robots, 4).
     """
-    own, robot = simulator.coefficients, simulator.scene.robot
-    out = np.empty((len(targets), _size(robot.n_limbs), targets.shape[2]))
+    own, robot, target_rows = simulator.coefficients, simulator.scene.robot, to_rows(targets)
+    out = np.empty((len(target_rows), _size(robot.n_limbs), target_rows.shape[2]))
     places = stations_of(robot)
     seen = own.rest, own.limb_length, simulator.q, simulator.v
-    _known.call(places.root_weights is None, observe, *seen, places, targets, VELOCITY_SCALE, out)
+    _known.call(places.root_weights is None, observe, *seen, places, target_rows, VELOCITY_SCALE, out)
     return out
 
 
@@ -49,7 +49,7 @@ def observing(own: Coefficients, robot: Seastar, targets: Floats) -> tuple[Any, 
     rest, length = (rows[0, :, 0] if own.are_shared else rows for rows in (own.rest, own.limb_length))
     numbers = {
         "rest": rest, "limb_length": length, "n_limbs": robot.n_limbs, "stations": stations_of(robot),
-        "targets": targets, "velocity_scale": VELOCITY_SCALE,
+        "targets": to_rows(targets), "velocity_scale": VELOCITY_SCALE,
     }  # fmt: skip
     return observe_group, numbers, _size(robot.n_limbs)
 
@@ -75,6 +75,6 @@ def lengths_of(simulator: Simulator) -> Floats:
 
 def pictures_of(simulator: Simulator, columns: NDArray[np.intp]) -> Floats:
     """Pictures of the robots, shape (n_robots, k), see tracker.py. columns: Of a `Tracker`."""
-    rows = observed_rows(simulator, to_rows(np.zeros((simulator.n_robots, 4))))
+    rows = observed_rows(simulator, np.zeros((simulator.n_robots, 4)))
     of_robots = rows.transpose(0, 2, 1).reshape(-1, rows.shape[1])[: simulator.n_robots]
     return np.concatenate([simulator.hub_position(), axes_of(simulator).T, of_robots[:, columns]], axis=1)

@@ -37,7 +37,6 @@ from seastar_gym.envs.sight import Lateness, Sees, bounds_of, entries_of, statio
 from seastar_gym.envs.tracker import Tracker
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror, complete
-from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
 from seastar_gym.simulator.growth import is_watched
 from seastar_gym.simulator.pauses import completed, pausing
@@ -156,10 +155,6 @@ class Swimming(ABC):
     def _targets(self) -> Floats:
         """Two points of every robot's observation in the world frame [m], shape (n_robots, 4)."""
 
-    def _target_rows(self) -> Floats:
-        """The targets as rows for kernels, shape (n_groups, 4, N_LANES)."""
-        return to_rows(self._targets())
-
     @abstractmethod
     def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
         """Score of a decision that ended with the hubs at `hub` [m]. pulses: Heat, see `pulses_of`."""
@@ -252,7 +247,7 @@ class Swimming(ABC):
         """`observe` as a fresh array of the simulator's device. What a `Sight` shows is copied there."""
         if self._tracker is not None:
             return self.simulator.arrays.asarray(self.observe())
-        seen = to_float32(rows_on_device(self.simulator, self._target_rows()), self.n_robots)
+        seen = to_float32(rows_on_device(self.simulator, self._targets()), self.n_robots)
         return self._with_more(seen, self.simulator.arrays)
 
     def _with_more(self, seen: Any, arrays: ModuleType) -> Any:
@@ -277,7 +272,7 @@ class Swimming(ABC):
 
     def _seen_now(self) -> NDArray[np.float32]:
         """Observations of what the kernel fills, without delay, shape (n_robots, k)."""
-        return to_float32(observed_rows(self.simulator, self._target_rows()), self.n_robots)
+        return to_float32(observed_rows(self.simulator, self._targets()), self.n_robots)
 
     def seen_hub(self) -> Floats:
         """Hubs as robots are seen by who decides [m], shape (n_robots, 2), a copy."""

@@ -10,7 +10,6 @@ from seastar_gym.envs.options import Path, SwimOptions
 from seastar_gym.envs.paths import cross_track_error, make_path
 from seastar_gym.envs.reward import reward_terms
 from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
-from seastar_gym.simd.rows import to_rows
 
 
 class Legs(NamedTuple):
@@ -25,8 +24,6 @@ class Legs(NamedTuple):
     """Length of the path from `following` to its end, shape (n_robots,)."""
     ends: Floats
     """`current` and `following`, shape (n_robots, 4)."""
-    end_rows: Floats
-    """The same as rows for kernels."""
 
 
 class SwimTask(Swimming):
@@ -104,7 +101,7 @@ class SwimTask(Swimming):
             start = np.where((leg == 0)[:, None], 0.0, self._waypoint(np.maximum(leg - 1, 0)))
             current, following = self._waypoint(k), self._waypoint(k + 1)
             ends = np.concatenate([current, following], axis=1)
-            self._known_legs = Legs(start, current, following, beyond, ends, to_rows(ends))
+            self._known_legs = Legs(start, current, following, beyond, ends)
         return self._known_legs
 
     def _measure_way_to_go(self, hub: Floats) -> Floats:
@@ -118,9 +115,6 @@ class SwimTask(Swimming):
 
     def _targets(self) -> Floats:
         return self._legs.ends
-
-    def _target_rows(self) -> Floats:
-        return self._legs.end_rows
 
     def _task_observation(self) -> Floats:
         if self._asked is None:

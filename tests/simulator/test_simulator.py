@@ -15,7 +15,6 @@ from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverSta
 from seastar_gym.envs.pictures import observed_rows
 from seastar_gym.simd.dispatch import KnownCode, code_for
 from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
 from strokes import assert_same_bits, finished
 
@@ -530,5 +529,5 @@ def test_machine_code_that_is_kept_is_that_for_its_arguments(monkeypatch):
         simulator.stroke(np.ones((2, 5)))
         finished(simulator.advance_in_parts(1.0, np.ones((2, 5)), 2))
         assert (simulator.elastic_energy() >= 0.0).all() and (simulator.kinetic_energy() > 0.0).all()
-        observed_rows(simulator, to_rows(np.zeros((2, 4))))
+        observed_rows(simulator, np.zeros((2, 4)))
     assert {entry.__name__ for entry in entries} == {"advance", "energies", "energies_in_water", "observe"}
