@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.greedy import turned
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.layout import Layout
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -26,8 +27,6 @@ ROBOTS, DECISIONS = 512, 24
 """Size of the swims that the function is fitted to: robots, and decisions of each."""
 SECONDS = 1.2
 """Time in which a robot comes to rest [s]."""
-WAYPOINT_RADIUS = 0.01
-"""Radius of the waypoints of a training [m]."""
 RIDGE = 1e-6
 """Weight of the squared coefficients in the fit, relative to the mean square of the scaled features."""
 

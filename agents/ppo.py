@@ -11,14 +11,16 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
 
-from agents.coasting import WAYPOINT_RADIUS, CoastingProgress, fit_coasting
+from agents.coasting import CoastingProgress, fit_coasting
 from agents.hyperparameters import Hyperparameters
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers import checkpoint
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, Weights
 from seastar_gym.controllers.registry import task_of
+from seastar_gym.envs.commands import unless_strokes
 from seastar_gym.envs.options import Path as SwimPath
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction, observed_mirror
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -101,8 +103,8 @@ def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
     batch: Any = env.env.unwrapped
     memory = next((layer for layer in env.layers() if isinstance(layer, VectorFrameStack)), None)
     symmetry = memory is not None or env.env_is_wrapped(VectorSymmetryReduction)[0]
-    in_strokes = batch.decision_period == batch.scene.actuator.period
-    about = Description(batch.actions, symmetry, batch.scene, hidden, None if in_strokes else batch.decision_period)
+    period = unless_strokes(batch.decision_period, batch.scene)
+    about = Description(batch.actions, symmetry, batch.scene, hidden, period)
     past = 0 if memory is None else memory.frame_stack.past
     at = batch.layout
     about = about._replace(past=past, entries=at.entries, shows_limbs=at.shows_limbs, stations=at.stations)

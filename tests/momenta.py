@@ -31,7 +31,7 @@ def bodied_momenta(simulator: Simulator) -> tuple[np.ndarray, float]:
     mass, omega, n = rods.mass[: len(q)], simulator.spin()[0], rods.edges_per_limb
     S_x, S_y = turned(rods.body.moment, simulator.orientation()[0])
     turning = omega * np.array([-S_y, S_x])
-    roots = root_places(simulator.scene.robot, q[None, 0], simulator.orientation())[0]
+    roots = q[0] + root_places(simulator.scene.robot, simulator.orientation())[0]
     arms = roots - q[0]
     moving_roots = v[0] + omega * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
     tails_q = np.concatenate([np.vstack([roots[k], q[1 + k * n : (k + 1) * n]]) for k in range(rods.n_limbs)])

@@ -7,9 +7,9 @@ from ray.rllib.algorithms.ppo import PPO, PPOConfig
 from ray.rllib.core.rl_module.default_model_config import DefaultModelConfig
 from ray.tune.registry import register_env
 
-from agents.coasting import WAYPOINT_RADIUS
 from agents.rllib.options import Options
 from seastar_gym.adapters.rllib import native_batch
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
 
 NAME = "seastar"
 PATIENCE = 600.0

@@ -12,7 +12,7 @@ from pathlib import Path
 import seastar_gym
 from agents.training.options import Options
 from agents.training.robot import physics
-from seastar_gym.simulator.workers import processors
+from seastar_gym.processors import processors
 
 LOWEST = 19
 """Priority of the process: it takes what the training leaves of the processors."""

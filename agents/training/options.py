@@ -26,7 +26,7 @@ PATH_HELP = (
 
 
 ENOUGH, ENOUGH_IN_TIME = 98_304, 300_000
-"""Length of a training [strokes], after which more gain nothing (docs/results.md), and of one in time [decisions]."""
+"""Length of a training [strokes], after which more gain nothing (docs/training.md), and of one in time [decisions]."""
 
 
 class Lengths:

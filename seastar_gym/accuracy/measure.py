@@ -23,6 +23,7 @@ from seastar_gym.accuracy.commands import ACTIONS, CLASSES, PROMISED, STROKES, d
 from seastar_gym.accuracy.endurance import energy_growth
 from seastar_gym.accuracy.setting import Setting, at, physics
 from seastar_gym.accuracy.water import carried, velocity, with_the_water
+from seastar_gym.processors import processors
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.checks import require_count, require_seed, shown
 from seastar_gym.scene.numerics import DAMPING, Resolution
@@ -134,8 +135,8 @@ def certify(scene: Scene, samples: int = SAMPLES, seed: int = 0, progress: Progr
                 typical=by_class(of_space + in_time.path, samples, np.median),
                 space_error=_promised(of_space, samples),
                 time_error=_promised(in_time.path, samples),
-                speed=_rounded(speed(at(scene, each), commands)),
-                energy_growth=_rounded(energy_growth(at(scene, each))),
+                speed=rounded_up(speed(at(scene, each), commands)),
+                energy_growth=rounded_up(energy_growth(at(scene, each))),
             )
         )  # fmt: skip
         report(SHARE_OF_SWIMS + (1.0 - SHARE_OF_SWIMS) * k / len(settings))
@@ -214,7 +215,7 @@ def swim_all(
     velocity(scenes[0], np.zeros(2))  # not first in a thread
     order, done = sorted(range(len(jobs)), key=lambda k: -cost[k]), 0.0
     found: dict[int, Swims] = {}
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(processors()) as pool:
         for k, swum in zip(order, pool.map(lambda k: swim(*jobs[k], period), order), strict=True):
             found[k] = Swims(*(each[every - 1 :: every] for each in swum))
             done += cost[k]
@@ -236,7 +237,7 @@ def path_lengths(scene: Scene, hub: Floats, shortest: float = SHORTEST_PATH) -> 
 def by_class(errors: Floats, samples: int, of: Callable[..., Floats] = np.max) -> dict[str, float]:
     """Largest error of every class, or another number `of` its errors, rounded upwards to two digits."""
     found = of(errors.reshape(len(CLASSES), samples), axis=1)
-    return {name: _rounded(float(error)) for name, error in zip(CLASSES, found, strict=True)}
+    return {name: rounded_up(float(error)) for name, error in zip(CLASSES, found, strict=True)}
 
 
 def speed(scene: Scene, commands: Floats, strokes: int = 3) -> float:
@@ -255,9 +256,9 @@ def _promised(errors: Floats, samples: int) -> float:
     return max(found[name] for name in PROMISED)
 
 
-def _rounded(number: float, digits: int = 2) -> float:
-    """Rounded upwards, so that a promise is not less than what was measured."""
+def rounded_up(number: float) -> float:
+    """Rounded upwards to two digits, so that a promise is not less than what was measured."""
     if not np.isfinite(number) or number <= 0.0:
         return number
-    unit = 10.0 ** (np.floor(np.log10(number)) - digits + 1)
-    return float(f"{np.ceil(number / unit - 1e-9) * unit:.{digits}g}")
+    unit = 10.0 ** (np.floor(np.log10(number)) - 1)
+    return float(f"{np.ceil(number / unit - 1e-9) * unit:.2g}")

@@ -110,7 +110,7 @@ def plan(options: argparse.Namespace) -> tuple[Policy, Swim, dict[str, Any]]:
 
 
 def _swim(name: str, policy: Policy, env: PlantSwim, options: argparse.Namespace) -> Swim:
-    limit = decisions_in(options.seconds, options.decision_period)
+    limit = decisions_in(options.seconds, options.decision_period, env.scene)
     return swim(name, policy, env, max_strokes=limit, seed=options.seed)
 
 

@@ -18,12 +18,14 @@ from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.controllers.registry import DEFAULTS, HELP, fitting_agents, load_agents
 from seastar_gym.envs.options import scene_at
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.results import Row, write_csv
 from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
 from seastar_gym.evaluation.trials import SETS, as_text, trials
 from seastar_gym.extras import require_extra
+from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_number
 from seastar_gym.scene.numerics import Fidelity
 
@@ -49,7 +51,8 @@ def parser() -> argparse.ArgumentParser:
     limit = found.add_mutually_exclusive_group()
     limit.add_argument("--seconds", type=float, default=TIME_LIMIT, help=f"time limit [s] {default}")
     limit.add_argument("--max-strokes", type=int, help="time limit [decisions]")
-    found.add_argument("--waypoint-radius", type=float, default=0.01, help=f"radius of the waypoints [m] {default}")
+    radius = f"radius of the waypoints [m] {default}"
+    found.add_argument("--waypoint-radius", type=float, default=WAYPOINT_RADIUS, help=radius)
     found.add_argument("--random-heading", action=flag, default=False, help="turn the robot at random at the start")
     found.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn at random {default}")
     found.add_argument("--out", type=Path, help="folder for evaluation.csv and traces.png; with --sets a CSV file")
@@ -85,9 +88,9 @@ def require_sound(options: argparse.Namespace) -> None:
         raise ValueError("A video, a report or a trajectory needs a folder, --out, and a path, no --sets.")
 
 
-def limit_of(options: argparse.Namespace) -> int:
+def limit_of(options: argparse.Namespace, scene: Scene | None = None) -> int:
     """Time limit [decisions]."""
-    return options.max_strokes or decisions_in(options.seconds, options.decision_period)
+    return options.max_strokes or decisions_in(options.seconds, options.decision_period, scene)
 
 
 def compared(options: argparse.Namespace, command: str) -> None:
@@ -98,7 +101,7 @@ def compared(options: argparse.Namespace, command: str) -> None:
     agents, left_out = fitting_agents(options.agents, options.seed, fidelity, options.decision_period, own)
     print("".join(f"{sentence}\n" for sentence in left_out), end="", file=sys.stderr)
     evaluate(
-        agents, path, seed=options.seed, max_strokes=limit_of(options), waypoint_radius=options.waypoint_radius,
+        agents, path, seed=options.seed, max_strokes=limit_of(options, own), waypoint_radius=options.waypoint_radius,
         scene=own, decision_period=options.decision_period, out=options.out, video=options.video,
         trajectory=options.trajectory,
         report=remarks(agents, options, command) if options.report else None,

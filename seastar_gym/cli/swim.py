@@ -105,7 +105,7 @@ def watch(options: argparse.Namespace) -> str:
     period = plain.decision_period
     number, fps = rate(options.film, period, options.speed)
     env = make(options, actions=actions, render_mode="rgb_array_list", frames_per_stroke=number)
-    limit = None if options.seconds is None else decisions_in(options.seconds, period)
+    limit = None if options.seconds is None else decisions_in(options.seconds, period, plain.scene)
     with screen(options.film, fps) as show:
         info = show_episode(env, policy, show, options.seed, limit)
     env.close()

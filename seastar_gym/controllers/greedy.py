@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.contract import observed
 from seastar_gym.envs.commands import Actions, checked_decision_period, command_table
 from seastar_gym.envs.layout import OBSERVATION_LAYOUT, Layout
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.files import beside
@@ -149,7 +150,7 @@ class GreedyPolicy(Searcher):
     def __init__(
         self,
         scene: Scene,
-        waypoint_radius: float = 0.01,
+        waypoint_radius: float = WAYPOINT_RADIUS,
         reward: RewardWeights = RewardWeights(),
         decision_period: float | None = None,
     ):

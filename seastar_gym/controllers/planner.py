@@ -21,6 +21,7 @@ from seastar_gym.envs.commands import checked_decision_period, command_table
 from seastar_gym.envs.headings import HeadingTargets, wrapped
 from seastar_gym.envs.layout import HEADINGS, N_STATIONS, VELOCITY_SCALE, Layout, memory_size
 from seastar_gym.envs.options import make_scene
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import body_heading, node_weights, of_beginning
 from seastar_gym.gaits import evolved_gaits
@@ -204,7 +205,7 @@ class Planner(Searcher):
     def __init__(
         self,
         scene: Scene | None = None,
-        waypoint_radius: float = 0.01,
+        waypoint_radius: float = WAYPOINT_RADIUS,
         budget: Budget | None = None,
         threads: int | None = None,
         reward: RewardWeights = RewardWeights(),

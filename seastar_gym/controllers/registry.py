@@ -16,6 +16,7 @@ from seastar_gym.controllers.contract import Policy, actions_of, require_fit
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.planner import Planner, gait_planner
 from seastar_gym.controllers.scripted import GAITS, scripted
+from seastar_gym.envs.commands import unless_strokes
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.envs import name_of
@@ -139,9 +140,8 @@ def load_agent(name: str, env: SeastarSwimEnv, seed: int = 0) -> Policy:
     require_seed(seed)
     if not all(hasattr(env, known) for known in ("decision_period", "scene", "step")):
         raise ValueError(f"env must be an environment of this package, not {shown(env)}.")
-    in_strokes = env.decision_period == env.scene.actuator.period
-    task = task_of(env)
-    return _load_agent(name, seed, env.scene, None if in_strokes else env.decision_period, task, lambda: env)
+    period = unless_strokes(env.decision_period, env.scene)
+    return _load_agent(name, seed, env.scene, period, task_of(env), lambda: env)
 
 
 def task_of(env: Any) -> str | None:

@@ -53,12 +53,6 @@ class Recorder(_VectorWrapper):
         self._seeds: list[int | None] = [None] * env.num_envs
         self._spans: list[tuple[int, int, int, int | None]] = []  # robot, first and last row, and seed
 
-    @property
-    def n_finished(self) -> NDArray[np.int64]:
-        """Number of episodes that every robot has finished, shape (num_envs,)."""
-        robots = np.array([robot for robot, *_ in self._spans], np.int64)
-        return np.bincount(robots, minlength=self.num_envs)
-
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:

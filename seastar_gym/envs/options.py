@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seastar_gym.accuracy.certificate import Certificate
-from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.commands import Actions, unless_strokes
 from seastar_gym.envs.headings import HeadingTargets
-from seastar_gym.envs.paths import FARTHEST, make_path
+from seastar_gym.envs.paths import FARTHEST, WAYPOINT_RADIUS, make_path
 from seastar_gym.envs.randomization import ACTION_DELAY, DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.sight import Drawn, Sight, require_action_delay
@@ -44,7 +44,7 @@ class SwimOptions:
     fidelity: Fidelity | None = None
     scene: Scene | None = None
     reward: RewardWeights = RewardWeights()
-    waypoint_radius: float = 0.01
+    waypoint_radius: float = WAYPOINT_RADIUS
     random_heading: bool = False
     randomization: DomainRandomization | None = None
     certificate: Certificate | str | PathLike[str] | None = None
@@ -133,7 +133,7 @@ def make_scene(
     """
     if scene is None:
         chapters = Scene().at(fidelity)
-        in_strokes = decision_period is None or decision_period == chapters.actuator.period
+        in_strokes = unless_strokes(decision_period, chapters) is None
         return chapters if in_strokes else replace(chapters, actuator=SmaWires())
     scene = read(scene, Scene)
     require_kind("scene", scene, Scene, "a Scene")

@@ -31,6 +31,8 @@ MakePath: TypeAlias = Callable[[np.random.Generator], Waypoints]
 PATHS: dict[str, MakePath] = {}
 """Functions that make the waypoints [m], shape (n, 2), of the named paths, see `register_path`."""
 
+WAYPOINT_RADIUS = 0.01
+"""Distance from a waypoint at which it counts as reached, unless an environment is told another [m]."""
 PENTAGON_SIDE = 0.1437
 """Side [m] of the pentagon that the scripted gait (13.15) traces: 45 strokes, then 5 at rest, per side.
 

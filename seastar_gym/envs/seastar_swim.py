@@ -43,7 +43,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `"pairs"`      | `Discrete(1 + n*(n - 1))`   | -      | 0..n*(n-1) | number of a command: none, or a + and a -   |
     | `"continuous"` | `Box(-1, 1, (n,), float32)` | 0..n-1 | -1..1      | limb: share of a full command, + or -       |
 
-    `"pairs"` learns best: 172.6 strokes on held-out paths, where `"limbs"` takes 196.8 (docs/results.md). `"limbs"` is
+    `"pairs"` learns best: 172.6 strokes on held-out paths, where `"limbs"` takes 196.8 (docs/training.md). `"limbs"` is
     the default because it is the plainest form, for any robot.
 
     Actions have no unit. `env.command_table[number]` is the command of every limb: 0, 1 (+) or -1 (-). A share is the

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from seastar_gym.envs.layout import N_STATIONS
 from seastar_gym.scene import Seastar
 from seastar_gym.simulator import Simulator
-from seastar_gym.simulator.body_frame import best_fit_heading
+from seastar_gym.simulator.body_frame import best_fit_heading, root_places
 
 Floats = NDArray[np.float64]
 
@@ -106,9 +106,7 @@ def roots_from_hub(positions: Floats, robot: Seastar, orientation: Floats | None
     if orientation is None:
         each = positions.reshape(-1, *positions.shape[-2:])
         orientation = best_fit_heading(each, robot.nodes()).reshape(positions.shape[:-2])
-    c, s = np.cos(orientation)[..., None], np.sin(orientation)[..., None]
-    x, y = np.array([limb.root for limb in robot.limb_shapes()]).T
-    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+    return root_places(robot, orientation)
 
 
 def at_stations(positions: Floats, robot: Seastar, orientation: Floats | None = None) -> Floats:

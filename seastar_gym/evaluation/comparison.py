@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from seastar_gym.controllers.contract import Policy, actions_of
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.options import make_scene
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.films import film
 from seastar_gym.evaluation.pictures import FPS, FRAMES_PER_STROKE, draw_traces
@@ -33,7 +34,7 @@ def evaluate(
     seed: int | None = 0,
     reset_options: dict[str, Any] | None = None,
     max_strokes: int | None = None,
-    waypoint_radius: float = 0.01,
+    waypoint_radius: float = WAYPOINT_RADIUS,
     scene: Scene | None = None,
     decision_period: float | None = None,
     out: Path | str | None = None,
@@ -62,7 +63,7 @@ def evaluate(
     """
     if not agents:
         raise ValueError("There is nothing to evaluate: name at least one agent.")
-    max_strokes = decisions_in(TIME_LIMIT, decision_period) if max_strokes is None else max_strokes
+    max_strokes = decisions_in(TIME_LIMIT, decision_period, scene) if max_strokes is None else max_strokes
     if max_strokes < 1:
         raise ValueError(f"max_strokes must be at least 1, not {shown(max_strokes)}.")
     folder = None if out is None else Path(out)

@@ -5,6 +5,7 @@ import numpy as np
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit, require_policy
 from seastar_gym.envs.options import Path as SwimPath
 from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.sight import Drawn, Sight
 from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
 from seastar_gym.evaluation.rollout import MOST_DECISIONS, TaskBatch, rollout
@@ -27,7 +28,7 @@ def swim_many(
     disturbance: Disturbance = Disturbance(),
     *,
     max_strokes: int | None = None,
-    waypoint_radius: float = 0.01,
+    waypoint_radius: float = WAYPOINT_RADIUS,
     seed: int = 0,
     threads: int | None = None,
     decision_period: float | None = None,
@@ -56,7 +57,7 @@ def swim_many(
     )  # fmt: skip
     task = DisturbedTask(disturbance, np.random.default_rng([seed, n_swims]), options, n_swims, threads)
     require_fit(policy, scene, actions, decision_period, task.layout.size)
-    batch, limit = TaskBatch(task), max_strokes or decisions_in(TIME_LIMIT, decision_period)
+    batch, limit = TaskBatch(task), max_strokes or decisions_in(TIME_LIMIT, decision_period, scene)
     batch.np_random = tuple(np.random.default_rng([seed, swim]) for swim in range(n_swims))
     swims = swims_of(agent, rollout(batch, policy, until=limit, record=RECORDED))
     batch.close()

@@ -1,6 +1,5 @@
 """`Processes`: tasks in processes of this machine."""
 
-import os
 import signal
 from collections.abc import Iterator
 from contextlib import suppress
@@ -10,6 +9,7 @@ from typing import Any, NamedTuple
 
 from seastar_gym.executors import Outcome, Task, Work
 from seastar_gym.executors.here import outcome_of
+from seastar_gym.processors import processors
 from seastar_gym.scene.checks import require_count
 
 
@@ -26,7 +26,7 @@ class Processes:
     def __init__(self, workers: int | None = None):
         if workers is not None:
             require_count("workers", workers, 1, 4096)
-        self.workers = workers or os.cpu_count() or 1
+        self.workers = workers or processors()
 
     def run(self, work: Work[Task], tasks: Iterator[Task]) -> Iterator[Outcome[Task]]:
         """Run all tasks. A process that dies is replaced by another."""

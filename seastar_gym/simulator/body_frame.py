@@ -21,8 +21,8 @@ def best_fit_heading(positions: Floats, rest: Floats) -> Floats:
     return np.asarray(np.arctan2(y @ rest[:, 0] - x @ rest[:, 1], x @ rest[:, 0] + y @ rest[:, 1]))
 
 
-def root_places(robot: Seastar, hub: Floats, orientation: Floats) -> Floats:
-    """Places where limbs begin [m], shape (n_robots, n_limbs, 2), from hubs (n_robots, 2) and orientations [rad]."""
+def root_places(robot: Seastar, orientation: Floats) -> Floats:
+    """Places where limbs begin, from the hub [m], shape (..., n_limbs, 2), at orientations [rad], shape (...)."""
     x, y = np.array([limb.root for limb in robot.limb_shapes()]).T
-    c, s = np.cos(orientation)[:, None], np.sin(orientation)[:, None]
-    return np.asarray(hub[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=-1))
+    c, s = np.cos(orientation)[..., None], np.sin(orientation)[..., None]
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)

@@ -13,6 +13,7 @@ from seastar_gym import renamed
 from seastar_gym.der.rods import Work
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
+from seastar_gym.processors import processors
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_array, as_finite, as_floats, require_choice, require_count, require_flag, shown
 from seastar_gym.scene.contact import LARGEST_OVERLAP
@@ -29,7 +30,6 @@ from seastar_gym.simulator.lock import BROKEN_OFF, StrokeLock
 from seastar_gym.simulator.report import StrokeReport, make_report, warn_of_overlap
 from seastar_gym.simulator.schedule import ends_at, ends_of_parts, require_duration
 from seastar_gym.simulator.state import State, checked_state
-from seastar_gym.simulator.workers import processors
 
 Floats = NDArray[np.float64]
 
@@ -344,7 +344,7 @@ class Simulator:
 
     def root_positions(self) -> Floats:
         """Places where limbs begin [m], world frame, shape (n_robots, n_limbs, 2): on the body, or at the hub."""
-        return root_places(self.scene.robot, self.hub_position(), self.orientation())
+        return self.hub_position()[:, None] + root_places(self.scene.robot, self.orientation())
 
     def elastic_energy(self) -> Floats:
         """Stretching and bending energy (13.14) at the present actuation [J], shape (n_robots,)."""

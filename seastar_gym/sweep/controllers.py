@@ -13,12 +13,12 @@ from seastar_gym.controllers.contract import Policy, require_fit
 from seastar_gym.controllers.learned import bundled_file, load
 from seastar_gym.controllers.registry import AGENTS, files_of, load_agent
 from seastar_gym.controllers.scripted import scripted
-from seastar_gym.envs.commands import checked_decision_period
+from seastar_gym.envs.commands import checked_decision_period, unless_strokes
 from seastar_gym.envs.options import Path as SwimPath
 from seastar_gym.envs.paths import make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.many import HELD_OUT_SEED
-from seastar_gym.evaluation.swim import TIME_LIMIT
+from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number, shown
 
@@ -78,7 +78,7 @@ def controller_of(name: Any, route: Route, scene: Scene) -> Controller:
     if not isinstance(name, str):
         raise ValueError(f"A controller is the name of an agent, such as learned, not {shown(name)}.")
     seconds = checked_decision_period(route.decision_period, scene)
-    period = None if seconds == scene.actuator.period else route.decision_period
+    period = unless_strokes(seconds, scene)
     files = files_of(name, period)
     if name == "learned" or name.endswith(".safetensors"):
         policy = load(bundled_file(period) if name == "learned" else name)
@@ -87,7 +87,7 @@ def controller_of(name: Any, route: Route, scene: Scene) -> Controller:
         scripted(name, n_limbs=scene.robot.n_limbs, decision_period=period)
     waypoints = make_path(route.path, np.random.default_rng(HELD_OUT_SEED))
     return Controller(
-        name, _digest(files), tuple(map(tuple, waypoints.tolist())), max(1, round(route.seconds / seconds)), period
+        name, _digest(files), tuple(map(tuple, waypoints.tolist())), decisions_in(route.seconds, seconds), period
     )
 
 

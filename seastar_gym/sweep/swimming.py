@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import actions_of, require_fit
+from seastar_gym.envs.headings import wrapped
 from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.evaluation.rollout import TaskBatch, rollout
 from seastar_gym.scene import Scene
@@ -28,7 +30,8 @@ UNITS = {
 
 speed: Distance between the places of the hub at the beginning and at the end of the measurement, over its time.
 strokes_per_metre: Periods of the actuator that a metre takes at that speed.
-ahead, aside: That distance along limb 1 as it stood at the beginning, and to the left of it.
+ahead, aside: That distance along the robot's x axis at the beginning, and to the left of it. The axis is that of the
+    rest shape that fits all nodes best; for controllers, that of observations, which fits hub and stations.
 turn: Rotation of the robot during the measurement.
 energy: Electric energy of the measured intervals.
 work: Mechanical work of the actuators in these intervals, see `StrokeReport`.
@@ -47,8 +50,6 @@ OF_CONTROLLERS = {"time": "s", "waypoints": "1"}
 time: Time until the last waypoint is reached; NaN if it is not. waypoints: Number of waypoints reached.
 """
 
-RADIUS = 0.01
-"""Radius of waypoints [m]."""
 OF_EPISODES = (
     "time", "waypoint_index", "hub_position", "energy", "work", "peak_moment", "smallest_opening_angle",
     "newton_iterations", "solver_status",
@@ -134,7 +135,7 @@ def steer(scene: Scene, frame: Scene, controller: Controller, n_robots: int, dev
     actions = actions_of(policy, n_limbs)
     require_fit(policy, scene, actions, controller.decision_period)
     options = SwimOptions(
-        waypoints, actions, scene=scene, waypoint_radius=RADIUS, decision_period=controller.decision_period,
+        waypoints, actions, scene=scene, waypoint_radius=WAYPOINT_RADIUS, decision_period=controller.decision_period,
         device=device,
     )  # fmt: skip
     task = SwimTask(options, n_robots, 1, effort=True)
@@ -164,5 +165,5 @@ def ways(scene: Scene, speed: Floats, way: NDArray[np.complex128], turn: Floats)
         strokes = 1.0 / (speed * scene.actuator.period)
     return {
         "speed": speed, "strokes_per_metre": strokes, "ahead": way.real, "aside": way.imag,
-        "turn": turn - 2.0 * np.pi * np.rint(turn / (2.0 * np.pi)),
+        "turn": wrapped(turn),
     }  # fmt: skip

@@ -23,7 +23,6 @@ from typing import Any, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import beta
 
 from seastar_gym.accuracy import Certificate, chapters_certificate, measure
 from seastar_gym.accuracy.certificate import CLASSES_VERSION
@@ -42,8 +41,8 @@ SAMPLES, SEED = 1000, 2_026
 SCREEN = Numerics("implicit-midpoint", 1e-3, 1e-7)
 CLOSE = 0.5
 """Sequences are swum with short steps if their error against `SCREEN` is above this share of a bound."""
-SHARE, CONFIDENCE = 0.05, 0.95
-"""Share of a class that may exceed its promised error, and the confidence with which no more do."""
+SHARE = 0.05
+"""Share of a class that may exceed its promised error."""
 PRESETS: tuple[Fidelity, ...] = tuple(name for name in get_args(Fidelity) if name not in ("reference", "chapter"))
 """Fidelities that are held against the package's table: a dearer one has the limit's own error."""
 
@@ -103,13 +102,6 @@ def exceedances(scene: Scene, checks: Sequence[Check], samples: int, seed: int) 
     return {
         check.name: dict(zip(CLASSES, row.tolist(), strict=True)) for check, row in zip(checks, beyond, strict=True)
     }
-
-
-def largest_share(exceeded: int, samples: int) -> float:
-    """Upper end of the one-sided interval of 95 % (Clopper and Pearson) of the share of a class that exceeds."""
-    if exceeded == samples:
-        return 1.0
-    return float(beta.ppf(CONFIDENCE, exceeded + 1, samples - exceeded))
 
 
 def examine(name: str, folder: Path, samples: int) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from seastar_gym.accuracy import Certificate, Setting, chapter
 from seastar_gym.accuracy.certificate import CLASSES_VERSION
-from seastar_gym.accuracy.measure import machine
+from seastar_gym.accuracy.measure import machine, rounded_up
 from seastar_gym.accuracy.setting import physics
 from seastar_gym.scene import Scene
 from seastar_gym.version import __version__
@@ -52,14 +52,12 @@ def nodes_of(row: Row) -> str:
     return str(nodes) if discretisation == "continuum" else f"{nodes}, chapter's"
 
 
-def two_digits(value: float, up: bool = False) -> float:
-    """Value rounded to two significant digits; up: round upwards."""
+def two_digits(value: float) -> float:
+    """Value rounded to two significant digits."""
     if not math.isfinite(value):
         return value
     unit = 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0.0 else 1.0
-    scaled = value / unit
-    whole = math.ceil(scaled - 1e-9) if up else round(scaled)
-    return float(f"{whole * unit:.2g}")
+    return float(f"{round(value / unit) * unit:.2g}")
 
 
 def facts(found: Study) -> list[str]:
@@ -110,23 +108,18 @@ def _cell(value: Any) -> Any:
     return float(f"{value:.5g}") if isinstance(value, float) else value
 
 
-def up(error: float) -> float:
-    """Error rounded upwards to two digits."""
-    return two_digits(error, up=True)
-
-
 def as_setting(row: Row) -> Setting:
     """Setting of a row: errors rounded upwards to two digits, speed rounded to two digits."""
     discretisation, nodes_per_limb, numerics = row.resolution
-    space, time = up(row.sure_space.path), up(row.sure_time.path)
+    space, time = rounded_up(row.sure_space.path), rounded_up(row.sure_time.path)
     return Setting(
         nodes_per_limb, numerics.scheme, numerics.step, numerics.newton_tolerance,
         errors={
-            "random": float(f"{space + time:.6g}"), "repeated": up(row.promise("gait")),
-            "small": up(row.promise("slow")), "straight": up(row.promise("straight")),
+            "random": float(f"{space + time:.6g}"), "repeated": rounded_up(row.promise("gait")),
+            "small": rounded_up(row.promise("slow")), "straight": rounded_up(row.promise("straight")),
         },
         typical=as_typical(row), space_error=space, time_error=time, speed=two_digits(row.speed),
-        heading_error=up(row.promise("heading")), end_error=up(row.promise("end")),
+        heading_error=rounded_up(row.promise("heading")), end_error=rounded_up(row.promise("end")),
         path_tolerance=numerics.path_tolerance, discretisation=discretisation, damping=numerics.damping,
     )  # fmt: skip
 
@@ -138,7 +131,7 @@ def as_typical(row: Row) -> dict[str, float]:
     """
     found = row.typical
     kinds = {"random": found.random, "repeated": found.gait, "small": found.slow, "straight": row.promise("straight")}
-    return {} if any(map(math.isnan, kinds.values())) else {name: up(error) for name, error in kinds.items()}
+    return {} if any(map(math.isnan, kinds.values())) else {name: rounded_up(error) for name, error in kinds.items()}
 
 
 def store_typical(rows: Sequence[Row], path: Path = chapter.STROKES) -> None:
@@ -187,6 +180,6 @@ def store(found: Study, path: Path = chapter.STROKES) -> None:
     settings = {resolution: as_setting(row) for resolution, row in rows.items()}
     Certificate(
         physics(Scene()), tuple(settings.values()), ("random",), ("random", "repeated"), Plan().n_random,
-        limit_error=up(settings[presets()["reference"]].space_error / 3.0), classes=CLASSES_VERSION,
+        limit_error=rounded_up(settings[presets()["reference"]].space_error / 3.0), classes=CLASSES_VERSION,
         version=__version__, machine=machine(), measured_over=measured_over(Plan()),
     ).save(path)  # fmt: skip

@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 from seastar_gym.accuracy import Certificate, Setting, chapter
 from seastar_gym.accuracy.certificate import CLASSES_VERSION
 from seastar_gym.accuracy.command import progress_bar
-from seastar_gym.accuracy.measure import Progress, machine, measure, path_lengths, swim_all
+from seastar_gym.accuracy.measure import Progress, machine, measure, path_lengths, rounded_up, swim_all
 from seastar_gym.accuracy.setting import at, physics
 from seastar_gym.scene import Numerics, Scene, SmaWires
 from seastar_gym.scene.numerics import PRESETS, Fidelity, Resolution
 from seastar_gym.version import __version__
 from studies.accuracy.page import PERIODS, timed
-from studies.accuracy.tables import two_digits, up
+from studies.accuracy.tables import two_digits
 from studies.frame import Results, Study
 from studies.pages import show
 
@@ -85,12 +85,12 @@ def setting(resolution: Resolution, space: Floats, time: Floats) -> Setting:
     """Setting of errors of space and of time, of random and then of as many repeated commands; rounded upwards."""
     discretisation, nodes_per_limb, numerics = resolution
     (random, repeated), (in_time, repeated_in_time) = np.split(space, 2), np.split(time, 2)
-    of_space, of_time = up(random.max()), up(in_time.max())
+    of_space, of_time = rounded_up(random.max()), rounded_up(in_time.max())
     medians = np.median(random + in_time), np.median(repeated + repeated_in_time)
     return Setting(
         nodes_per_limb, numerics.scheme, numerics.step, numerics.newton_tolerance,
-        errors={"random": of_space + of_time, "repeated": up(repeated.max() + repeated_in_time.max())},
-        typical={name: up(float(each)) for name, each in zip(("random", "repeated"), medians, strict=True)},
+        errors={"random": of_space + of_time, "repeated": rounded_up(repeated.max() + repeated_in_time.max())},
+        typical={name: rounded_up(float(each)) for name, each in zip(("random", "repeated"), medians, strict=True)},
         space_error=of_space, time_error=of_time, discretisation=discretisation, damping=numerics.damping,
     )  # fmt: skip
 
@@ -111,7 +111,7 @@ def study(period: float, plan: Plan) -> Certificate:
         settings = tuple(errors(period, plan, progress).values())
     return Certificate(
         physics(SCENE), settings, ("random",), ("random", "repeated"), plan.samples,
-        limit_error=up(min(each.space_error for each in settings) / 3.0), classes=CLASSES_VERSION,
+        limit_error=rounded_up(min(each.space_error for each in settings) / 3.0), classes=CLASSES_VERSION,
         version=__version__, machine=machine(), decision_period=period,
         measured_over={
             "command": "python -m studies.accuracy.timed --store",

@@ -27,7 +27,7 @@ from seastar_gym.controllers.planner import Branching
 from seastar_gym.controllers.registry import HELP, load_agents
 from seastar_gym.envs.commands import Actions, command_table
 from seastar_gym.envs.options import make_scene
-from seastar_gym.envs.paths import LINE_LENGTH, make_path
+from seastar_gym.envs.paths import LINE_LENGTH, WAYPOINT_RADIUS, make_path
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import action_table
 from seastar_gym.evaluation.many import swim_many
@@ -47,8 +47,6 @@ CHUNK = 4096
 """Gaits that are simulated in one batch."""
 STRAIGHT = np.radians(0.3)
 """Largest turn per stroke [rad] of a straight gait, which its mirror image or a rare other stroke can correct."""
-WAYPOINT_RADIUS = 0.01
-"""Distance of the hub from a waypoint at which it is reached [m]."""
 
 
 def distinct_gaits(period: int, actions: Actions, n_limbs: int = 5) -> Gaits:

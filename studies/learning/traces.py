@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from seastar_gym.controllers.registry import load_agents
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.swim import Swim
@@ -17,8 +18,6 @@ from studies.frame import InDocs, Results, Study
 from studies.style import apply_style
 
 AGENTS = ("learned", "pentagon")
-RADIUS = 0.01
-"""Radius of the waypoints [m]."""
 MOST_STROKES = 400
 UNIT = 1e-5
 """Length that counts as one in the data [m]."""
@@ -26,7 +25,7 @@ UNIT = 1e-5
 
 def swims(max_strokes: int = MOST_STROKES) -> list[Swim]:
     """The agents' swims at `balanced`."""
-    return evaluate(load_agents(AGENTS), max_strokes=max_strokes, waypoint_radius=RADIUS, say=lambda text: None)
+    return evaluate(load_agents(AGENTS), max_strokes=max_strokes, say=lambda text: None)
 
 
 def as_data(found: list[Swim]) -> dict[str, Any]:
@@ -60,7 +59,7 @@ def from_data(results: Mapping[str, Any]) -> list[Swim]:
 def draw(results: Mapping[str, Any], file: Path) -> None:
     """Write the picture."""
     apply_style()
-    draw_traces(from_data(results), RADIUS, file)
+    draw_traces(from_data(results), WAYPOINT_RADIUS, file)
 
 
 def run(_: InDocs, results: Results) -> None:

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.learned import bundled_file, load
+from seastar_gym.envs.headings import wrapped
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.rendering import limb_nodes
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.evaluation.playback import RecordingEnv
@@ -39,8 +41,6 @@ CYCLE = 2
 """Strokes of a straight gait, which alternates between two pairs."""
 SETTLING = 8
 """Strokes after which a gait is steady."""
-RADIUS = 0.01
-"""Radius of waypoints [m]."""
 SWIMS = ((0.2, "learned, five decisions a second"), (None, "learned, a stroke of the chapter each second"))
 """Time between decisions [s] of a bundled policy, and what the page calls its swim."""
 
@@ -95,7 +95,7 @@ def transitions(fidelity: Fidelity) -> dict[str, Any]:
         "nodes": packed(moved / UNIT),
         "frames": moved.shape[1],
         "hub": np.round(moved[:, -1, 0].reshape(*shape, 2), 6).tolist(),
-        "turn": np.round((turn - 2.0 * np.pi * np.rint(turn / (2.0 * np.pi))).reshape(shape), 5).tolist(),
+        "turn": np.round(wrapped(turn).reshape(shape), 5).tolist(),
         "commands": gaits.astype(int).tolist(),
     }
 
@@ -112,7 +112,7 @@ def recorded(decision_period: float | None, name: str, most: int | None = None) 
     policy = load(bundled_file(decision_period))
     env = RecordingEnv(
         frames_per_stroke=round(FRAMES_PER_SECOND * policy.decision_period),
-        actions=policy.actions, scene=policy.scene, decision_period=decision_period, waypoint_radius=RADIUS,
+        actions=policy.actions, scene=policy.scene, decision_period=decision_period, waypoint_radius=WAYPOINT_RADIUS,
     )  # fmt: skip
     swim(name, policy, env, max_strokes=10_000 if most is None else most, seed=0)
     frames = env.playback(name).frames
@@ -141,7 +141,7 @@ def record(fidelity: Fidelity = "balanced", most: int | None = None) -> dict[str
     """All that the page needs."""
     return {
         "unit": UNIT,
-        "radius": RADIUS,
+        "radius": WAYPOINT_RADIUS,
         "seen": SEEN,
         "limbs": N_LIMBS,
         "rate": FRAMES_PER_SECOND,

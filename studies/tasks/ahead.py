@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.greedy import Displacements, displacement_map, turned, waypoints_of
 from seastar_gym.controllers.planner import Branching, state_of
+from seastar_gym.envs.commands import unless_strokes
+from seastar_gym.envs.headings import wrapped
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.simulator import State
 
@@ -28,7 +30,7 @@ class Robots:
         inner = batch.unwrapped
         self.inner, self.scene, self.n = inner, inner.scene, inner.num_envs
         self.table, self.period = inner.command_table, inner.decision_period
-        self.in_strokes = self.period == self.scene.actuator.period
+        self.in_strokes = unless_strokes(self.period, self.scene) is None
         self._numbers = {command.tobytes(): k for k, command in enumerate(self.table + 0.0)}
         self._layout = inner.layout
 
@@ -70,8 +72,7 @@ class Odometer:
         self._hub, self._heading = hub, heading
         if before is None:
             return None
-        turn = heading - was
-        return turned(hub - before, -was), turn - 2.0 * np.pi * np.rint(turn / (2.0 * np.pi))
+        return turned(hub - before, -was), wrapped(heading - was)
 
 
 def few_commands(n_limbs: int) -> Floats:

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.evaluation.rollout import Info
 from studies.tasks.ahead import Robots
@@ -11,7 +12,6 @@ Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 Actions = NDArray[np.int64]
 
-WAYPOINT_RADIUS = 0.01
 
 
 def length(vectors: Floats) -> Floats:

@@ -32,9 +32,9 @@ def test_classes_are_drawn_for_any_number_of_limbs(n_limbs):
 
 
 def test_failed_robots_have_no_bound():
-    assert measure._rounded(np.inf) == np.inf
-    assert measure._rounded(0.0123) == 0.013
-    assert measure._rounded(0.012) == 0.012
+    assert measure.rounded_up(np.inf) == np.inf
+    assert measure.rounded_up(0.0123) == 0.013
+    assert measure.rounded_up(0.012) == 0.012
 
 
 def test_a_speed_is_the_simulated_time_of_all_robots_over_processor_time_the_best_of_three_strokes(monkeypatch):
@@ -68,7 +68,7 @@ def test_the_dearest_swims_begin_first_and_progress_is_the_share_of_their_cost(m
 
     monkeypatch.setattr(measure, "swim", swum)
     monkeypatch.setattr(measure, "GROUP", 3)
-    monkeypatch.setattr(measure.os, "cpu_count", lambda: 1)
+    monkeypatch.setattr(measure, "processors", lambda: 1)
     scenes = [resolved(SCENE, nodes, Numerics("sdirk2", step)) for nodes, step in ((5, 2e-2), (9, 2e-2), (5, 5e-3))]
     found = measure.swim_all(scenes, np.zeros((2, 4, 5)), shares.append)
     assert began == [(5, 5e-3, 3), (9, 2e-2, 3), (5, 5e-3, 1), (5, 2e-2, 3), (9, 2e-2, 1), (5, 2e-2, 1)]

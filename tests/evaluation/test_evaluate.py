@@ -15,7 +15,7 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from agents.evaluate import main
-from seastar_gym import TASKS, Scene, Seastar
+from seastar_gym import TASKS, Scene, Seastar, SmaPulse
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, save
 from seastar_gym.controllers.registry import load_agents
@@ -31,7 +31,7 @@ from seastar_gym.evaluation.films import CLOSING_SECONDS
 from seastar_gym.evaluation.measures import MEASURES, SECONDS, measure_of, measure_of_challenge
 from seastar_gym.evaluation.pictures import COLOURS, FPS, FRAMES_PER_STROKE
 from seastar_gym.evaluation.rollout import Episodes, TaskBatch, rollout
-from seastar_gym.evaluation.swim import RECORDED, Swim, swim, swims_of
+from seastar_gym.evaluation.swim import RECORDED, Swim, decisions_in, swim, swims_of
 from seastar_gym.evaluation.tasks import make_batch
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -90,6 +90,19 @@ def test_the_way_of_a_timed_swim_is_that_from_second_to_second():
     done = made_up_swim(hub, [0] * 6)
     assert replace(done, time=0.5 * done.time).hub_path_length == pytest.approx(0.04)
     assert done.hub_path_length == pytest.approx(0.08)
+
+
+def test_a_time_limit_counts_the_strokes_of_the_scenes_actuator():
+    short = Scene(actuator=SmaPulse(cooling_time=0.4))
+    assert [decisions_in(400.0, None, scene) for scene in (None, Scene(), short)] == [400, 400, 800]
+    assert decisions_in(400.0, 0.2, short) == 2000 and decisions_in(0.1, None, short) == 1
+
+
+def test_an_evaluation_ends_after_400_s_whatever_a_stroke_takes(monkeypatch):
+    monkeypatch.setattr("seastar_gym.evaluation.comparison.TIME_LIMIT", 4.0)
+    short = replace(Scene.preset("fast"), actuator=SmaPulse(cooling_time=0.4))
+    (done,) = evaluate({"rest": scripted("rest")}, scene=short, say=str)
+    assert done.strokes == 8 and done.time[-1] == pytest.approx(4.0)
 
 
 def test_unknown_energy_is_no_number():

@@ -9,7 +9,7 @@ import pytest
 
 from seastar_gym import Numerics, Scene
 from seastar_gym.accuracy import Certificate, chapter
-from seastar_gym.accuracy.measure import Errors, Swims, errors, path_lengths
+from seastar_gym.accuracy.measure import Errors, Swims, errors, path_lengths, rounded_up
 from seastar_gym.accuracy.measure import swim as swim_commands
 from seastar_gym.accuracy.setting import at
 from seastar_gym.gaits import PAIRS, STRAIGHT
@@ -222,7 +222,7 @@ def test_every_mesh_has_a_front_of_its_own():
 )
 def test_stored_figures_have_two_digits_and_errors_are_rounded_upwards(value, rounded, up):
     assert accuracy_tables.two_digits(value) == rounded
-    assert accuracy_tables.two_digits(value, up=True) == up
+    assert rounded_up(value) == up
 
 
 # The study

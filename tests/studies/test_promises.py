@@ -70,12 +70,6 @@ def test_the_table_promises_gaits_and_small_commands_their_own_errors():
         assert check.errors["random ternary"] <= check.errors["repeated ternary"] < check.errors["small"]
 
 
-def test_a_share_that_was_never_seen_may_still_be_there():
-    assert promises.largest_share(0, 59) == pytest.approx(0.05, abs=1e-3)
-    assert promises.largest_share(0, 1000) == pytest.approx(0.003, abs=1e-4)
-    assert promises.largest_share(7, 7) == 1.0
-
-
 def test_a_robot_that_is_done_is_not_swum_again(few_settings, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(measure, "SAMPLES", 2)
     monkeypatch.setattr(measure.certify, "__defaults__", (2, 0, None))
