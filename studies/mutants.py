@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from studies.frame import Results, Study, require_known
+from studies.frame import Results, Study
 
 ROOMS = {
     "seastar_gym/envs": "tests/envs", "seastar_gym/controllers": "tests/controllers",
@@ -34,6 +34,8 @@ ROOMS = {
     "seastar_gym/identify": "tests/identify",
 }  # fmt: skip
 """Rooms, or single files, and the folders of their tests."""
+SECONDS = 600.0
+"""Time limit of a mutant."""
 KERNELS = "simd.compilation"
 """Named by files whose code is compiled, and tested by differences and oracles. They are left out."""
 SWAPS: dict[type, tuple[str, str]] = {
@@ -340,22 +342,12 @@ class Options:
     """Number of mutants."""
     seed: int = 0
     """Which are drawn."""
-    rooms: tuple[str, ...] = tuple(ROOMS)
-    """Rooms."""
-    seconds: float = 600.0
-    """Time limit of a mutant."""
-    out: Path = Path("runs/mutants")
-    """Folder of the files, or the file of the numbers."""
-
-    def __post_init__(self) -> None:
-        require_known("room", self.rooms, ROOMS)
 
 
 def run(options: Options, results: Results) -> None:
     """Draw mutants and say which survive."""
-    rooms = {room: ROOMS[room] for room in options.rooms}
-    results.update(study(Path.cwd(), rooms, options.count, options.seed, options.seconds, options.out))
+    results.update(study(Path.cwd(), ROOMS, options.count, options.seed, SECONDS, results.out))
     print(json.dumps({name: value for name, value in results.items() if name != "mutants"}))
 
 
-STUDY = Study("mutants", run, Options, "mutants.json")
+STUDY = Study("mutants", run, Options, "mutants.json", Path("runs/mutants"))
