@@ -51,7 +51,7 @@ ACTUATORS = {
     "measured limb": SmaLimb.preset(20, period=1 / 3),
     "measured limbs of each robot": SmaLimb(0.5 * EACH, rise=9.0 * EACH, time_constant=0.7 * EACH),
     "thermal of each robot": ThermalSma(water_temperature=20.0 + EACH),
-    "limits of thermal of each robot": ThermalSma(largest_temperature=30.0 + 20.0 * EACH),
+    "limits of thermal of each robot": ThermalSma(steady_rise=220.0 * EACH, largest_temperature=30.0 + 20.0 * EACH),
 }
 PARTS = {
     "nothing": {},

@@ -197,7 +197,7 @@ FAR = (Attachment(1e200, 0.0, 0.0), Attachment(-1e200, 0.0, math.pi))
     [
         Body(radius=1e100),
         Body(radius=0.02, mass=1e308, centre_of_mass=(10.0, 0.0)),
-        Body(radius=0.02, centre_of_mass=(1e200, 0.0)),
+        Body(radius=0.02, centre_of_mass=(1e154, 1e154)),
         Body.rectangle(1e-3, 1e100),
         Body(attachments=FAR),
         Body(mass=1e-3, inertia=1e-320),

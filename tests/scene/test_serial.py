@@ -19,7 +19,7 @@ from seastar_gym import (
     Contact,
     DomainRandomization,
     GridCurrent,
-HeadingTargets,
+    HeadingTargets,
     Limb,
     Limited,
     LogUniform,
@@ -386,9 +386,9 @@ def nested(depth: int) -> list:
     return lists
 
 
-@pytest.mark.parametrize("depth", [100, 100_000])
-def test_what_is_nested_without_end_is_refused(depth):
-    with assert_refused("nested too deeply"):
+@pytest.mark.parametrize("depth, words", [(31, "A load is"), (32, "nested too deeply"), (100_000, "nested too deeply")])
+def test_what_is_nested_without_end_is_refused(depth, words):
+    with assert_refused(words):
         Scene.from_dict({**PLAIN, "loads": nested(depth)})
 
 

@@ -561,3 +561,13 @@ def test_what_touches_at_rest_is_refused():
     through = Body.rectangle(0.06, 1e-4, attachments=(Attachment(0.0, 5e-5, -1.6), Attachment(-0.03, 0.0, math.pi)))
     with assert_refused("limb 1 touches the body"):
         Scene(Seastar(2, 5, body=through), contact=Contact())
+    back = Body.rectangle(0.06, 0.03, attachments=(Attachment(0.03, 0.015, 1.0), Attachment(-0.03, 0.0, math.pi)))
+    with assert_refused("limb 1 touches the body"):  # the last 4 mm of an arc
+        Scene(Seastar(2, 5, body=back, limbs=(Limb(natural_curvature=45.0), Limb())), contact=Contact())
+
+
+def test_tips_that_face_each_other_at_rest_do_not_touch():
+    """Limbs 3.2 mm thick that end 4.5 mm from each other."""
+    facing = Attachment(0.03, 0.015, math.pi - 0.3), Attachment(-0.03, 0.015, 0.3)
+    body = Body.rectangle(0.06, 0.03, attachments=facing)
+    Scene(Seastar(2, 5, (0.03 - 0.00225) / math.cos(0.3), body=body), contact=Contact())

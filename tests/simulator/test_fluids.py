@@ -68,6 +68,7 @@ def test_a_linear_current_on_a_grid_is_the_current_itself():
         return 0.3 * (c * y - s * x) * c, 0.3 * (c * y - s * x) * s
 
     grid = GridCurrent.from_function(sheared, (-1.0, 1.0), (-1.0, 1.0), 0.1)
+    assert np.shape(grid.velocities) == (21, 21, 2)
     sampled, itself = replace(NONE, current=grid), replace(NONE, current=shear)
     np.testing.assert_allclose(swim(sampled), swim(itself), rtol=0.0, atol=1e-8)
 

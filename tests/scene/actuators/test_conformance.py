@@ -86,6 +86,11 @@ def test_every_robot_turns_as_its_own_actuators_do(name):
             turned, state = own.respond(t, its_commands, np.broadcast_to(own.rest, (5, *rest)))
             np.testing.assert_array_equal(found[0][:, robot], turned)
             np.testing.assert_array_equal(found[1][robot], state)
+            seen = each.observe(found[1])
+            np.testing.assert_array_equal(seen[robot], own.observe(state))
+            recalled = each.recall(seen)
+            if recalled is not None:
+                np.testing.assert_allclose(each.observe(recalled), seen, rtol=1e-12, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", REMEMBERING)
