@@ -104,8 +104,9 @@ def test_proposals_are_simulated_and_told(storage, tmp_path):
 
 def test_a_search_goes_on_where_it_was_and_keeps_to_its_number(sqlite, tmp_path):
     explore(SWEEP, Search(), sqlite, 5, tmp_path, Here())
-    study = explore(SWEEP, Search(), sqlite, 8, tmp_path, Here())
-    assert len(study.trials) == 8
+    seen = []
+    study = explore(SWEEP, Search(), sqlite, 8, tmp_path, Here(), lambda tally: seen.append(tally.designs))
+    assert len(study.trials) == 8 and seen[-1] == 3
     assert len(explore(SWEEP, Search(), sqlite, 8, tmp_path, Here()).trials) == 8
 
 
