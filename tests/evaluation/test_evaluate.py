@@ -15,6 +15,7 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from agents.evaluate import main
+from declared import assert_declared_as_recorded
 from seastar_gym import TASKS, Scene, Seastar, UniformCurrent
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, save
@@ -53,6 +54,10 @@ def made_up_swim(hub, waypoint_index, waypoints=((0.1, 0.0), (0.1, 0.1)), limbs_
         energy=np.full(len(hub) - 1, 1.5),
         solver_message=None,
     )
+
+
+def test_defaults_and_constants_are_declared_as_recorded():
+    assert_declared_as_recorded("seastar_gym.evaluation")
 
 
 # Measures of a swim
