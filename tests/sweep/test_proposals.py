@@ -119,7 +119,7 @@ def test_another_sweep_is_another_study(sqlite):
 
 def test_another_file_of_any_controller_is_another_study(sqlite, tmp_path):
     file = tmp_path / "second.zip"
-    axes = (*AXES[:2], Choices("controller", ("straight", str(file))))
+    axes = (*AXES[:2], Choices("controller", ("straight", "rest", str(file))))
 
     def study_name(contents):
         file.write_bytes(contents)
