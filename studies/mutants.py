@@ -31,7 +31,7 @@ from studies.frame import Results, Study
 ROOMS = {
     "seastar_gym/envs": "tests/envs", "seastar_gym/controllers": "tests/controllers",
     "seastar_gym/sweep": "tests/sweep", "seastar_gym/accuracy": "tests/accuracy",
-    "seastar_gym/identify": "tests/identify",
+    "seastar_gym/identify": "tests/identify", "seastar_gym/evaluation": "tests/evaluation",
 }  # fmt: skip
 """Rooms, or single files, and the folders of their tests."""
 SECONDS = 600.0

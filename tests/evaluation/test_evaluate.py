@@ -15,7 +15,8 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from agents.evaluate import main
-from seastar_gym import TASKS, Scene, Seastar, SmaPulse
+from declared import assert_declared_as_recorded
+from seastar_gym import TASKS, Scene, Seastar, SmaPulse, UniformCurrent
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, save
 from seastar_gym.controllers.registry import load_agents
@@ -26,6 +27,7 @@ from seastar_gym.envs.paths import PENTAGON_SIDE, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.tasks.envs import CHALLENGES
+from seastar_gym.evaluation import pictures
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.films import CLOSING_SECONDS
 from seastar_gym.evaluation.measures import MEASURES, SECONDS, measure_of, measure_of_challenge
@@ -52,6 +54,10 @@ def made_up_swim(hub, waypoint_index, waypoints=((0.1, 0.0), (0.1, 0.1)), limbs_
         energy=np.full(len(hub) - 1, 1.5),
         solver_message=None,
     )
+
+
+def test_defaults_and_constants_are_declared_as_recorded():
+    assert_declared_as_recorded("seastar_gym.evaluation")
 
 
 # Measures of a swim
@@ -193,10 +199,21 @@ def test_picture_shows_every_trace_in_its_colour(written):
 
 def test_picture_is_not_stretched_by_who_swims_far_away(tmp_path):
     agents = {"pentagon": scripted("pentagon"), "straight": scripted("straight")}
-    evaluate({"pentagon": agents["pentagon"]}, out=tmp_path / "one", video=False, **EASY)
+    evaluate({"pentagon": agents["pentagon"]}, out=tmp_path / "new" / "one", video=False, **EASY)
     evaluate(agents, out=tmp_path / "both", video=False, **EASY)
-    one, both = (imageio.imread(tmp_path / name / "traces.png").shape for name in ("one", "both"))
+    one, both = (imageio.imread(tmp_path / name / "traces.png").shape for name in ("new/one", "both"))
     assert both[0] > 0.7 * one[0]
+
+
+def test_picture_shows_its_view_and_the_current_there(monkeypatch):
+    (done, current), figures = (made_up_swim([(0.0, 0.0), (0.2, 0.0)], [0, 0]), UniformCurrent(1e-3, 0.0)), []
+    monkeypatch.setattr(pictures, "save_figure", lambda figure, *arguments, **options: figures.append(figure))
+    pictures.draw_traces([done], 2e-3, Path(), current)
+    axes, (low, high) = figures[0].axes[0], np.array([[-12.0, -12.0], [142.0, 112.0]])
+    assert [*axes.get_xlim(), *axes.get_ylim()] == pytest.approx([low[0], high[0], low[1], high[1]])
+    arrows = pictures.flow_in(current, low, high).arrows
+    np.testing.assert_allclose(axes.collections[0].get_offsets(), 1e3 * arrows[:, 0])
+    assert [text.get_text() for text in axes.texts] == ["start", "1", "2"]
 
 
 def frames_of(video):

@@ -17,7 +17,14 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.films import CLOSING_SECONDS, film, film_format, frequent_colours, shrunk, write_gif
 from seastar_gym.evaluation.playback import UNIT, RecordingEnv
-from seastar_gym.evaluation.report.charts import Curve, curves_figure, read_progress, speeds_figure, to_html
+from seastar_gym.evaluation.report.charts import (
+    Curve,
+    curves_figure,
+    paths_figure,
+    read_progress,
+    speeds_figure,
+    to_html,
+)
 from seastar_gym.evaluation.report.page import Remarks, ResultsTable, table_html, trials_table
 from seastar_gym.evaluation.results import COLUMNS, number
 from seastar_gym.evaluation.swim import swim
@@ -79,6 +86,7 @@ def test_a_recording_is_the_swim_in_frames():
     ends = np.array(packed["nodes"])[::4]
     np.testing.assert_allclose(ends[:, :2] * UNIT, done.hub, atol=0.51 * UNIT)
     np.testing.assert_allclose(packed["time"], np.arange(21) / 4, atol=0.02)  # the nearest time steps
+    assert packed["unit"] == "stroke"
     assert packed["commands"] == [[0] * 5, [0, 1, 0, 0, -1], [0, 1, 0, 0, -1], [0] * 5] + 2 * [[1, 0, -1, 0, 0]]
     assert packed["waypoint"][::4] == done.waypoint_index.tolist()
 
@@ -237,6 +245,7 @@ def test_a_curve_begins_with_the_untrained_policy():
     figure = curves_figure([Curve.of("a", [[0, 400, 0], *PROGRESS])], {})
     trace, unfinished = figure.data
     assert trace.x[0] == unfinished.x[0] == 0 and figure.layout.xaxis.rangemode == "tozero"
+    assert len(curves_figure([Curve.of("a", PROGRESS[1:])], {}).data) == 1  # all finished
 
 
 def test_a_training_without_a_checkpoint_has_no_curve():
@@ -248,7 +257,8 @@ def test_several_curves_have_their_median_and_range():
     finished = {"a": 170, "b": 160, "c": 180}
     curves = [Curve.of(name, [[1, 9, 4], [2, strokes, 5]]) for name, strokes in finished.items()]
     lowest, highest, median, *each, unfinished = curves_figure(curves, {"script": 241}).data
-    assert [list(one.y) for one in (lowest, highest, median)] == [[160], [180], [170]]  # common and finished: at 2
+    for trace, strokes in ((lowest, 160), (highest, 180), (median, 170)):  # common and finished: at 2
+        assert (list(trace.x), list(trace.y)) == ([2], [strokes])
     assert [one.name for one in each] == ["a", "b", "c"] and list(unfinished.x) == [1, 1, 1]
 
 
@@ -260,6 +270,11 @@ def test_speeds_of_one_sector_are_turned_and_mirrored_round():
         from_limb = theta % 72.0
         assert speed == {0.0: 4.0, 18.0: 5.0, 36.0: 3.0}[min(from_limb, 72.0 - from_limb)]
     assert trace.theta[-1] == trace.theta[0] and trace.r[-1] == trace.r[0]
+
+
+def test_every_waypoint_is_a_circle(evaluated):
+    circles = [[one.x0, one.x1, one.y0, one.y1] for one in paths_figure(evaluated[1], 2e-3).layout.shapes]
+    np.testing.assert_allclose(circles, [[18.0, 22.0, -2.0, 2.0], [18.0, 22.0, 18.0, 22.0]])
 
 
 def test_names_in_pictures_are_text_not_markup():
@@ -274,12 +289,12 @@ def test_command_line_writes_the_report_with_the_curves_of_runs(tmp_path, capsys
     run = tmp_path / "run"
     run.mkdir()
     (run / "progress.csv").write_text("1000,200,5\n2000,190,5\n")
-    arguments = ["--agents", "learned", "straight", "--max-strokes", "2", "--no-video", "--report", "--runs", str(run)]
-    arguments += ["--bound", str(tmp_path / "none.json")]  # the learned policy's speeds stand there too
+    arguments = ["--agents", "learned", "straight", "--waypoint-radius", "0.5", "--no-video", "--report", "--runs"]
+    arguments += [str(run), "--bound", str(tmp_path / "none.json")]  # the learned policy's speeds stand there too
     assert main([*arguments, "--fidelity", "fast", "--out", str(tmp_path / "out")]) == 0
     assert "report.html" in capsys.readouterr().out
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert '"name":"run"' in page and '"name":"learned"' not in page
+    assert '"name":"run"' in page and '"name":"learned"' not in page and "agent straight: 1" in page
     assert "python train.py" in page
     assert "seastar evaluate --video --out runs/evaluate --agents learned straight" in page
 
@@ -447,6 +462,7 @@ def test_it_fits_the_screen_with_equal_scales(open_offline, evaluated, size):
 def test_the_recorded_swims_are_plain_json(text):
     (recorded,) = re.findall(r"^const recorded = (.*);$", text, flags=re.MULTILINE)
     assert [one["agent"] for one in json.loads(recorded)["swims"]] == ["straight", STRAY]
+    assert json.loads(recorded)["path"] == [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0]]
 
 
 # Films have their pictures, in their order and for their time.

@@ -16,7 +16,7 @@ from seastar_gym.envs.options import SwimOptions, make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.evaluation import results, statistics
-from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
+from seastar_gym.evaluation.disturbances import DISTURBANCES, Disturbance, DisturbedTask
 from seastar_gym.evaluation.many import swim_many
 from seastar_gym.evaluation.swim import swim
 
@@ -50,13 +50,14 @@ def test_nothing_disturbed_is_the_task_itself():
     np.testing.assert_array_equal(hubs_of(task), plain.simulator.hub_position())
 
 
-def test_a_current_carries_the_robots_its_own_way_and_the_waypoints_stay():
-    task, speed = disturbed(current=1e-3), 1e-3
+@pytest.mark.parametrize("mm_per_s", [0.5, 1.5])
+def test_a_current_carries_the_robots_its_own_way_and_the_waypoints_stay(mm_per_s):
+    task, speed = disturbed(**vars(DISTURBANCES[f"current of {mm_per_s} mm/s"])), 1e-3 * mm_per_s
     first, at = task.observe(), Layout.of(FAST)
     np.testing.assert_allclose(first[:, at.hub_velocity], 0.0, atol=1e-6)  # at rest in the world
     np.testing.assert_array_equal(first[:, at.waypoints], disturbed().observe()[:, at.waypoints])
     waypoint, hubs = np.linalg.norm(first[:, at.current_waypoint], axis=1), []
-    for _ in range(40):
+    for _ in range(80):
         task.step(np.zeros((N, 5)))
         hubs.append(hubs_of(task))
     angles = 2.0 * np.pi * np.arange(N) / 8
@@ -82,7 +83,7 @@ def test_a_current_is_seen_in_the_hubs_velocity_whatever_actuators_remember():
 
 def test_every_limb_is_the_weak_one_of_some_robot():
     commands = np.tile([1.0, -1.0, 1.0, -1.0, 1.0], (N, 1))
-    weak = disturbed(weakness=0.5)
+    weak = disturbed(**vars(DISTURBANCES["a limb at half strength"]))
     np.testing.assert_array_equal(weak.step(commands).commands, commands)
     strengths = np.ones((N, 5))
     strengths[np.arange(N), np.arange(N) % 5] = 0.5
@@ -94,7 +95,7 @@ def test_every_limb_is_the_weak_one_of_some_robot():
 
 
 def test_noise_is_on_positions_and_has_its_size():
-    noisy, clean = disturbed(noise=1e-3).observe(), disturbed().observe()
+    noisy, clean = disturbed(**vars(DISTURBANCES["1 mm of noise"])).observe(), disturbed().observe()
     error = 0.1 * (noisy - clean)
     np.testing.assert_array_equal(error[:, 90:182], 0.0)  # velocities
     assert error[:, :90].std() == pytest.approx(np.sqrt(2.0) * 1e-3, rel=0.15)  # a node's and the hub's
@@ -103,10 +104,11 @@ def test_noise_is_on_positions_and_has_its_size():
 
 
 def test_lost_strokes_are_lost_whole_and_as_often_as_said():
-    task, commands = disturbed(lost=0.25), np.tile([0.0, 1.0, 0.0, 0.0, -1.0], (N, 1))
+    lost_strokes = DISTURBANCES["every tenth stroke lost"]
+    task, commands = disturbed(**vars(lost_strokes)), np.tile([0.0, 1.0, 0.0, 0.0, -1.0], (N, 1))
     carried_out = np.array([task.step(commands).commands for _ in range(30)])
     lost = (carried_out == 0.0).all(axis=2)
-    assert lost.mean() == pytest.approx(0.25, abs=0.06)
+    assert lost.mean() == pytest.approx(0.1, abs=0.04)
     np.testing.assert_array_equal(carried_out[~lost], np.broadcast_to(commands, carried_out.shape)[~lost])
 
 

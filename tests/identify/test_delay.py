@@ -110,6 +110,8 @@ def test_between_strokes_and_before_and_after_them_the_robot_coasts():
     simulator.advance(0.5)
     np.testing.assert_array_equal(found[:2], 0.0)
     np.testing.assert_allclose(found[2:], [before, simulator.hub_position()[0]], atol=1e-7)
+    seen_before_the_last = trajectory(np.array([0.0, 2.5]), (0,), COMMANDS[:2], SCENE, np.array([1.0, 4.0]))
+    np.testing.assert_allclose(seen_before_the_last[1, 0], before, atol=1e-7)
 
 
 def test_pictures_whose_clock_is_behind_see_the_robot_coast_after_its_last_stroke():

@@ -569,6 +569,8 @@ def test_the_covariance_is_at_least_that_of_independent_errors():
     independent = residuals @ residuals / 97 * np.linalg.inv(jacobian.T @ jacobian)
     found = uncertainty_of(jacobian, residuals, times).covariance
     assert np.linalg.eigvalsh(found - independent).min() > -1e-12 * np.trace(found)
+    in_millimetres = uncertainty_of(jacobian, 1e3 * residuals, times).covariance
+    np.testing.assert_allclose(in_millimetres, 1e6 * found, rtol=1e-9)
 
 
 def test_errors_that_are_the_same_in_both_coordinates_count_once():

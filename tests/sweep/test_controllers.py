@@ -11,6 +11,7 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym.controllers.learned import BUNDLED, load
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.swim import swim as swim_one
 from seastar_gym.executors.processes import Processes
@@ -64,6 +65,8 @@ def test_who_does_not_arrive_has_no_time_and_the_speed_of_what_is_reached():
     (batch,) = sweep_of("rest", route=replace(SHORT, seconds=3.0)).batches()
     found = swim(batch)
     assert np.isnan(found["time"][0]) and found["waypoints"][0] == 0.0 == found["speed"][0]
+    timed = sweep_of("rest", scene=make_scene(None, "fast", 0.5), route=Route(seconds=3.0, decision_period=0.5))
+    assert [each.configuration.controller.decisions for each in (batch, *timed.batches())] == [3, 6]
 
 
 def test_a_cell_is_named_by_its_controller_and_what_that_swims(policy):
@@ -77,7 +80,7 @@ def test_a_cell_is_named_by_its_controller_and_what_that_swims(policy):
     facts = json.loads(description.read_text())
     description.write_text(json.dumps(facts | {"training": {}}))
     others.append(names(sweep_of(str(policy))))
-    assert first == names(sweep_of("learned"))
+    assert first == names(sweep_of("learned")) == names(sweep_of("learned", route=replace(SHORT, decision_period=1.0)))
     assert len({*first, *file, *(name for each in others for name in each)}) == 7
 
 

@@ -104,8 +104,9 @@ def test_proposals_are_simulated_and_told(storage, tmp_path):
 
 def test_a_search_goes_on_where_it_was_and_keeps_to_its_number(sqlite, tmp_path):
     explore(SWEEP, Search(), sqlite, 5, tmp_path, Here())
-    study = explore(SWEEP, Search(), sqlite, 8, tmp_path, Here())
-    assert len(study.trials) == 8
+    seen = []
+    study = explore(SWEEP, Search(), sqlite, 8, tmp_path, Here(), lambda tally: seen.append(tally.designs))
+    assert len(study.trials) == 8 and seen[-1] == 3
     assert len(explore(SWEEP, Search(), sqlite, 8, tmp_path, Here()).trials) == 8
 
 
@@ -118,7 +119,7 @@ def test_another_sweep_is_another_study(sqlite):
 
 def test_another_file_of_any_controller_is_another_study(sqlite, tmp_path):
     file = tmp_path / "second.zip"
-    axes = (*AXES[:2], Choices("controller", ("straight", str(file))))
+    axes = (*AXES[:2], Choices("controller", ("straight", "rest", str(file))))
 
     def study_name(contents):
         file.write_bytes(contents)
