@@ -2,10 +2,12 @@
 
     python -m studies                   lists the studies
     python -m studies NAME [options]    runs one; `python -m studies.NAME` is the same
+    python -m studies NAME --out OUT    writes into the folder OUT, or the numbers into the file OUT
     python -m studies [NAME] --check    names pictures and pages in docs/ that are not what the numbers beside them say
     python -m studies [NAME] --draw     draws and fills them again, in seconds and without running a study
 """
 
+import argparse
 import ast
 import importlib
 import shlex
@@ -49,22 +51,33 @@ def all_studies() -> Iterator[Study]:
     return (module_of(name).STUDY for name in declared())
 
 
-def run(study: Study, given: Sequence[str], doc: str) -> int:
-    """Run a study as its command line says; returns the exit code. doc: What its help begins with, in full lines."""
+def options_of(study: Study, given: Sequence[str], prog: str, doc: str) -> tuple[Any, ...]:
+    """The options as a command line has them, if the study has any; ends with the help if that is asked for."""
+    if {"-h", "--help"} & set(given):
+        text = f"{doc}\n\n--out OUT: folder of the files, or file of the numbers; by default {study.default_out}."
+        print(command_parser(prog, text).description, end="\n\n")
+    if study.options is None:
+        argparse.ArgumentParser(prog).parse_args(given)
+        return ()
+    return (tyro.cli(study.options, prog=prog, args=given),)
+
+
+def run(study: Study, given: Sequence[str], doc: str, out: Path | None = None) -> int:
+    """Run a study as its command line says; returns the exit code.
+
+    doc: What its help begins with, in full lines. out: Where --out says that it writes.
+    """
     if study.run is None:
         raise ValueError("There is nothing to run: --check or --draw.")
     prog = f"python -m studies.{study.name}"
-    if {"-h", "--help"} & set(given):
-        print(command_parser(prog, doc).description, end="\n\n")
-    options = study.with_folder(tyro.cli(study.options, prog=prog, args=given))
-    out = Path(getattr(options, "out", "."))
+    options, out = options_of(study, given, prog, doc), out or study.default_out
     file = study.place(out, study.file) if study.file else None
     command = prog if study.settings else shlex.join([*prog.split(), *given])
     if study.extra:
         require_extra(f"Runs of {prog}", study.extra, *study.packages)
     about = provenance(command, *study.packages)
-    results = Results(about, file, study.settings(options) if study.settings else None)
-    failed = study.run(options, results)
+    results = Results(about, file, study.settings(*options) if study.settings else None, out)
+    failed = study.run(*options, results)
     if results.keys() - {"settings"} and file is not None:
         told(study, results, out, file)
     if failed:
@@ -87,14 +100,18 @@ def told(study: Study, results: Results, out: Path, file: Path) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
-    given, names = list(sys.argv[1:] if arguments is None else arguments), declared()
+    parser, names = argparse.ArgumentParser("python -m studies", add_help=False, allow_abbrev=False), declared()
+    parser.add_argument("--check", action="store_true")
+    parser.add_argument("--draw", action="store_true")
+    parser.add_argument("--out", type=Path)
+    asked, given = parser.parse_known_args(arguments)
     name = given.pop(0) if given and given[0] in names else ""
     try:
-        if {"--check", "--draw"} & set(given):
+        if asked.check or asked.draw:
             chosen = [study for study in all_studies() if name in ("", study.name)]
-            return check(DOCS, chosen) if "--check" in given else draw(DOCS, chosen)
+            return check(DOCS, chosen) if asked.check else draw(DOCS, chosen)
         if name:
-            return run(module_of(name).STUDY, given, module_of(name).__doc__)
+            return run(module_of(name).STUDY, given, module_of(name).__doc__, asked.out)
         require_known("study", [each for each in given[:1] if each not in ("-h", "--help")], names)
     except (ValueError, ModuleNotFoundError) as wrong:
         print(wrong, file=sys.stderr)

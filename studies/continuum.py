@@ -22,7 +22,7 @@ from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene import Contact, Limb, Numerics, Scene, Seastar, SmaPulse, Vortex, Water
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
-from studies.frame import InDocs, Results, Study
+from studies.frame import Results, Study
 from studies.results_file import rounded
 from studies.style import DPI, INK, PERCENT, as_percent, subplots
 
@@ -198,7 +198,7 @@ def draw(rows: list[Row], path: Path) -> None:
     figure.savefig(path, dpi=DPI)
 
 
-def run(options: InDocs, results: Results) -> str | None:
+def run(results: Results) -> str | None:
     """Measure all scenes."""
     with tqdm(total=len(NAMES), unit="scene") as bar:
         rows = measure(NAMES, bar)

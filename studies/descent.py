@@ -30,7 +30,7 @@ from seastar_gym.identify import Measurement, identify
 from seastar_gym.scene import Contact, Limb, Scene, SmaWires
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.per_robot import with_numbers
-from studies.frame import DOCS, RESULTS, InDocs, Results, Study
+from studies.frame import DOCS, RESULTS, Results, Study
 from studies.results_file import rounded
 
 Floats = NDArray[np.float64]
@@ -277,12 +277,12 @@ CELLS: dict[tuple[str, str], Callable[[], Any]] = {
 }
 
 
-def settings(options: InDocs) -> dict[str, float]:
+def settings() -> dict[str, float]:
     """What all numbers have in common."""
     return {"largest_change": LARGEST, "tries": TRIES, "uneven": UNEVEN, "strokes_fitted": SWUM}
 
 
-def run(options: InDocs, results: Results) -> str | None:
+def run(results: Results) -> str | None:
     """Compute what is missing."""
     results.fill(CELLS, str)
     return None

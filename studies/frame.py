@@ -7,7 +7,7 @@ its room, whose module is `study`.
 import json
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,22 +19,17 @@ RESULTS = Path("results")
 
 
 @dataclass(frozen=True)
-class InDocs:
-    """Options of a study that writes where docs/ has its numbers. Alone, of a study that has no others."""
-
-    out: Path = Path("docs") / RESULTS
-    """Folder of the files, or the file of the numbers; by default the study's folder there."""
-
-
-@dataclass(frozen=True)
 class Study:
     """A study: what it runs, what it keeps, and what follows from the numbers that it keeps.
 
     name: As the command has it: the module's without "studies." and ".study".
-    run: Computes and fills the results; returns a sentence if something failed. None: there is nothing to run.
-    options: Dataclass of the options. One of them may be `out`: the folder of the files, or the file of the numbers.
+    run: Computes and fills the results, which come after the options; returns a sentence if something failed. None:
+        there is nothing to run.
+    options: Dataclass of the options, without --out, which every study has. None: there are no others.
     file: File of the numbers as docs/results/ has it, such as "learning/bound.json"; empty for none.
-    settings: What all numbers of a file have in common. A study that tells it goes on with the file that is there.
+    out: Where a run writes unless --out says; by default the folder that docs/ has for the numbers.
+    settings: What all numbers of a file have in common, of the options if there are any. A study that tells it goes on
+        with the file that is there.
     pictures: By their names, how they are drawn from the numbers into a file beside them.
     tables: By the names that pages give them, tables in Markdown.
     drawn: Pictures in docs/results/ that only a run draws.
@@ -43,10 +38,11 @@ class Study:
     """
 
     name: str
-    run: Callable[[Any, "Results"], str | None] | None = None
-    options: type[Any] = InDocs
+    run: Callable[..., str | None] | None = None
+    options: type[Any] | None = None
     file: str = ""
-    settings: Callable[[Any], Mapping[str, Any]] | None = None
+    out: Path | None = None
+    settings: Callable[..., Mapping[str, Any]] | None = None
     pictures: Mapping[str, Callable[[Any, Path], None]] = field(default_factory=dict)
     tables: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
     drawn: tuple[str, ...] = ()
@@ -62,10 +58,10 @@ class Study:
         """File of the numbers, or picture, in a folder such as docs/."""
         return self.place((docs / RESULTS / self.file).parent, name)
 
-    def with_folder(self, options: Any) -> Any:
-        """The options, with the study's folder where they name that of all studies."""
-        is_of_all = isinstance(options, InDocs) and options.out == InDocs.out
-        return replace(options, out=options.out / Path(self.file).parent) if is_of_all else options
+    @property
+    def default_out(self) -> Path:
+        """Where a run writes unless --out says."""
+        return self.out or (Path("docs") / RESULTS / self.file).parent
 
     def write(self, results: Any, out: Path) -> list[Path]:
         """Draw the pictures; returns their files."""
@@ -78,11 +74,18 @@ class Results(dict[str, Any]):
     """Numbers of a study, which begin with those of its file if the study resumes.
 
     about: Command, machine and versions, which head the file. file: None for numbers that are not kept.
+    out: The folder for what else a run writes, or a file.
     """
 
-    def __init__(self, about: Mapping[str, Any], file: Path | None = None, settings: Mapping[str, Any] | None = None):
+    def __init__(
+        self,
+        about: Mapping[str, Any],
+        file: Path | None = None,
+        settings: Mapping[str, Any] | None = None,
+        out: Path = Path(),
+    ):
         super().__init__()
-        self.about, self.file = about, file
+        self.about, self.file, self.out = about, file, out
         if settings is not None:
             self["settings"] = dict(settings)
             self.read()

@@ -6,7 +6,6 @@ With `--device scalar` the device's code swims on the processor, and nothing els
 """
 
 import multiprocessing
-import os
 import time
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
@@ -37,7 +36,7 @@ from seastar_gym.scene import (
 from seastar_gym.scene.numerics import Fidelity, SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study, require_known
+from studies.frame import Results, Study
 from studies.results_file import rounded
 from studies.speed.operations import count_operations, numbers_moved
 from studies.speed.terms import scenes as scenes_of_terms
@@ -283,26 +282,17 @@ class Options:
 
     device: str = "cuda"
     """"cuda", or "scalar", which compares bits alone."""
-    names: tuple[str, ...] = ()
-    """Scenes and environments to compare; all by default."""
-    processes: int = os.cpu_count() or 1
-    """Processes that compare at the same time."""
-    out: Path = Path("runs/gpu")
-    """Folder of the files."""
 
 
 def run(options: Options, results: Results) -> str | None:
     """Compare all scenes, and measure, but for what is in the file; what is measured is kept at once."""
-    known = scenes() | environments()
-    names = options.names or tuple(known)
-    require_known("scene", names, known)
     if options.device == "cuda":
         results["gpu"] = gpu()
     context = multiprocessing.get_context("spawn")
     bits, observations = results.setdefault("bits", {}), results.setdefault("observations", {})
-    with ProcessPoolExecutor(options.processes, context) as pool:
+    with ProcessPoolExecutor(mp_context=context) as pool:
         for kept, compare, ours in ((bits, compared, scenes()), (observations, observed, environments())):
-            missing = [name for name in names if name in ours and name not in kept]
+            missing = [name for name in ours if name not in kept]
             for name, found in zip(missing, pool.map(compare, missing, [options.device] * len(missing)), strict=True):
                 kept[name] = found
                 told = "same bits" if found["same"] else ", ".join(found["differing"])
@@ -395,5 +385,6 @@ def settings(options: Options) -> dict[str, Any]:
 
 
 STUDY = Study(
-    "gpu", run, Options, file="speed/gpu.json", settings=settings, pictures={"gpu.png": draw}, tables={"gpu": speeds}
-)
+    "gpu", run, Options, file="speed/gpu.json", out=Path("runs/gpu"), settings=settings,
+    pictures={"gpu.png": draw}, tables={"gpu": speeds},
+)  # fmt: skip

@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 from typing import Any, get_args
@@ -75,15 +74,7 @@ def facts(told: str) -> dict[str, int]:
     return dict(zip(("stack", "spill_stores", "spill_loads", "registers"), map(int, found.groups()), strict=True))
 
 
-@dataclass(frozen=True)
-class Options:
-    """Registers that the code for GPUs needs."""
-
-    out: Path = Path("runs/gpu_code")
-    """Folder of the file."""
-
-
-def run(_: Options, results: Results) -> str | None:
+def run(results: Results) -> str | None:
     """Compile and assemble the code of some scenes for every architecture."""
     ptxas = assembler()
     if ptxas is None:
@@ -111,4 +102,4 @@ def registers(results: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-STUDY = Study("gpu_code", run, Options, file="speed/gpu_code.json", tables={"gpu_code": registers})
+STUDY = Study("gpu_code", run, file="speed/gpu_code.json", out=Path("runs/gpu_code"), tables={"gpu_code": registers})

@@ -31,7 +31,7 @@ from seastar_gym.gradients import differentiate, record
 from seastar_gym.scene import Contact, Scene, SmaWires, Vortex, Water
 from seastar_gym.scene.per_robot import at, side_by_side, with_numbers
 from seastar_gym.simulator import Simulator
-from studies.frame import InDocs, Results, Study
+from studies.frame import Results, Study
 from studies.results_file import rounded
 from studies.style import DPI, INK, subplots
 
@@ -263,12 +263,12 @@ def cost_table(results: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def settings(options: InDocs) -> dict[str, float]:
+def settings() -> dict[str, float]:
     """What all numbers have in common."""
     return {"strokes": STROKES, "swims": SWIMS, "newton_tolerance": NEWTON_TOLERANCE, "timed_strokes": SWUM}
 
 
-def run(options: InDocs, results: Results) -> str | None:
+def run(results: Results) -> str | None:
     """Measure all cases and costs that are missing."""
     cases = {
         ("growth", name): partial(lambda case: as_data(growth(case, STROKES, SWIMS)), CASES[name]) for name in CASES

@@ -344,8 +344,6 @@ class Options:
     """Rooms."""
     seconds: float = 600.0
     """Time limit of a mutant."""
-    out: Path = Path("runs/mutants")
-    """Folder of the files, or the file of the numbers."""
 
     def __post_init__(self) -> None:
         require_known("room", self.rooms, ROOMS)
@@ -354,8 +352,8 @@ class Options:
 def run(options: Options, results: Results) -> None:
     """Draw mutants and say which survive."""
     rooms = {room: ROOMS[room] for room in options.rooms}
-    results.update(study(Path.cwd(), rooms, options.count, options.seed, options.seconds, options.out))
+    results.update(study(Path.cwd(), rooms, options.count, options.seed, options.seconds, results.out))
     print(json.dumps({name: value for name, value in results.items() if name != "mutants"}))
 
 
-STUDY = Study("mutants", run, Options, "mutants.json")
+STUDY = Study("mutants", run, Options, "mutants.json", Path("runs/mutants"))

@@ -39,7 +39,7 @@ from seastar_gym.plant.simulated import SimulatedPlant
 from seastar_gym.plant.swim import PlantSwim
 from seastar_gym.scene.per_robot import with_numbers
 from studies.accuracy.page import markdown
-from studies.frame import InDocs, Results, Study
+from studies.frame import Results, Study
 
 Floats = NDArray[np.float64]
 
@@ -329,7 +329,7 @@ def _span(found: list[float]) -> str:
     return f"{np.mean(found):.1f} ({min(found):.1f} to {max(found):.1f})"
 
 
-def run(_: InDocs, results: Results) -> None:
+def run(results: Results) -> None:
     """Take the steps that are missing."""
     results.read()
     results.fill({("bench",): wires}, lambda found: f"{np.mean(found['peak_angle']):.3f} rad")

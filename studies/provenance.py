@@ -43,7 +43,7 @@ COMMANDS = {
     "gaits/gaits.json": "python -m studies.gaits",
     "gaits/heading.json": "python -m studies.learning.heading",
     "designs/hub.json": "python -m studies.designs.hub",
-    "validation/limbs.json": "python -m studies.measurements.limbs --models --swims",
+    "validation/limbs.json": "python -m studies.measurements.limbs",
     "accuracy/promises.json": "python -m studies.accuracy.promises",
     "tasks/tasks.json": "python -m studies.tasks",
     "validation/validation.json": "python -m studies.validation",

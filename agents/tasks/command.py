@@ -44,7 +44,7 @@ FAR_SEED = 10**6
 class Options:
     """Train the policy of every task for the box, and write its card."""
 
-    ids: tuple[str, ...] = tuple(RECIPES)
+    tasks: tuple[str, ...] = tuple(RECIPES)
     """Environments."""
     seeds: tuple[int, ...] = (0, 1)
     """Seeds of the trainings, of which the best is published."""
@@ -60,7 +60,7 @@ class Options:
     """Folder of the policies."""
 
     def __post_init__(self) -> None:
-        if unknown := set(self.ids) - set(RECIPES):
+        if unknown := set(self.tasks) - set(RECIPES):
             raise ValueError(f"{min(unknown)!r} has no bundled policy: choose of {', '.join(RECIPES)}.")
         require_count("decisions", self.decisions, 1, 10**9)
         if not self.seeds:
@@ -130,7 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def train_all() -> None:
         options = tyro.cli(Options, prog="python -m agents.tasks", args=given)
-        for id in options.ids:
+        for id in options.tasks:
             if not options.cards_only:
                 publish(id, options, shlex.join(["python", "-m", "agents.tasks", *given]))
             file = file_of(id, options.out)

@@ -28,7 +28,7 @@ from seastar_gym.scene.numerics import DAMPING, PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from studies.accuracy.settings import MS
 from studies.accuracy.work_precision import cost, draw_sequences, finite
-from studies.frame import InDocs, Results, Study
+from studies.frame import Results, Study
 from studies.results_file import rounded
 from studies.style import PERCENT
 
@@ -126,7 +126,7 @@ def examine(name: str) -> dict[str, Any]:
     }
 
 
-def run(_: InDocs, results: Results) -> None:
+def run(results: Results) -> None:
     """Examine the contacts that are missing."""
     for what, of in (("thrown", thrown), ("bounds", bound), ("contacts", examine)):
         results.fill({(what, name): partial(of, name) for name in KINDS}, str)
@@ -158,6 +158,6 @@ STUDY = Study(
     "accuracy.contact",
     run,
     file="accuracy/contact.json",
-    settings=lambda _: {"sequences": 14},
+    settings=lambda: {"sequences": 14},
     tables={"contact": table},
 )

@@ -13,7 +13,6 @@ Writes the numbers as JSON and a picture.
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,7 +27,7 @@ from seastar_gym.scene import Numerics, Scene, Seastar, Water, relaxation_time
 from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.error_bars import factor
-from studies.frame import InDocs, Results, Study
+from studies.frame import Results, Study
 from studies.style import FAINT, INK, PERCENT, subplots
 
 Floats = NDArray[np.float64]
@@ -60,8 +59,8 @@ TRUE = Resolution("continuum", 73, SHORT)
 """What stands for the continuum: twice the edges of the finest twin, half its steps."""
 LEVEL = 0.95
 """Share of strokes that estimates are to cover."""
-SAMPLES = 6
-"""Sequences per class."""
+SAMPLES, SEEDS = 6, (1000, 3000)
+"""Sequences per class, and the seeds of calibration and test."""
 SMALLEST = 1e-12
 """True errors [m] below it are rounding."""
 
@@ -217,22 +216,12 @@ def draw(rows: list[Row], path: Path) -> None:
     figure.savefig(path, dpi=130)
 
 
-@dataclass(frozen=True)
-class Options(InDocs):
-    """Coverage and sharpness of error bars."""
-
-    samples: int = SAMPLES
-    """Sequences per class."""
-    seeds: tuple[int, int] = (1000, 3000)
-    """Of calibration and test."""
-
-
-def run(options: Options, results: Results) -> str | None:
+def run(results: Results) -> str | None:
     """Measure all robots."""
     with tqdm(total=len(ROBOTS), unit="robot") as bar:
-        rows = measure(tuple(ROBOTS), options.samples, options.seeds, bar)
+        rows = measure(tuple(ROBOTS), SAMPLES, SEEDS, bar)
     costs = {name: round(cost(setting), 3) for name, setting in SETTINGS.items()}
-    results.update(samples=options.samples, costs=costs, rows=[row._asdict() for row in rows])
+    results.update(samples=SAMPLES, costs=costs, rows=[row._asdict() for row in rows])
     failed = not all(math.isfinite(row.needed) for row in rows)
     return "The solver failed on a robot, see the table." if failed else None
 
@@ -240,8 +229,7 @@ def run(options: Options, results: Results) -> str | None:
 STUDY = Study(
     "accuracy.error_bars",
     run,
-    Options,
-    "accuracy/error_bars.json",
+    file="accuracy/error_bars.json",
     pictures={"error_bars.png": lambda results, file: draw(rows_of(results), file)},
     tables={"error_bars robots": of_robots, "error_bars settings": of_settings},
     drawn=("accuracy/error_bars.png",),

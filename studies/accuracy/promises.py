@@ -16,7 +16,6 @@ again.
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
@@ -33,7 +32,7 @@ from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 from studies.accuracy.error_bars import ROBOTS
-from studies.frame import InDocs, Results, Study, require_known
+from studies.frame import Results, Study
 
 Floats = NDArray[np.float64]
 
@@ -173,31 +172,24 @@ def _cells(found: dict[str, Any]) -> list[tuple[str, dict[tuple[str, str], int]]
     return [(kind, some) for kind, some in kinds if some]
 
 
-@dataclass(frozen=True)
-class Options(InDocs):
-    """Exceedances of certified errors."""
+def run(
+    results: Results,
+    samples: int = SAMPLES,
+    robots: Sequence[str] = tuple(ROBOTS),
+    certificates: Path = Path("runs/certificates"),
+) -> None:
+    """Examine the robots that are missing. ValueError where the file is of other sequences or another version.
 
-    samples: int = SAMPLES
-    """Fresh sequences per class."""
-    robots: tuple[str, ...] = tuple(ROBOTS)
-    """Robots."""
-    certificates: Path = Path("runs/certificates")
-    """Folder of certificates."""
-
-    def __post_init__(self) -> None:
-        require_known("robot", self.robots, ROBOTS)
-
-
-def run(options: Options, results: Results) -> None:
-    """Examine the robots that are missing. ValueError where the file is of other sequences or another version."""
-    wanted = {"samples": options.samples, "seed": SEED, "classes": CLASSES_VERSION, "version": __version__}
+    samples: Fresh sequences per class. certificates: Folder where they are kept.
+    """
+    wanted = {"samples": samples, "seed": SEED, "classes": CLASSES_VERSION, "version": __version__}
     results.read()
     if results and {key: results.get(key) for key in wanted} != wanted:
         raise ValueError(f"{results.file} has results of other sequences or another version: give another --out.")
     results.update(wanted)
-    cells = {("robots", name): partial(examine, name, options.certificates, options.samples) for name in options.robots}
+    cells = {("robots", name): partial(examine, name, certificates, samples) for name in robots}
     results.fill(cells, lambda found: f"{found['seconds']} s")
     print(summary(results))
 
 
-STUDY = Study("accuracy.promises", run, Options, "accuracy/promises.json", tables={"promises": table})
+STUDY = Study("accuracy.promises", run, file="accuracy/promises.json", tables={"promises": table})

@@ -32,8 +32,8 @@ from studies.accuracy.convergence import measured, rows_of, second_opinion
 from studies.accuracy.pictures import draw_all
 from studies.accuracy.rows import Row, promised
 from studies.accuracy.rows import Study as Found
-from studies.accuracy.settings import QUICK, Plan, presets, settings
-from studies.accuracy.tables import as_markdown, store, store_typical, write_csv
+from studies.accuracy.settings import QUICK, Plan, settings
+from studies.accuracy.tables import as_markdown, store, write_csv
 from studies.frame import Results, Study
 from studies.pages import show
 
@@ -61,13 +61,6 @@ def sequences(plan: Plan, rng: np.random.Generator) -> Cases:
     return joined(some, gaits(), random_gaits(plan.n_gaits, rng))
 
 
-def typical_rows(plan: Plan) -> list[Row]:
-    """Rows of the presets, for their medians: without speeds, and without the pentagon, which is one sequence."""
-    cases, mine = sequences(plan, np.random.default_rng(0)), list(presets().values())
-    with progress_bar("medians") as report:
-        return rows_of([cases], [measured(cases, plan, mine, report)], mine)
-
-
 def with_speeds(rows: list[Row], plan: Plan, progress: bool) -> list[Row]:
     """Rows with their speeds and promises."""
     with progress_bar("speeds", progress) as report:
@@ -82,39 +75,33 @@ class Options:
 
     quick: bool = False
     """Run fewer settings and swims, in under a minute."""
-    out: Path = Path("runs/accuracy")
-    """Folder for tables and pictures."""
     store: bool = False
     """Also write the table of errors and speeds that comes with the package."""
-    typical: bool = False
-    """Measure and store the medians of the presets alone."""
 
     def __post_init__(self) -> None:
         if self.quick and self.store:
             raise ValueError("--store needs the whole study, not --quick.")
 
 
-def run(options: Options, _: Results) -> None:
+def run(options: Options, results: Results) -> None:
     """Run the study, write its files and print its table."""
-    if options.typical:
-        store_typical(typical_rows(Plan()))
-        return
     found = study(QUICK if options.quick else Plan())
-    options.out.mkdir(parents=True, exist_ok=True)
-    write_csv(found, options.out / "accuracy.csv")
-    (options.out / "accuracy.md").write_text(as_markdown(found), encoding="utf-8")
-    drawn = draw_all(found, options.out)
+    results.out.mkdir(parents=True, exist_ok=True)
+    write_csv(found, results.out / "accuracy.csv")
+    (results.out / "accuracy.md").write_text(as_markdown(found), encoding="utf-8")
+    drawn = draw_all(found, results.out)
     show(as_markdown(found))
     if options.store:
         store(found)
         print(f"Stored: {STROKES}")
-    print(f"Written: {', '.join(str(path) for path in (options.out / 'accuracy.csv', *drawn))}")
+    print(f"Written: {', '.join(str(path) for path in (results.out / 'accuracy.csv', *drawn))}")
 
 
 STUDY = Study(
     "accuracy",
     run,
     Options,
+    out=Path("runs/accuracy"),
     tables={
         name: lambda _, name=name: getattr(page, name)()  # type: ignore[misc]
         for name in ("errors", "choosing", "presets", "timed", "timed_paths")

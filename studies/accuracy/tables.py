@@ -2,8 +2,6 @@
 
 import csv
 import math
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -139,19 +137,6 @@ def as_typical(row: Row) -> dict[str, float]:
     found = row.typical
     kinds = {"random": found.random, "repeated": found.gait, "small": found.slow, "straight": row.promise("straight")}
     return {} if any(map(math.isnan, kinds.values())) else {name: up(error) for name, error in kinds.items()}
-
-
-def store_typical(rows: Sequence[Row], path: Path = chapter.STROKES) -> None:
-    """Write medians of presets into the package's certificate and keep its bounds and speeds."""
-    certificate, by_resolution = Certificate.load(path), {row.resolution: row for row in rows}
-
-    def told(setting: Setting) -> Setting:
-        row = by_resolution.get(setting.resolution)
-        if row is None or setting.resolution not in presets().values():
-            return setting
-        return replace(setting, typical=as_typical(row) | {"straight": setting.errors["straight"]})
-
-    replace(certificate, settings=tuple(map(told, certificate.settings))).save(path)
 
 
 def measured_over(plan: Plan) -> dict[str, Any]:

@@ -56,9 +56,6 @@ class Plan(NamedTuple):
     presets: tuple[Fidelity, ...] = get_args(Fidelity)
 
 
-QUICK = Plan(4, 2, 19, Numerics("implicit-midpoint", 1e-3, 1e-8), ("fast", "balanced"))
-
-
 def sequences(period: float, plan: Plan, rng: np.random.Generator) -> Floats:
     """Commands of decisions, shape (n_decisions, 2 samples, 5): random ones, then a second that is repeated."""
     a_second = round(1.0 / period)
@@ -127,26 +124,18 @@ def study(period: float, plan: Plan) -> Certificate:
 class Options:
     """Errors of the presets in time."""
 
-    quick: bool = False
-    """Simulate fewer swims and presets."""
     store: bool = False
     """Write the certificates that come with the package."""
-    out: Path = Path("runs/timed_errors")
-    """Folder of the certificates."""
-
-    def __post_init__(self) -> None:
-        if self.quick and self.store:
-            raise ValueError("--store needs the whole study, not --quick.")
 
 
-def run(options: Options, _: Results) -> None:
+def run(options: Options, results: Results) -> None:
     """Run the study, and print its table."""
     for period in PERIODS:
-        certificate = study(period, QUICK if options.quick else Plan())
-        certificate.save(chapter.file_of(period, chapter.FOLDER if options.store else options.out))
+        certificate = study(period, Plan())
+        certificate.save(chapter.file_of(period, chapter.FOLDER if options.store else results.out))
         print(*(f"{period:g} s: {each}: {each.errors}" for each in certificate.settings), sep="\n")
     if options.store:
         show(timed())
 
 
-STUDY = Study("accuracy.timed", run, Options)
+STUDY = Study("accuracy.timed", run, Options, out=Path("runs/timed_errors"))

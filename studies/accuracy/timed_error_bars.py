@@ -4,10 +4,11 @@ The factors of error bars were found with strokes (studies/accuracy/error_bars.p
 seconds from rest by the sequences of studies/accuracy/timed.py, drawn anew. A decision is covered where the hub's
 distance from that with 73 nodes per limb and steps of 0.25 ms is at most the estimate.
 
-Prints a table: the share of decisions that are covered, and the median of estimate over true error.
+Prints a table and writes it as `timed_error_bars.md`: the share of decisions that are covered, and the median of
+estimate over true error.
 """
 
-from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,18 +53,13 @@ def table(found: dict[float, dict[str, tuple[float, float]]]) -> str:
     return "\n".join(lines)
 
 
-@dataclass(frozen=True)
-class Options:
-    """Coverage of error bars in time."""
-
-    samples: int = SAMPLES
-    """Sequences of either kind."""
-
-
-def run(options: Options, _: Results) -> None:
-    """Measure and print the table."""
-    plan = timed.Plan(samples=options.samples)
-    show(table({period: measure(period, plan) for period in tqdm(PERIODS, unit="period")}))
+def run(results: Results) -> None:
+    """Measure, write and print the table."""
+    plan = timed.Plan(samples=SAMPLES)
+    text = table({period: measure(period, plan) for period in tqdm(PERIODS, unit="period")})
+    results.out.mkdir(parents=True, exist_ok=True)
+    (results.out / "timed_error_bars.md").write_text(text, encoding="utf-8")
+    show(text)
 
 
-STUDY = Study("accuracy.timed_error_bars", run, Options)
+STUDY = Study("accuracy.timed_error_bars", run, out=Path("runs/timed_error_bars"))

@@ -28,7 +28,7 @@ from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from studies.accuracy.settings import MS
 from studies.accuracy.work_precision_page import draw, of_presets, of_settings
-from studies.frame import InDocs, Results, Study
+from studies.frame import Results, Study
 from studies.speed.terms import SILICONE
 
 Floats = NDArray[np.float64]
@@ -113,7 +113,7 @@ def examine(physics: Scene, straight: bool) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def run(_: InDocs, results: Results) -> None:
+def run(results: Results) -> None:
     """Examine the problems that are missing. ValueError where the file is of another machine or version."""
     results.read()
     if results and {name: results.get(name) for name in results.about} != results.about:

@@ -6,7 +6,6 @@ The chapter's statements are printed beside the numbers, and written to `stateme
 of docs/ show is written to `chapter.json`.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -74,20 +73,10 @@ def make_figures(out: Path, quick: bool = False, progress: bool = True) -> tuple
     return statements + cost_statements(costs), as_results(straight, pentagon, pairs)
 
 
-@dataclass(frozen=True)
-class Options:
-    """The chapter's figures and statements."""
-
-    quick: bool = False
-    """Take 1 ms as converged, and fewer time steps in Fig. 13.9."""
-    out: Path = Path("runs/chapter")
-    """Folder of the files, or the file of the numbers."""
-
-
-def run(options: Options, results: Results) -> None:
+def run(results: Results) -> None:
     """Swim, write the figures and the statements, and print the statements."""
-    statements, found = make_figures(options.out, options.quick)
-    write_csv(statements, options.out / "statements.csv")
+    statements, found = make_figures(results.out)
+    write_csv(statements, results.out / "statements.csv")
     Console().print(as_table(statements))
     results.update(found)
 
@@ -95,8 +84,8 @@ def run(options: Options, results: Results) -> None:
 STUDY = Study(
     "chapter",
     run,
-    Options,
-    "chapter/chapter.json",
+    file="chapter/chapter.json",
+    out=Path("runs/chapter"),
     pictures={
         "fig_13_2.png": lambda found, file: pictures.draw_pentagon_snapshots(*swims_of(found, "pentagon"), file),
         "fig_13_7a.png": lambda found, file: pictures.draw_pentagon(*swims_of(found, "pentagon"), file),

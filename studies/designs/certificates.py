@@ -23,7 +23,7 @@ from seastar_gym.sweep.swimming import swim
 from studies.designs import front, study
 from studies.designs.front import AT_WORK, THRIFTIEST
 from studies.designs.space import MEASURED, SETTLING, Body
-from studies.frame import DOCS, InDocs, Results, Study, require_known
+from studies.frame import DOCS, Results, Study, require_known
 from studies.pages import numbers
 
 Table = dict[str, Any]
@@ -119,11 +119,9 @@ def table(found: Table) -> str:
 
 
 @dataclass(frozen=True)
-class Options(InDocs):
+class Options:
     """Certificates of the robots that won."""
 
-    folder: Path = Path("runs/certificates")
-    """Folder of the certificates."""
     samples: int = SAMPLES
     """Sequences per class."""
     robots: tuple[str, ...] = ROBOTS
@@ -133,11 +131,11 @@ class Options(InDocs):
         require_known("robot", self.robots, ROBOTS)
 
 
-def certify_all(options: Options, results: Results) -> None:
-    """Certify the robots that are missing, and tell their errors."""
+def certify_all(options: Options, results: Results, folder: Path = Path("runs/certificates")) -> None:
+    """Certify the robots that are missing, and tell their errors. folder: Where their certificates are kept."""
 
     def certified(name: str, row: Table) -> Table:
-        return told(certificate_of(name, scene_of(row), options.folder, options.samples))
+        return told(certificate_of(name, scene_of(row), folder, options.samples))
 
     results.fill(
         {("robots", name): partial(certified, name, row) for name, row in rows().items() if name in options.robots},

@@ -5,7 +5,7 @@ swim again at `reference`, with limbs that touch. Robots that are to keep a limi
 they do so there. Writes front.json and front.png.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -81,22 +81,12 @@ def radii(scene: Scene) -> tuple[float, float]:
     return root, tip
 
 
-@dataclass(frozen=True)
-class Options:
-    """What speed costs."""
-
-    out: Path = Path("runs/front")
-    """Folder of the files, or the file of the numbers."""
-    workers: int | None = None
-    """Processes; one per processor by default."""
-
-
-def run(options: Options, results: Results) -> None:
+def run(results: Results) -> None:
     """Search, and swim the best again."""
     chapter = replace(Scene.preset("fast"), contact=Contact())
     limits = {factor: Limit(factor * OWN.work) for factor in FACTORS}
     speed = swum(chapter)["speed"]
-    table = search((*limits.values(), OWN), options.out, Processes(options.workers))
+    table = search((*limits.values(), OWN), results.out, Processes())
     scenes = {
         CHAPTER: chapter,
         AT_WORK: scene_of(sized(fastest(table, OWN), OWN)),
@@ -166,6 +156,6 @@ def draw(results: Table, file: Path) -> None:
 
 
 STUDY = Study(
-    "designs.front", run, Options, "designs/front.json", pictures={"front.png": draw},
+    "designs.front", run, file="designs/front.json", out=Path("runs/front"), pictures={"front.png": draw},
     tables={"front robots": robots, "front by_work": by_work}, packages=("pandas", "pyarrow"),
 )  # fmt: skip

@@ -7,7 +7,7 @@ interrupt.
 """
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -146,30 +146,20 @@ def masses_by_taper(mass: Any) -> Table:
     }
 
 
-@dataclass(frozen=True)
-class Options:
-    """Which robot swims fastest."""
-
-    out: Path = Path("runs/designs")
-    """Folder of the files, or the file of the numbers."""
-    workers: int | None = None
-    """Processes; one per processor by default."""
-
-
-def swim_all(options: Options, results: Results) -> None:
+def swim_all(results: Results) -> None:
     """Swim what is missing, and write the scene of the fastest."""
-    found, table = study(options.out, Processes(options.workers))
+    found, table = study(results.out, Processes())
     results.update(found, picture=summary(table))
     fastest = scene_of(table.loc[table.speed.idxmax()])
-    (options.out / "fastest.json").write_text(json.dumps(fastest.to_dict()) + "\n", encoding="utf-8")
+    (results.out / "fastest.json").write_text(json.dumps(fastest.to_dict()) + "\n", encoding="utf-8")
     print(json.dumps(found, indent=1))
 
 
 STUDY = Study(
     "designs",
     swim_all,
-    Options,
-    "designs/designs.json",
+    file="designs/designs.json",
+    out=Path("runs/designs"),
     pictures={"designs.png": draw},
     tables={"designs robots": robots},
     packages=("pandas", "pyarrow"),

@@ -14,17 +14,16 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import tyro
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.greedy import Displacements, measure_gaits
 from seastar_gym.controllers.planner import Branching
-from seastar_gym.controllers.registry import HELP, load_agents
+from seastar_gym.controllers.registry import load_agents
 from seastar_gym.envs.commands import Actions, command_table
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.paths import LINE_LENGTH, make_path
@@ -34,7 +33,7 @@ from seastar_gym.evaluation.many import swim_many
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator, State
-from studies.frame import InDocs, Results, Study
+from studies.frame import Results, Study
 from studies.style import CYCLE, subplots
 
 Floats = NDArray[np.float64]
@@ -143,16 +142,11 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
 
 
 @dataclass(frozen=True)
-class Options(InDocs):
+class Options:
     """Fastest swims found offline: the best gaits, the best speed in every direction, and the fastest pentagon."""
 
     fidelity: Fidelity = "fast"
     """Fidelity of the simulated swims."""
-    pentagon_beam: int = 300
-    """Width of the beam search round the pentagon, over pairs of limbs [states]."""
-    only_pentagon: bool = False
-    """Search only the pentagon, print the number of strokes found, and write nothing."""
-    agents: Annotated[tuple[str, ...], tyro.conf.arg(help=HELP)] = ("learned",)
 
 
 def study_gaits(scene: Scene) -> tuple[list[dict[str, Any]], Floats]:
@@ -194,46 +188,28 @@ def agent_speeds(agent: str, policy: Policy, scene: Scene, directions: Floats) -
     return np.array(speeds)
 
 
-def search_pentagon(options: Options) -> Gaits:
-    """Actions (pairs of limbs) of the shortest swim found round the pentagon."""
-    waypoints = make_path("pentagon", np.random.default_rng(0))
-    return search_path(make_scene(None, options.fidelity), waypoints, "pairs", options.pentagon_beam)
+def run(options: Options, results: Results, beam: int = 300) -> None:
+    """Search gaits, speeds and the pentagon.
 
-
-def study(options: Options) -> dict[str, Any]:
-    """Run the whole study, which takes minutes, and return its results as plain data."""
-    scene = make_scene(None, options.fidelity)
+    beam: Width of the beam search round the pentagon, over pairs of limbs [states].
+    """
+    began, scene = time.perf_counter(), make_scene(None, options.fidelity)
     fastest, displacements = study_gaits(scene)
     directions = np.radians(np.arange(0.0, 37.0, 6.0))
     mixed = mixed_speed(displacements, directions)
-    agents = {
-        agent: MM * agent_speeds(agent, policy, scene, directions)
-        for agent, policy in load_agents(options.agents, fidelity=options.fidelity).items()
-    }
-    pentagon = search_pentagon(options)
-    return {
+    learned = MM * agent_speeds("learned", load_agents(("learned",))["learned"], scene, directions)
+    pentagon = search_path(scene, make_path("pentagon", np.random.default_rng(0)), "pairs", beam)
+    results.update({
         "fidelity": options.fidelity,
         "fastest_gaits": fastest,
         "directions_deg": np.degrees(directions).tolist(),
-        "mm_per_stroke": {
-            MIXED: (MM * mixed).tolist(),
-            **{agent: speeds.tolist() for agent, speeds in agents.items()},
-        },
+        "mm_per_stroke": {MIXED: (MM * mixed).tolist(), "learned": learned.tolist()},
         "pentagon": {
             "strokes": len(pentagon),
-            "beam": options.pentagon_beam,
+            "beam": beam,
             "gait": [name(command) for command in command_table("pairs", scene.robot.n_limbs)[pentagon]],
         },
-    }
-
-
-def run(options: Options, results: Results) -> None:
-    """Search the pentagon alone, or everything."""
-    began = time.perf_counter()
-    if options.only_pentagon:
-        print(f"Pentagon: {len(search_pentagon(options))} strokes, in {time.perf_counter() - began:.0f} s.")
-        return
-    results.update(study(options))
+    })
     print(json.dumps({key: value for key, value in results.items() if key != "pentagon"}, indent=1))
     print(f"Pentagon: {results['pentagon']['strokes']} strokes. All in {time.perf_counter() - began:.0f} s.")
 

@@ -26,7 +26,7 @@ from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from studies.accuracy.page import markdown
-from studies.frame import InDocs, Results, Study
+from studies.frame import Results, Study
 
 N_PATHS = 200
 FIDELITY: Fidelity = "fast"
@@ -162,7 +162,7 @@ def _cell(times: list[float], arrived: int) -> str:
     return f"{np.mean(times):.1f}{lost}"
 
 
-def run(_: InDocs, results: Results) -> None:
+def run(results: Results) -> None:
     """Swim what is missing."""
     results.read()
     cells: dict[tuple[str, ...], Callable[[], Any]] = {

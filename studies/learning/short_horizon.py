@@ -46,7 +46,7 @@ from seastar_gym.gaits import STRAIGHT
 from seastar_gym.gradients import Record, record
 from seastar_gym.scene import Scene
 from studies.accuracy.page import markdown
-from studies.frame import InDocs, Results, Study
+from studies.frame import Results, Study
 from studies.results_file import rounded
 
 Floats = NDArray[np.float64]
@@ -364,12 +364,12 @@ REACHED = 0.8
 """Share of the straight gait's return of which the table tells when it is reached."""
 
 
-def settings(options: InDocs) -> dict[str, Any]:
+def settings() -> dict[str, Any]:
     """What all numbers have in common."""
     return {"episode": EPISODE, "held_out": HELD_OUT, "decisions": [FEW, MANY, OF_PAIRS]}
 
 
-def run(options: InDocs, results: Results) -> str | None:
+def run(results: Results) -> str | None:
     """Train what is missing, on one thread."""
     torch.set_num_threads(1)
     cells: dict[tuple[str, ...], Callable[[], Any]] = {("rules",): rules}

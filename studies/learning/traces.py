@@ -13,7 +13,7 @@ from seastar_gym.controllers.registry import load_agents
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.swim import Swim
-from studies.frame import InDocs, Results, Study
+from studies.frame import Results, Study
 from studies.style import apply_style
 
 AGENTS = ("learned", "pentagon")
@@ -63,7 +63,7 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     draw_traces(from_data(results), RADIUS, file)
 
 
-def run(_: InDocs, results: Results) -> None:
+def run(results: Results) -> None:
     """Swim."""
     results.update(as_data(swims()))
     print(", ".join(f"{each.agent}: {each.result}" for each in from_data(results)))

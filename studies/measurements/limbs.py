@@ -2,14 +2,14 @@
 
 Every material is fitted at all its frequencies with the model of `SmaLimb`: its error per curve, as a fraction of the
 curve's peak, is printed beside that of the ramp of Fig. 13.5b. Then four frequencies predict the others, with 90 %
-intervals, once from spread frequencies and once from the four lowest ones. `--models` compares richer and poorer models
-in the same way. `--swims` swims the chapter's robot with the measured limbs.
+intervals, once from spread frequencies and once from the four lowest ones. Richer and poorer models are compared in the
+same way. The chapter's robot swims with the measured limbs.
 
-Prints tables and writes `limbs.json` and `limbs.png`. Takes about ten seconds on one core, with `--models` a minute.
+Prints tables and writes `limbs.json` and `limbs.png`. Takes about three minutes on one core.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from rich.table import Table
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.pulse import pulse
-from studies.frame import InDocs, Results, Study
+from studies.frame import Results, Study
 from studies.measurements.curves import PHASES, Curve, read_curves
 from studies.measurements.fit import Fit, fit, predict
 from studies.measurements.model import MODELS
@@ -155,32 +155,20 @@ def study_policies(console: Console) -> dict[str, Any]:
     return found
 
 
-@dataclass(frozen=True)
-class Options(InDocs):
-    """Fits of measured limbs, and predictions."""
-
-    models: bool = False
-    """Also compare the other models."""
-    swims: bool = False
-    """Also swim with the measured limbs (two minutes)."""
-
-
-def run(options: Options, results: Results) -> None:
-    """Fit and predict, compare models and swim as far as it is asked for; prints tables."""
+def run(results: Results) -> None:
+    """Fit and predict, compare models and swim; prints tables."""
     console, curves = Console(), read_curves()
     _, figures = study_model(CHOSEN, curves)
     print_fits(console, figures, curves)
     results.update(model=CHOSEN, fits=figures)
-    if options.models:
-        all_models = {name: summary(study_model(name, curves)[1]) for name in MODELS}
-        columns = ("model", f"curves below {AIM}", "error", "AIC", "between", "beyond")
-        console.print(table("Models", columns, [[name, *cells] for name, cells in all_models.items()]))
-        results["models"] = {name: dict(zip(columns[1:], cells, strict=True)) for name, cells in all_models.items()}
-    if options.swims:
-        results["gaits"], results["swims"] = list(GAITS), study_swims(console)
-        results["strokes_round_the_pentagon"] = study_policies(console)
+    all_models = {name: summary(study_model(name, curves)[1]) for name in MODELS}
+    columns = ("model", f"curves below {AIM}", "error", "AIC", "between", "beyond")
+    console.print(table("Models", columns, [[name, *cells] for name, cells in all_models.items()]))
+    results["models"] = {name: dict(zip(columns[1:], cells, strict=True)) for name, cells in all_models.items()}
+    results["gaits"], results["swims"] = list(GAITS), study_swims(console)
+    results["strokes_round_the_pentagon"] = study_policies(console)
 
 
 STUDY = Study(
-    "measurements.limbs", run, Options, "validation/limbs.json", pictures={"limbs.png": draw}, packages=("scipy",)
+    "measurements.limbs", run, file="validation/limbs.json", pictures={"limbs.png": draw}, packages=("scipy",)
 )

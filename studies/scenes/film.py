@@ -3,7 +3,6 @@
 Draws both side by side, at the same simulated time, until the faster one has arrived, and writes an animated GIF.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -47,32 +46,17 @@ def side_by_side(left: list[Picture], right: list[Picture]) -> list[Picture]:
     return [np.concatenate(both, axis=1) for both in zip(left, right, strict=False)]
 
 
-@dataclass(frozen=True)
-class Options:
-    """Film of two robots round the pentagon."""
-
-    decision_period: float = 0.2
-    """Of the policy on the right [s]."""
-    frames: int | None = None
-    """Largest number of frames."""
-    out: Path = Path("docs/swim.gif")
-    """File."""
-
-
-def run(options: Options, _: Results) -> None:
+def run(results: Results) -> None:
     """Draw and write the film."""
-    parts = round(2 * options.decision_period / BETWEEN)
-    if not np.isclose(parts * BETWEEN, 2 * options.decision_period) or parts == 0:
-        raise ValueError(f"decisions must take a whole number of {BETWEEN / 2:g} s, not {options.decision_period:g} s.")
-    policy = load(bundled_file(options.decision_period))
+    policy = load(bundled_file(0.2))
     gait = scripted("pentagon", policy.actions)
     # As `seastar swim` shows it, and at the same fidelity as the other.
-    timed = {"fidelity": "balanced", "decision_period": policy.decision_period}
-    learned = frames(policy, parts, options.frames, actions=policy.actions, **timed)
+    period = policy.decision_period
+    learned = frames(policy, 1, actions=policy.actions, fidelity="balanced", decision_period=period)
     chapter = frames(gait, round(2 / BETWEEN), len(learned), actions=gait.actions, fidelity="balanced")
     film = side_by_side(chapter, learned)
-    write_gif(film + [film[-1]] * REST, options.out, FPS)
-    print(f"Written: {options.out}, {len(film)} frames of {BETWEEN} s.")
+    write_gif(film + [film[-1]] * REST, results.out, FPS)
+    print(f"Written: {results.out}, {len(film)} frames of {BETWEEN} s.")
 
 
-STUDY = Study("scenes.film", run, Options)
+STUDY = Study("scenes.film", run, out=Path("docs/swim.gif"))

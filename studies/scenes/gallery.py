@@ -23,7 +23,7 @@ from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.limb import Limb
 from seastar_gym.scene.section import AnySection, Disc, Section
 from seastar_gym.simulator import Simulator
-from studies.frame import InDocs, Results, Study
+from studies.frame import Results, Study
 from studies.style import INK, subplots
 
 Floats = NDArray[np.float64]
@@ -209,21 +209,10 @@ def measured(rounds: int = ROUNDS, n_robots: int = ROBOTS) -> dict[str, Any]:
     return {"scenes": scenes}
 
 
-@dataclass(frozen=True)
-class Options(InDocs):
-    """Pictures and costs of scenes."""
-
-    pictures: Path = Path("docs/gallery")
-    """Folder of the pictures."""
-    draw_only: bool = False
-    """Draw the pictures, measure nothing."""
+def run(results: Results, pictures: Path = Path("docs/gallery")) -> None:
+    """Draw the pictures into a folder, and measure the costs."""
+    draw_all(pictures)
+    results.update(measured())
 
 
-def run(options: Options, results: Results) -> None:
-    """Draw the pictures, and measure the costs if they are asked for."""
-    draw_all(options.pictures)
-    if not options.draw_only:
-        results.update(measured())
-
-
-STUDY = Study("scenes.gallery", run, Options, "gallery/gallery.json", tables={"gallery": table})
+STUDY = Study("scenes.gallery", run, file="gallery/gallery.json", tables={"gallery": table})

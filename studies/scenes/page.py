@@ -8,7 +8,6 @@ each of ten directions. Symmetry turns them to all headings.
 import base64
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -150,20 +149,10 @@ def record(fidelity: Fidelity = "balanced", most: int | None = None) -> dict[str
     }
 
 
-@dataclass(frozen=True)
-class Options:
-    """The page that swims."""
-
-    decisions: int | None = None
-    """Largest number of decisions of a recorded swim."""
-    out: Path = Path("docs/swim.html")
-    """File."""
-
-
-def run(options: Options, _: Results) -> None:
+def run(results: Results) -> None:
     """Record the swims and write the page."""
-    options.out.write_text(page(record(most=options.decisions)), encoding="utf-8")
-    print(f"Written: {options.out}, {options.out.stat().st_size / 1e3:.0f} kB.")
+    results.out.write_text(page(record()), encoding="utf-8")
+    print(f"Written: {results.out}, {results.out.stat().st_size / 1e3:.0f} kB.")
 
 
-STUDY = Study("scenes.page", run, Options)
+STUDY = Study("scenes.page", run, out=Path("docs/swim.html"))

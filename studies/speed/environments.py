@@ -6,7 +6,6 @@ turns, round by round, so that all meet the same machine.
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +16,8 @@ import seastar_gym  # noqa: F401, registers the ids
 from studies.frame import Results, Study
 from studies.results_file import rounded
 
-DECISIONS = 256
-"""Decisions of a round, at least."""
+DECISIONS, ROUNDS = 256, 15
+"""Decisions of a round, at least, and rounds, of which the median counts."""
 BATCHES = {"SeastarSwim-v0": 512, "SeastarSwimTimedModerate-v0": 512, "Swimmer-v5": 64, "HalfCheetah-v5": 64}
 """Environments, and the robots of their batches: about as many as make them fastest."""
 
@@ -72,24 +71,14 @@ def simulated(id: str) -> float:
     return float(info["time"] if is_ours(id) else env.dt)
 
 
-@dataclass(frozen=True)
-class Options:
-    """Decisions per second of environments beside MuJoCo's."""
-
-    rounds: int = 15
-    """Rounds, of which the median counts."""
-    out: Path = Path("runs/environments")
-    """Folder of the file."""
-
-
-def run(given: Options, results: Results) -> str | None:
+def run(results: Results) -> str | None:
     """Time all environments."""
     kinds: dict[str, Callable[[str], Single | Batch]] = {"single": Single, "batch": Batch}
     rooms = {(id, name): kind(id) for id in BATCHES for name, kind in kinds.items()}
     rates: dict[tuple[str, str], list[float]] = {each: [] for each in rooms}
     for room in rooms.values():
         room.go()
-    for _ in range(given.rounds):
+    for _ in range(ROUNDS):
         for each, room in rooms.items():
             began = time.process_time()
             room.go()
@@ -119,6 +108,7 @@ def _two(number: float) -> str:
 
 
 STUDY = Study(
-    "speed.environments", run, Options, file="speed/speed_environments.json", tables={"speed environments": table},
+    "speed.environments", run, file="speed/speed_environments.json", out=Path("runs/environments"),
+    tables={"speed environments": table},
     packages=("mujoco",), extra="mujoco",
 )  # fmt: skip

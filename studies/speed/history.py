@@ -22,7 +22,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import Simulator
-from studies.frame import InDocs, Results, Study
+from studies.frame import Results, Study
 from studies.provenance import provenance
 from studies.results_file import rounded
 from studies.speed import terms
@@ -107,7 +107,7 @@ def commit() -> str:
     return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
 
 
-def run(_: InDocs, results: Results) -> None:
+def run(results: Results) -> None:
     """Time everything, and add a row."""
     unit()
     found = {}
@@ -149,6 +149,6 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
 
 
 STUDY = Study(
-    "speed.history", run, file="speed/speed_history.json", settings=lambda _: UNIT,
+    "speed.history", run, file="speed/speed_history.json", settings=lambda: UNIT,
     pictures={"speed_history.png": draw}, tables={"speed history": table},
 )  # fmt: skip

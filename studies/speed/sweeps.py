@@ -12,7 +12,6 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -141,21 +140,11 @@ def table(found: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-@dataclass(frozen=True)
-class Options:
-    """Speed of sweeps."""
-
-    out: Path = Path("runs/sweeps")
-    """Folder of the files, or the file of the numbers."""
-    quick: bool = False
-    """Fewer cells."""
-
-
-def run_cells(options: Options, results: Results) -> None:
+def run_cells(results: Results) -> None:
     """Measure, and reckon a cluster."""
-    results.update(measure(4 if options.quick else 10, 64 if options.quick else 256, 10, (1, 2)))
+    results.update(measure(10, 256, 10, (1, 2)))
     results[f"reckoned: {NODES} such nodes"] = reckon(results, 2)
     print(json.dumps(results, indent=1))
 
 
-STUDY = Study("speed.sweeps", run_cells, Options, "speed/sweeps.json", tables={"sweeps": table})
+STUDY = Study("speed.sweeps", run_cells, file="speed/sweeps.json", out=Path("runs/sweeps"), tables={"sweeps": table})

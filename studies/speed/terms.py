@@ -24,6 +24,8 @@ from studies.frame import Results, Study
 
 PRESSING = np.array([1.0, -1.0, 0.0, 0.0, 0.0])
 """Command that presses limbs 1 and 2 together."""
+ROUNDS = 40
+"""Strokes of every scene."""
 GROUPS = 8
 """Lane groups in the batch. All robots do the same, so no lane waits for another."""
 SILICONE = relaxation_time(0.1, 10.0)
@@ -148,30 +150,20 @@ def as_table(costs: list[Cost]) -> Table:
     return table
 
 
-@dataclass(frozen=True)
-class Options:
-    """Cost of each term of a scene."""
-
-    rounds: int = 40
-    """Strokes of every scene."""
-    out: Path = Path("runs/terms")
-    """Folder for the CSV."""
-
-
-def run(options: Options, _: Results) -> None:
+def run(results: Results) -> None:
     """Measure the costs, print them and write them as CSV."""
-    costs = measure(scenes(), options.rounds)
+    costs = measure(scenes(), ROUNDS)
     touching = {THE_CHAPTERS: Scene(), "contact, a pair of limbs pressed together": Scene(contact=Contact())}
     touching = {name: in_ten_nodes(scene) for name, scene in touching.items()}
-    costs += measure(touching, options.rounds, PRESSING)[1:]
+    costs += measure(touching, ROUNDS, PRESSING)[1:]
     Console().print(as_table(costs))
-    options.out.mkdir(parents=True, exist_ok=True)
+    results.out.mkdir(parents=True, exist_ok=True)
     rows = [{**asdict(cost), "low": cost.quartiles[0], "high": cost.quartiles[1]} for cost in costs]
     names = ["name", "iterations", "seconds", "per_iteration", "low", "high", "per_stroke"]
-    with (options.out / "terms.csv").open("w", newline="") as file:
+    with (results.out / "terms.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, names, extrasaction="ignore")
         writer.writeheader()
         writer.writerows(rows)
 
 
-STUDY = Study("speed.terms", run, Options)
+STUDY = Study("speed.terms", run, out=Path("runs/terms"))

@@ -68,7 +68,7 @@ def start_up_figures() -> list[Figure]:
     ]
 
 
-def measure(seconds: float, progress: bool = True) -> tuple[list[Figure], dict[str, list[tuple[int, float]]]]:
+def measure(seconds: float = 1.0, progress: bool = True) -> tuple[list[Figure], dict[str, list[tuple[int, float]]]]:
     """Rows of the table, and the curves of the picture: real-time factor over batch size, and cost over N."""
     chapter = Scene(Seastar(nodes_per_limb=10), numerics=Numerics.preset("chapter"))
     steps = {
@@ -188,24 +188,14 @@ def draw(curves: dict[str, list[tuple[int, float]]], path: Path) -> None:
     figure.savefig(path)
 
 
-@dataclass(frozen=True)
-class Options:
-    """Speed of the simulator on this machine."""
-
-    quick: bool = False
-    """Measure for a fifth of the time, with more noise."""
-    out: Path = Path("runs/throughput")
-    """Folder for CSV and picture."""
-
-
-def run(options: Options, _: Results) -> None:
+def run(results: Results) -> None:
     """Measure, write the files and print the table."""
-    figures, curves = measure(0.2 if options.quick else 1.0)
-    options.out.mkdir(parents=True, exist_ok=True)
-    write_csv(figures, curves, options.out / "throughput.csv")
-    draw(curves, options.out / "throughput.png")
+    figures, curves = measure()
+    results.out.mkdir(parents=True, exist_ok=True)
+    write_csv(figures, curves, results.out / "throughput.csv")
+    draw(curves, results.out / "throughput.png")
     Console().print(as_table(figures))
-    print(f"Written: {options.out / 'throughput.csv'}, {options.out / 'throughput.png'}")
+    print(f"Written: {results.out / 'throughput.csv'}, {results.out / 'throughput.png'}")
 
 
-STUDY = Study("speed.throughput", run, Options, drawn=("speed/throughput.png",))
+STUDY = Study("speed.throughput", run, out=Path("runs/throughput"), drawn=("speed/throughput.png",))

@@ -8,8 +8,6 @@ from seastar_gym.scene import Seastar, Water
 
 STEPS = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 2e-2, 5e-2, 1e-1, 3e-1, 1.0)
 """Time steps of the atlas [s]."""
-QUICK_STEPS = (1e-4, 1e-3, 2e-2, 3e-1)
-"""Time steps of the quick atlas [s]."""
 
 
 @dataclass(frozen=True)
@@ -90,17 +88,6 @@ SWEEPS = (
         lambda angle: Case(peak_angle=math.radians(_number(angle)), all_commands=True), 36.0,
     ),
 )  # fmt: skip
-
-
-def quick_sweeps() -> tuple[Sweep, ...]:
-    """Sweeps reduced to every third value, the ends and the chapter's value."""
-    return tuple(
-        replace(sweep, values=tuple(v for k, v in enumerate(sweep.values) if _stays(sweep, k, v))) for sweep in SWEEPS
-    )
-
-
-def _stays(sweep: Sweep, k: int, value: float | None) -> bool:
-    return k % 3 == 0 or k == len(sweep.values) - 1 or value == sweep.chapter
 
 
 def format_value(sweep: Sweep, value: float | None) -> str:

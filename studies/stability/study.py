@@ -26,7 +26,7 @@ from seastar_gym.scene.numerics import SchemeName
 from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
 from studies.frame import Results, Study
 from studies.results_file import rounded
-from studies.stability.cases import QUICK_STEPS, STEPS, SWEEPS, Sweep, format_value, quick_sweeps
+from studies.stability.cases import STEPS, SWEEPS, Sweep, format_value
 from studies.stability.cells import Cell, commands_of, converged_displacements, run_cell, stroke_duration
 from studies.stability.pictures import draw as draw_cells
 
@@ -160,23 +160,18 @@ def write_csv(cells: Iterable[Cell], file: Path) -> None:
 class Options:
     """Robustness and accuracy of the solver over time steps."""
 
-    quick: bool = False
-    """Run a coarser grid, in a fraction of the time."""
     scheme: SchemeName = "implicit-euler"
     """Scheme of the atlas."""
-    out: Path = Path("runs/stability")
-    """Folder of the files, or the file of the numbers."""
 
 
 def run(options: Options, results: Results) -> None:
     """Run the atlas."""
-    sweeps, steps = (quick_sweeps(), QUICK_STEPS) if options.quick else (SWEEPS, STEPS)
     start = time.perf_counter()
-    cells = atlas(sweeps, steps, options.scheme)
-    options.out.mkdir(parents=True, exist_ok=True)
-    write_csv(cells, options.out / "stability.csv")
+    cells = atlas(SWEEPS, STEPS, options.scheme)
+    results.out.mkdir(parents=True, exist_ok=True)
+    write_csv(cells, results.out / "stability.csv")
     results.update(as_data(cells, options.scheme))
-    Console().print(f"{time.perf_counter() - start:.0f} s. Written, too: {options.out / 'stability.csv'}")
+    Console().print(f"{time.perf_counter() - start:.0f} s. Written, too: {results.out / 'stability.csv'}")
 
 
 def sweeps_of(cells: Sequence[Cell]) -> list[Sweep]:
@@ -210,6 +205,7 @@ STUDY = Study(
     run,
     Options,
     "stability/stability.json",
+    Path("runs/stability"),
     pictures={f"stability_{name}.png": draw for name in ("needs", "iterations", "error")},
     tables={"stability": table},
 )

@@ -22,43 +22,32 @@ from seastar_gym.evaluation.tasks import make_batch
 from seastar_gym.extras import require_extra
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
-from studies.frame import Results, Study
+from studies.frame import Results, Study, require_known
 from studies.tasks.controllers import make_controller
 from studies.tasks.episodes import Agent, rollout_of
 
 QUALITIES = ("random", "greedy", "learned")
+FIDELITY: Fidelity = "fast"
 
 
 @dataclass(frozen=True)
 class Options:
     """Minari datasets of the tasks, of three qualities."""
 
-    ids: tuple[str, ...] = tuple(TASKS)
+    tasks: tuple[str, ...] = tuple(TASKS)
     """Environments."""
-    qualities: tuple[str, ...] = QUALITIES
-    """Qualities: random, greedy, learned."""
     episodes: int = 100
     """Episodes of every dataset, of the split "train", with the seeds 0, 1, ..."""
-    seed: int = 0
-    """Seed of the random actions."""
-    fidelity: Fidelity = "fast"
-    """Accuracy of the simulation."""
-    num_threads: int | None = None
-    """Threads of the simulator; by default one for every processor."""
-    out: Path = Path("runs/data")
-    """Folder of the datasets."""
 
     def __post_init__(self) -> None:
         require_count("episodes", self.episodes, 1, 100_000)
-        for kind, asked, known in (("task", self.ids, tuple(TASKS)), ("quality", self.qualities, QUALITIES)):
-            if unknown := set(asked) - set(known):
-                raise ValueError(f"Unknown {kind} {min(unknown)!r}: choose of {', '.join(known)}.")
+        require_known("task", self.tasks, TASKS)
 
 
-def agent_of(quality: str, id: str, recorder: Recorder, options: Options) -> Agent | Policy:
+def agent_of(quality: str, id: str, recorder: Recorder) -> Agent | Policy:
     """Agent of a quality."""
     if quality == "random":
-        return scripted("random", TASKS[id][1], rng=np.random.default_rng(options.seed))
+        return scripted("random", TASKS[id][1], rng=np.random.default_rng(0))
     if quality == "greedy":
         return make_controller("greedy", recorder)
     from agents.tasks.command import file_of
@@ -66,39 +55,33 @@ def agent_of(quality: str, id: str, recorder: Recorder, options: Options) -> Age
     return load(file_of(id))
 
 
-def record(id: str, quality: str, options: Options) -> list[Episode]:
+def record(id: str, quality: str, n_episodes: int) -> list[Episode]:
     """Episodes of a task, each from its reset to its end."""
-    batch = make_batch(id, options.episodes, options.num_threads, split="train", fidelity=options.fidelity)
-    recorder = Recorder(batch)
-    rollout_of(recorder, agent_of(quality, id, recorder, options), seeds=list(range(options.episodes)))
+    recorder = Recorder(make_batch(id, n_episodes, split="train", fidelity=FIDELITY))
+    rollout_of(recorder, agent_of(quality, id, recorder), seeds=list(range(n_episodes)))
     recorder.close()
     return recorder.episodes(only_first=True)
 
 
-def make_datasets(options: Options) -> None:
+def run(options: Options, results: Results) -> None:
     """Write the datasets that are missing; says a line on each."""
+    require_extra("Datasets", "data", "minari", "h5py")
     import minari
 
-    write_to(options.out)
+    write_to(results.out)
     there = minari.list_local_datasets()
-    for id in options.ids:
-        for quality in options.qualities:
+    for id in options.tasks:
+        for quality in QUALITIES:
             name = name_of(id, quality)
             if name in there:
                 print(f"{name} is there already.")
                 continue
-            episodes = record(id, quality, options)
+            episodes = record(id, quality, options.episodes)
             write(
                 episodes, name, id, quality, "Written by python -m studies.tasks.data", split="train",
-                fidelity=options.fidelity,
+                fidelity=FIDELITY,
             )  # fmt: skip
             print(f"{name}: {summary(episodes)}", flush=True)
 
 
-def run(options: Options, _: Results) -> None:
-    """Write the datasets that are missing."""
-    require_extra("Datasets", "data", "minari", "h5py")
-    make_datasets(options)
-
-
-STUDY = Study("tasks.data", run, Options)
+STUDY = Study("tasks.data", run, Options, out=Path("runs/data"))

@@ -45,11 +45,10 @@ def swim(
     make_agent: Callable[[Batch], Agent | Policy],
     n_episodes: int,
     fidelity: Fidelity,
-    threads: int | None = None,
     wrap: Wrap = lambda batch: batch,
 ) -> Episodes:
     """The first episodes of the split "test", each to its end."""
-    batch = wrap(make_batch(id, n_episodes, threads, split="test", fidelity=fidelity))
+    batch = wrap(make_batch(id, n_episodes, split="test", fidelity=fidelity))
     return swim_to_the_end(batch, make_agent(batch), seeds=0, options={"instance": np.arange(n_episodes)})
 
 

@@ -17,7 +17,7 @@ from seastar_gym.evaluation.rollout import Info
 from seastar_gym.evaluation.tasks import make_batch
 from studies.frame import Results, Study, require_known
 from studies.tasks.ahead import Robots
-from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
+from studies.tasks.controllers import is_swum, make_controller
 from studies.tasks.episodes import rollout_of
 
 BETWEEN = 2.0
@@ -36,12 +36,12 @@ def file_name(id: str) -> str:
 
 
 def swimmer(batch: Any) -> str:
-    """Name of the agent that a film shows unless another one is asked for."""
+    """Name of the agent that a film shows."""
     return "adaptive" if is_swum("adaptive", Robots(batch).inner.challenge) else "planner"
 
 
-def pictures(id: str, agent_name: str | None, longest: float = LONGEST, instance: int = 0) -> list[Picture]:
-    """Pictures of an episode; agent_name: None means `swimmer`. longest: Simulated time [s]."""
+def pictures(id: str) -> list[Picture]:
+    """Pictures of the first held-out episode of a task."""
     batch: Any = make_batch(id, 1, 1, split="test", fidelity="fast", render_mode="rgb_array")
     decision_period = TASKS[id][2]
     every, numbers, film = round(BETWEEN / decision_period), itertools.count(), list[Picture]()
@@ -51,8 +51,8 @@ def pictures(id: str, agent_name: str | None, longest: float = LONGEST, instance
             film.append(shrunk(batch.render()[0]))
 
     found = rollout_of(
-        batch, make_controller(agent_name or swimmer(batch), batch), look, seeds=0,
-        options={"instance": np.array([instance])}, until=round(longest / decision_period),
+        batch, make_controller(swimmer(batch), batch), look, seeds=0,
+        options={"instance": np.array([0])}, until=round(LONGEST / decision_period),
     )  # fmt: skip
     if found.decisions[0] % every:
         film.append(shrunk(batch.render()[0]))
@@ -64,29 +64,20 @@ def pictures(id: str, agent_name: str | None, longest: float = LONGEST, instance
 class Options:
     """Films of the tasks."""
 
-    ids: tuple[str, ...] = tuple(TASKS)
+    tasks: tuple[str, ...] = tuple(TASKS)
     """Environments."""
-    agent: str | None = None
-    """Who swims; "adaptive", or "planner", by default."""
-    seconds: float = LONGEST
-    """Longest film, simulated [s]."""
-    instance: int = 0
-    """Number of the episode."""
-    out: Path = Path("docs/gallery")
-    """Folder."""
 
     def __post_init__(self) -> None:
-        require_known("task", self.ids, TASKS)
-        require_known("agent", [self.agent] if self.agent else [], CONTROLLERS)
+        require_known("task", self.tasks, TASKS)
 
 
-def run(options: Options, _: Results) -> None:
+def run(options: Options, results: Results) -> None:
     """Write the films."""
-    options.out.mkdir(parents=True, exist_ok=True)
-    for id in options.ids:
-        film = pictures(id, options.agent, options.seconds, options.instance)
-        write_gif(film + film[-1:] * REST, options.out / file_name(id), FPS)
-        print(f"Written: {options.out / file_name(id)}, {len(film)} pictures.", flush=True)
+    results.out.mkdir(parents=True, exist_ok=True)
+    for id in options.tasks:
+        film = pictures(id)
+        write_gif(film + film[-1:] * REST, results.out / file_name(id), FPS)
+        print(f"Written: {results.out / file_name(id)}, {len(film)} pictures.", flush=True)
 
 
-STUDY = Study("tasks.films", run, Options)
+STUDY = Study("tasks.films", run, Options, out=Path("docs/gallery"))

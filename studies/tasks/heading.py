@@ -83,12 +83,12 @@ def trained(decisions: int, seed: int) -> PPO:
     return model
 
 
-def swum(agent: str, seed: int, decisions: int, n: int, fidelity: Fidelity, threads: int | None) -> Episodes:
+def swum(agent: str, seed: int, decisions: int, n: int, fidelity: Fidelity) -> Episodes:
     """Held-out episodes of an agent; PPO learns before, with a seed and for so many decisions, on other paths."""
     is_rule = agent == RULE
     period, mode = (PERIOD_OF_RULE, "joint") if is_rule else (PERIOD, "pairs")
     batch: Any = make_batch(
-        ID, n, threads, fidelity=fidelity, path="random", headings=HEADINGS, decision_period=period, actions=mode,
+        ID, n, fidelity=fidelity, path="random", headings=HEADINGS, decision_period=period, actions=mode,
         max_episode_steps=round(LIMIT / period),
     )  # fmt: skip
     if agent == "PPO":

@@ -39,16 +39,16 @@ def _recurrent(id: str, env: BatchVecEnv, seed: int) -> Any:
     )
 
 
-def train(id: str, name: str, seed: int, decisions: int, fidelity: Fidelity, threads: int | None) -> Any:
+def train(id: str, name: str, seed: int, decisions: int, fidelity: Fidelity) -> Any:
     """A learner after so many decisions of training, a `PPO` or `RecurrentPPO`."""
     torch.set_num_threads(1)
-    env = make_learning_env(id, ALL_LEARNERS[name], fidelity, threads)
+    env = make_learning_env(id, ALL_LEARNERS[name], fidelity, None)
     model = _recurrent(id, env, seed) if name == RECURRENT else new_model(id, env, seed)
     model.learn(decisions)
     env.close()
     return model
 
 
-def evaluate(id: str, name: str, model: Any, n_episodes: int, fidelity: Fidelity, threads: int | None) -> Episodes:
+def evaluate(id: str, name: str, model: Any, n_episodes: int, fidelity: Fidelity) -> Episodes:
     """Held-out episodes of a learner."""
-    return swim(id, lambda batch: model, n_episodes, fidelity, threads, ALL_LEARNERS[name].wrap)
+    return swim(id, lambda batch: model, n_episodes, fidelity, ALL_LEARNERS[name].wrap)

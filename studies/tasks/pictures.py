@@ -3,7 +3,6 @@
 python -m studies.tasks.pictures
 """
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -37,20 +36,12 @@ def picture(id: str, controller: str, strokes: int, instance: int = 0) -> NDArra
     return np.asarray(drawn)
 
 
-@dataclass(frozen=True)
-class Options:
-    """Pictures of the tasks."""
-
-    out: Path = Path("docs/tasks")
-    """Folder of the pictures."""
-
-
-def run(options: Options, _: Results) -> None:
+def run(results: Results) -> None:
     """Draw the pictures."""
-    options.out.mkdir(parents=True, exist_ok=True)
+    results.out.mkdir(parents=True, exist_ok=True)
     for name, shown in SHOWN.items():
-        Image.fromarray(picture(*shown)).save(options.out / f"{name}.png", optimize=True)
+        Image.fromarray(picture(*shown)).save(results.out / f"{name}.png", optimize=True)
         print(name, flush=True)
 
 
-STUDY = Study("tasks.pictures", run, Options)
+STUDY = Study("tasks.pictures", run, out=Path("docs/tasks"))

@@ -22,7 +22,7 @@ from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.evaluation.measures import measure_of_challenge
 from seastar_gym.evaluation.rollout import Episodes
 from seastar_gym.scene.numerics import Fidelity
-from studies.frame import InDocs, Results, Study, require_known
+from studies.frame import Results, Study, require_known
 from studies.tasks import heading
 from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
 from studies.tasks.episodes import swim
@@ -36,30 +36,25 @@ IDS: dict[str, str] = {id: about[0] for id, about in TASKS.items()} | {heading.I
 BUNDLED = "bundled"
 """Agent that swims the policy that the package brings for a task."""
 AGENTS = (*CONTROLLERS, heading.RULE, *ALL_LEARNERS, BUNDLED)
+DECISIONS, EPISODES = 200_000, 64
+"""Length of every training [decisions], and number of held-out episodes."""
+FIDELITY: Fidelity = "fast"
 DEFAULT_LEARNERS = ("PPO", "PPO, memory", "PPO, told the way", "PPO, memory, coasting")
 
 
 @dataclass(frozen=True)
-class Options(InDocs):
+class Options:
     """Headroom of the tasks: what rules, planners, learners and a bound that knows everything make of them."""
 
-    ids: tuple[str, ...] = tuple(IDS)
+    tasks: tuple[str, ...] = tuple(IDS)
     """Environments."""
     agents: tuple[str, ...] = (*CONTROLLERS, heading.RULE, *DEFAULT_LEARNERS, BUNDLED)
     """Agents; "RecurrentPPO" needs sb3-contrib."""
     seeds: tuple[int, ...] = (0, 1)
     """Seeds of the trainings; agents that do not learn swim once."""
-    decisions: int = 200_000
-    """Length of every training [decisions]."""
-    episodes: int = 64
-    """Number of held-out episodes."""
-    fidelity: Fidelity = "fast"
-    """Fidelity of the simulated swims."""
-    num_threads: int | None = None
-    """Threads of the simulator; all processors by default."""
 
     def __post_init__(self) -> None:
-        require_known("task", self.ids, IDS)
+        require_known("task", self.tasks, IDS)
         require_known("agent", self.agents, AGENTS)
 
 
@@ -77,24 +72,23 @@ def has_cell(id: str, agent: str) -> bool:
     return not learner.told_the_way or challenge == "obst-trap"
 
 
-def swum(id: str, agent: str, seed: int, options: Options) -> Episodes:
+def swum(id: str, agent: str, seed: int) -> Episodes:
     """Held-out episodes of an agent."""
-    fidelity, threads = options.fidelity, options.num_threads
     if id == heading.ID:
-        return heading.swum(agent, seed, options.decisions, options.episodes, fidelity, threads)
+        return heading.swum(agent, seed, DECISIONS, EPISODES, FIDELITY)
     if agent in CONTROLLERS:
-        return swim(id, lambda batch: make_controller(agent, batch), options.episodes, fidelity, threads)
+        return swim(id, lambda batch: make_controller(agent, batch), EPISODES, FIDELITY)
     if agent == BUNDLED:
         policy = load(file_of(id))
-        return swim(id, lambda batch: policy, options.episodes, fidelity, threads)
-    model = train(id, agent, seed, options.decisions, fidelity, threads)
-    return evaluate(id, agent, model, options.episodes, fidelity, threads)
+        return swim(id, lambda batch: policy, EPISODES, FIDELITY)
+    model = train(id, agent, seed, DECISIONS, FIDELITY)
+    return evaluate(id, agent, model, EPISODES, FIDELITY)
 
 
-def cell(id: str, agent: str, seed: int, options: Options) -> dict[str, Any]:
+def cell(id: str, agent: str, seed: int) -> dict[str, Any]:
     """Result of a cell as plain data: measure, return and success of every episode, and the processor's time [s]."""
     began = time.process_time()
-    done = swum(id, agent, seed, options)
+    done = swum(id, agent, seed)
     return {
         "measure": np.round(measure_of_challenge(CHALLENGES.get(IDS[id])).of(done), 4).tolist(),
         "return": np.round(done.returns, 3).tolist(),
@@ -106,12 +100,12 @@ def cell(id: str, agent: str, seed: int, options: Options) -> dict[str, Any]:
 def study(options: Options, results: Results) -> None:
     """Swim the cells that are missing, and print all tasks."""
     cells = {
-        ("cells", f"{id}, {agent}, {seed}"): partial(cell, id, agent, seed, options)
-        for seed, id, agent in itertools.product(options.seeds, options.ids, options.agents)
+        ("cells", f"{id}, {agent}, {seed}"): partial(cell, id, agent, seed)
+        for seed, id, agent in itertools.product(options.seeds, options.tasks, options.agents)
         if has_cell(id, agent) and (agent in ALL_LEARNERS or seed == options.seeds[0])
     }
     results.fill(
-        cells, lambda found: f"{np.mean(found['measure']):.2f}", lambda found: len(found["measure"]) >= options.episodes
+        cells, lambda found: f"{np.mean(found['measure']):.2f}", lambda found: len(found["measure"]) >= EPISODES
     )
     print(*(table(row, has_cell) for row in rows_of(results, IDS)), sep="\n\n")
 
@@ -121,7 +115,7 @@ STUDY = Study(
     study,
     Options,
     "tasks/tasks.json",
-    settings=lambda options: {name: getattr(options, name) for name in ("decisions", "fidelity")},
+    settings=lambda _: {"decisions": DECISIONS, "fidelity": FIDELITY},
     pictures={"tasks.png": lambda results, file: draw(rows_of(results, IDS), file)},
     tables={
         "tasks": lambda results: means(rows_of(results, IDS)),

@@ -6,10 +6,11 @@ do not tell of the unknowns is in the intervals. Then parts of the model are lef
 whose limbs follow their curves swim by other laws of drag, laws of one constant are fitted to the same four speeds, and
 turns of two tracked swims are predicted.
 
-Speeds are kept in the folder RUNS, so the study goes on where it was interrupted. It writes
+Speeds are kept in runs/validation, so the study goes on where it was interrupted. It writes
 `validation.json` and `validation.png`.
 """
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.frame import InDocs, Results, Study, require_known
+from studies.frame import Results, Study
 from studies.validation import follow, laws, turns
 from studies.validation.inference import (
     MODEL,
@@ -129,33 +130,35 @@ def as_json(
 
 
 @dataclass(frozen=True)
-class Options(InDocs):
+class Options:
     """Unknowns from four speeds, and predictions of the others."""
 
-    samples: int = SAMPLES
-    """Samples of the unknowns."""
-    variants: tuple[str, ...] = (*LEFT_OUT, *ADDED)
-    """Parts to leave out or to add."""
     more: bool = False
     """Keep the full model that is there, and add what is missing of the others; laws of one constant are new."""
-    runs: Path = Path("runs/validation")
-    """Folder of speeds."""
 
 
-def run(options: Options, results: Results) -> None:
-    """Simulate, weigh, predict, leave parts out, add others, and compare with laws of one constant."""
-    require_known("variant", options.variants, VARIANTS)
-    conditions, fewer, few = read_speeds(), min(OF_VARIANTS, options.samples), min(OF_ADDED, options.samples)
+def run(
+    options: Options,
+    results: Results,
+    n_samples: int = SAMPLES,
+    variants: Sequence[str] = (*LEFT_OUT, *ADDED),
+    runs: Path = Path("runs/validation"),
+) -> None:
+    """Simulate, weigh, predict, leave parts out, add others, and compare with laws of one constant.
+
+    variants: Parts to leave out or to add. runs: Folder of speeds.
+    """
+    conditions, fewer, few = read_speeds(), min(OF_VARIANTS, n_samples), min(OF_ADDED, n_samples)
     if options.more:
         results.read()
     else:
-        results.update(full_model(options, fewer))
+        results.update(full_model(n_samples, fewer, runs))
     results["laws"] = laws.law_scores(conditions, training(conditions), other_fours(conditions, FOURS))
     results.save()
 
     def of_variant(name: str) -> dict[str, Any]:
         n = few if name in ADDED else fewer
-        return row(analyse(simulate(conditions, name, n, options.runs), conditions))
+        return row(analyse(simulate(conditions, name, n, runs), conditions))
 
     def of_follower(name: str) -> dict[str, Any]:
         return row(analyse(follow.speeds(conditions, samples(fewer), follow.LAWS[name]), conditions))
@@ -163,21 +166,21 @@ def run(options: Options, results: Results) -> None:
     def of_turns(second: str) -> dict[str, Any]:
         four = [conditions[k] for k in training(conditions)]
         measured, known = np.array([condition.speed for condition in four]), list(range(len(four)))
-        weight = weights(simulate(four, "full", fewer, options.runs), measured, known)
+        weight = weights(simulate(four, "full", fewer, runs), measured, known)
         return turns.examine(second, samples(fewer), weight)
 
     results.fill({("turns", second): partial(of_turns, second) for second in turns.SECOND}, turns.tell)
-    results.fill({("models", name): partial(of_variant, name) for name in options.variants}, laws.tell)
+    results.fill({("models", name): partial(of_variant, name) for name in variants}, laws.tell)
     results.fill({("followers", name): partial(of_follower, name) for name in follow.LAWS}, laws.tell)
 
 
-def full_model(options: Options, fewer: int) -> dict[str, Any]:
+def full_model(n_samples: int, fewer: int, runs: Path) -> dict[str, Any]:
     """Numbers of the full model, and of the first of its samples."""
-    conditions, values = read_speeds(), samples(options.samples)
-    simulated = simulate(conditions, "full", options.samples, options.runs)
+    conditions, values = read_speeds(), samples(n_samples)
+    simulated = simulate(conditions, "full", n_samples, runs)
     analyses = {"full": analyse(simulated, conditions), SAME_SAMPLES: analyse(simulated[:fewer], conditions)}
     found = as_json(analyses, conditions, values)
-    return found | {"discretisation": discretisation(simulated, conditions, options.runs)}
+    return found | {"discretisation": discretisation(simulated, conditions, runs)}
 
 
 STUDY = Study(

@@ -7,7 +7,7 @@ as stiff as MuJoCo makes them, keep the lengths of edges. Both codes simulate tw
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -249,15 +249,7 @@ def cases() -> dict[tuple[str, str], Callable[[], dict[str, Measured]]]:
     return found | {("free fall", str(RINGING_NODES)): falling}
 
 
-@dataclass(frozen=True)
-class Options:
-    """Discrete elastic rods of MuJoCo beside ours."""
-
-    out: Path = Path("runs/mujoco")
-    """Folder of the files."""
-
-
-def run(_: Options, results: Results) -> str | None:
+def run(results: Results) -> str | None:
     """Compute all cases."""
     for (case, setting), compute in cases().items():
         found = {code: list(each) for code, each in compute().items()}
@@ -314,6 +306,6 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
 
 
 STUDY = Study(
-    "verification.mujoco", run, Options, file="verification/mujoco.json",
+    "verification.mujoco", run, file="verification/mujoco.json", out=Path("runs/mujoco"),
     pictures={"mujoco.png": draw}, tables={"mujoco": table}, packages=("mujoco",), extra="mujoco",
 )  # fmt: skip

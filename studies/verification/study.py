@@ -5,7 +5,6 @@ Two published codes computed the chapter's straight swim. Validation would need 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 from tqdm import tqdm
@@ -31,25 +30,17 @@ BESIDE = "\n## Beside MuJoCo"
 """What begins that part of the page which is kept: `studies.verification.mujoco` fills it."""
 
 
-@dataclass(frozen=True)
-class Options:
-    """Exact solutions and published codes."""
-
-    out: Path = Path("docs/verification.md")
-    """Page to write."""
-
-
-def run(options: Options, _: Results) -> str | None:
+def run(results: Results) -> str | None:
     """Compute all sections, write the page and show it."""
     sections = [section() for section in tqdm(SECTIONS.values(), unit="section")]
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    before = options.out.read_text(encoding="utf-8") if options.out.exists() else ""
-    options.out.write_text(as_page(sections) + "".join(before.partition(BESIDE)[1:]), encoding="utf-8")
+    results.out.parent.mkdir(parents=True, exist_ok=True)
+    before = results.out.read_text(encoding="utf-8") if results.out.exists() else ""
+    results.out.write_text(as_page(sections) + "".join(before.partition(BESIDE)[1:]), encoding="utf-8")
     for section in sections:
         show(f"## {section.title}\n\n{as_table(section.rows)}")
-    print(f"Written: {options.out}")
+    print(f"Written: {results.out}")
     outside = [row.quantity for section in sections for row in section.rows if not row.holds]
     return f"Outside of their bounds: {'; '.join(outside)}." if outside else None
 
 
-STUDY = Study("verification", run, Options)
+STUDY = Study("verification", run, out=Path("docs/verification.md"))

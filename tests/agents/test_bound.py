@@ -2,6 +2,8 @@
 
 import itertools
 import json
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from seastar_gym import Numerics, Scene
 from seastar_gym.controllers.scripted import to_actions
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.options import make_scene
+from seastar_gym.envs.paths import make_path
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import body_heading
 from seastar_gym.envs.symmetry import action_table
@@ -22,6 +25,7 @@ from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.gaits import pair_gait
 from seastar_gym.simulator import Simulator
 from studies.command import main
+from studies.learning import bound
 from studies.learning.bound import (
     all_directions,
     distinct_gaits,
@@ -72,17 +76,16 @@ def test_the_path_search_visits_all_waypoints_or_says_that_it_did_not():
     assert len(search_path(FAST, corner, "pairs", beam=1, max_strokes=3)) == 0
 
 
-def test_the_pentagon_alone_can_be_searched_at_any_fidelity_and_nothing_is_written(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["learning.bound", "--only-pentagon", "--pentagon-beam", "1"]) == 0
-    strokes = int(capsys.readouterr().out.split()[1])
-    assert 145 < strokes < 180 and not list(tmp_path.iterdir())
+def test_the_narrowest_search_swims_round_the_pentagon():
+    waypoints = make_path("pentagon", np.random.default_rng(0))
+    assert 145 < len(search_path(FAST, waypoints, "pairs", beam=1)) < 180
 
 
 @pytest.mark.slow
-def test_the_study_writes_numbers_and_a_picture(tmp_path):
+def test_the_study_writes_numbers_and_a_picture(tmp_path, monkeypatch):
     file = tmp_path / "bound.json"
-    assert main(["learning.bound", "--pentagon-beam", "1", "--agents", "greedy", "--out", str(file)]) == 0
+    monkeypatch.setattr(bound, "STUDY", replace(bound.STUDY, run=partial(bound.run, beam=1)))
+    assert main(["learning.bound", "--out", str(file)]) == 0
     results = json.loads(file.read_text(encoding="utf-8"))
     assert results["fastest_gaits"][0]["searched"] == 30
     assert len(results["pentagon"]["gait"]) == results["pentagon"]["strokes"] > 150

@@ -129,7 +129,7 @@ def test_odd_facts_of_a_task_are_refused_in_a_sentence(change, sentence, tmp_pat
 def test_the_command_trains_compares_seeds_and_writes_a_card(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr("agents.tasks.command.VALIDATION", 4)
     monkeypatch.setattr("agents.tasks.card.EPISODES", 4)
-    done = ["--ids", "SeastarPrey-v0", "--seeds", "0", "1", "--decisions", "8192", "--out", str(tmp_path)]
+    done = ["--tasks", "SeastarPrey-v0", "--seeds", "0", "1", "--decisions", "8192", "--out", str(tmp_path)]
     assert main([*done, "--num-threads", "1"]) == 0
     policy = load(tmp_path / "prey.safetensors")
     assert policy.training["seeds"] == [0, 1] and policy.training["id"] == "SeastarPrey-v0"
@@ -137,7 +137,7 @@ def test_the_command_trains_compares_seeds_and_writes_a_card(monkeypatch, tmp_pa
     assert "| `fast` |" in card and "prey caught" in card and "the best of seeds 0, 1" in card
     assert capsys.readouterr().out.count("mean return") == 2
     with pytest.raises(SystemExit):
-        main(["--ids", "SeastarSwim-v0"])
+        main(["--tasks", "SeastarSwim-v0"])
     assert "has no bundled policy" in capsys.readouterr().err
 
 

@@ -1,21 +1,20 @@
 """The accuracy study: its sequences, its promises against errors that cancel, and its files."""
 
 import csv
-import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene
-from seastar_gym.accuracy import Certificate, chapter
+from seastar_gym.accuracy import Certificate
 from seastar_gym.accuracy.measure import Errors, Swims, errors, path_lengths
 from seastar_gym.accuracy.measure import swim as swim_commands
 from seastar_gym.accuracy.setting import at
 from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene.numerics import Resolution
 from seastar_gym.simulator import Simulator
-from studies.accuracy import convergence, timed
+from studies.accuracy import convergence
 from studies.accuracy import rows as accuracy_rows
 from studies.accuracy import study as accuracy
 from studies.accuracy import tables as accuracy_tables
@@ -298,19 +297,6 @@ def test_what_is_stored_can_be_promised(found, tmp_path):
     assert speeds == sorted(speeds, reverse=True)
 
 
-def test_medians_are_stored_beside_bounds_and_speeds_that_stay(found, tmp_path):
-    file = tmp_path / "strokes.json"
-    shutil.copy(chapter.STROKES, file)
-    accuracy_tables.store_typical(found.rows, file)
-    before, after = Certificate.load(chapter.STROKES), Certificate.load(file)
-    by_resolution, n = {each.resolution: each for each in found.rows}, len(presets())
-    for old, new in zip(before.settings[:n], after.settings[:n], strict=True):
-        typical = accuracy_tables.as_typical(by_resolution[old.resolution])
-        assert replace(old, typical=new.typical) == new
-        assert new.typical == typical | {"straight": old.errors["straight"]}
-    assert after.settings[n:] == before.settings[n:] and after.machine == before.machine
-
-
 def test_medians_are_of_the_sum_of_both_errors():
     cases = Cases(("a", "b", "c", "d"), ("random", "random", "random", "gait"), np.zeros((1, 4, 5)))
     paths = np.array([1.0, 5.0, 2.0, 7.0]), np.array([9.0, 1.0, 2.0, 1.0])
@@ -326,7 +312,6 @@ def test_a_study_whose_limit_is_in_doubt_is_not_stored(found, tmp_path):
     assert not (tmp_path / "strokes.json").exists()
 
 
-@pytest.mark.parametrize("module", [accuracy, timed])
-def test_quick_studies_cannot_be_stored(module):
+def test_quick_studies_cannot_be_stored():
     with pytest.raises(ValueError, match="--store needs the whole study"):
-        module.Options(quick=True, store=True)
+        accuracy.Options(quick=True, store=True)

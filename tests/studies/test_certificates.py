@@ -66,13 +66,14 @@ def test_a_certificate_is_made_once(tmp_path, monkeypatch):
 
 
 def test_numbers_that_are_there_stay_and_others_are_added_or_made_anew(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(certificates, "certify", lambda scene, samples, progress: made(scene, samples))
     monkeypatch.setattr(certificates, "told", lambda certificate: {"samples": certificate.samples})
     monkeypatch.setattr(certificates, "STUDY", replace(certificates.STUDY, tables={}))
 
     def run(samples, *robots):
-        folders = ["--out", str(tmp_path), "--folder", str(tmp_path / "kept")]
-        assert main(["designs.certificates", "--samples", str(samples), *folders, "--robots", *robots]) == 0
+        options = ["--samples", str(samples), "--robots", *robots, "--out", str(tmp_path)]
+        assert main(["designs.certificates", *options]) == 0
         found = json.loads((tmp_path / "certificates.json").read_text(encoding="utf-8"))["robots"]
         return {name: row["samples"] for name, row in found.items()}
 

@@ -27,8 +27,6 @@ class Options:
     """Seeds."""
     strokes: int = 1
     """Strokes."""
-    out: Path = Path("runs/toy")
-    """Folder of the files."""
 
     def __post_init__(self) -> None:
         require_known("number", map(str, self.seeds), list(map(str, range(20))))
@@ -46,7 +44,7 @@ def draw(results, file):
 
 
 TOY = Study(
-    "toy", swim, Options, "toys/toy.json", settings=lambda options: {"strokes": options.strokes},
+    "toy", swim, Options, "toys/toy.json", Path("runs/toy"), settings=lambda options: {"strokes": options.strokes},
     pictures={"toy.png": draw, "other.png": draw},
     tables={"toy": lambda found: f"| {sum(found['runs']['one'].values())} |"}, packages=("scipy",),
 )  # fmt: skip

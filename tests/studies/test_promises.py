@@ -10,6 +10,7 @@ from seastar_gym.accuracy.commands import CLASSES, draw_classes
 from seastar_gym.accuracy.setting import resolved
 from studies.accuracy import promises
 from studies.command import main
+from studies.frame import Results
 
 ROBOT = "short, L = 5 cm"
 
@@ -80,18 +81,21 @@ def test_a_robot_that_is_done_is_not_swum_again(few_settings, tmp_path, monkeypa
     monkeypatch.setattr(measure, "SAMPLES", 2)
     monkeypatch.setattr(measure.certify, "__defaults__", (2, 0, None))
     out, folder = tmp_path / "promises.json", tmp_path / "certificates"
-    command = ["accuracy.promises", "--samples", "2", "--robots", ROBOT]
-    command += ["--certificates", str(folder), "--out", str(out)]
-    assert main(command) == 0
+
+    def run(samples):
+        promises.run(Results({}, out), samples, (ROBOT,), folder)
+
+    run(2)
     (file,) = folder.iterdir()
     assert Certificate.load(file).samples == 2
     first = json.loads(out.read_text())
     assert set(first["robots"]) == {ROBOT} and first["robots"][ROBOT]["certified"] == 2
     assert ROBOT in capsys.readouterr().out
     monkeypatch.setattr(promises, "examine", lambda *_: pytest.fail("swum again"))
-    assert main(command) == 0
+    run(2)
     assert json.loads(out.read_text()) == first
-    assert main([*command, "--samples", "3"]) == 2 and "give another --out" in capsys.readouterr().err
+    with pytest.raises(ValueError, match="give another --out"):
+        run(3)
 
 
 @pytest.mark.slow
@@ -104,5 +108,5 @@ def test_certified_errors_hold_on_fresh_sequences_of_every_class(tmp_path):
 
 def test_results_of_another_version_are_not_mixed(tmp_path, capsys):
     (tmp_path / "promises.json").write_text(json.dumps({"samples": 2, "version": "0.0.1"}))
-    assert main(["accuracy.promises", "--samples", "2", "--out", str(tmp_path)]) == 2
+    assert main(["accuracy.promises", "--out", str(tmp_path)]) == 2
     assert "another version" in capsys.readouterr().err

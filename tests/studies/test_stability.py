@@ -13,7 +13,7 @@ from studies.command import main
 from studies.results_file import as_json
 from studies.stability import cells as stability_cells
 from studies.stability import study as stability
-from studies.stability.cases import SWEEPS, format_step, format_value, quick_sweeps
+from studies.stability.cases import SWEEPS, format_step, format_value
 
 STEPS = (3e-3, 2e-2, 0.3)
 VALUES = {"youngs_modulus": (1e2, 1e6, 1e11), "drag_coefficient": (None, 1.0), "speed": (0.0, 10.0),
@@ -43,7 +43,7 @@ def folder(cells, results, tmp_path_factory):
     return out
 
 
-def test_the_grid_covers_every_range_and_the_quick_one_keeps_the_ends():
+def test_the_grid_covers_every_range():
     ends = {sweep.name: (sweep.values[0], sweep.values[-1]) for sweep in SWEEPS}
     assert ends == {
         "youngs_modulus": (1e2, 1e11), "rod_radius": (0.01, 20.0), "nodes_per_limb": (2, 640),
@@ -51,8 +51,6 @@ def test_the_grid_covers_every_range_and_the_quick_one_keeps_the_ends():
         "peak_angle": (9.0, 179.0),
     }  # fmt: skip
     assert (stability.STEPS[0], stability.STEPS[-1]) == (1e-5, 1.0)
-    for sweep, quick in zip(SWEEPS, quick_sweeps(), strict=True):
-        assert {sweep.values[0], sweep.values[-1], sweep.chapter} <= set(quick.values) < set(sweep.values)
 
 
 def test_every_cell_has_finite_numbers_and_none_is_refused(cells):
@@ -124,9 +122,9 @@ def test_values_and_steps_are_written_as_a_reader_expects_them():
 
 def test_the_study_writes_its_files_and_prints_its_table(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(stability_cells, "REFERENCE_STEPS", 100)
-    monkeypatch.setattr(stability, "quick_sweeps", lambda: GRID)
-    monkeypatch.setattr(stability, "QUICK_STEPS", (2e-2, 0.3))
-    assert main(["stability", "--quick", "--scheme", "sdirk2", "--out", str(tmp_path / "out")]) == 0
+    monkeypatch.setattr(stability, "SWEEPS", GRID)
+    monkeypatch.setattr(stability, "STEPS", (2e-2, 0.3))
+    assert main(["stability", "--scheme", "sdirk2", "--out", str(tmp_path / "out")]) == 0
     assert "stability.csv" in capsys.readouterr().out.replace("\n", "")  # a long path is wrapped
     pictures = {"stability_needs.png", "stability_iterations.png", "stability_error.png"}
     names = {"stability.csv", "stability.json", *pictures}

@@ -62,7 +62,7 @@ def test_every_controller_swims_every_kind_of_task(id, name, monkeypatch):
         robots.append(env.unwrapped)
         return make_controller(name, env)
 
-    done = swim(id, make, 2, "fast", 1)
+    done = swim(id, make, 2, "fast")
     assert done.of("time").shape == (3, 2) and np.isfinite(done.returns).all()
     assert np.isfinite(measure_of_challenge(robots[0].challenge).of(done)).all()
     assert robots[0]._task.instance.tolist() == [0, 1] and robots[0]._task.split == "test"
@@ -71,7 +71,7 @@ def test_every_controller_swims_every_kind_of_task(id, name, monkeypatch):
 def test_random_paths_with_random_headings_are_swum_by_rules(monkeypatch):
     monkeypatch.setattr(heading, "LIMIT", 1.0)
     for agent in heading.RULES:
-        done = heading.swum(agent, 0, 0, 2, "fast", 1)
+        done = heading.swum(agent, 0, 0, 2, "fast")
         assert done.last("time").tolist() == [1.0, 1.0] and SECONDS.of(done).tolist() == [1.0, 1.0]
 
 
@@ -360,22 +360,24 @@ def test_nobody_waits_for_agents_that_a_task_has_not():
 def test_the_study_goes_on_where_it_was_broken_off(tmp_path, monkeypatch, capsys):
     swum = []
 
-    def cell(id, agent, seed, options):
+    def cell(id, agent, seed):
         swum.append((id, agent, seed))
         return {"measure": [float(len(swum))], "return": [0.0], "success": [True], "processor_seconds": 0}
 
     monkeypatch.setattr(module, "cell", cell)
+    monkeypatch.setattr(module, "EPISODES", 1)
     out = tmp_path / "tasks.json"
-    shared = ["tasks", "--ids", "SeastarPrey-v0", "--out", str(out)]
-    assert main([*shared, "--agents", "rest", "greedy", "PPO", "--seeds", "0", "--episodes", "1"]) == 0
+    shared = ["tasks", "--tasks", "SeastarPrey-v0", "--out", str(out)]
+    assert main([*shared, "--agents", "rest", "greedy", "PPO", "--seeds", "0"]) == 0
     assert [agent for _, agent, _ in swum] == ["rest", "greedy", "PPO"]
     arguments = [*shared, "--agents", "greedy"]
-    assert main([*arguments, "PPO", "--episodes", "1", "--seeds", "0", "1"]) == 0
+    assert main([*arguments, "PPO", "--seeds", "0", "1"]) == 0
     assert swum[3:] == [("SeastarPrey-v0", "PPO", 1)]  # who does not learn swims once
     cells = json.loads(out.read_text())["cells"]
     assert list(cells) == [f"SeastarPrey-v0, {name}" for name in ("rest, 0", "greedy, 0", "PPO, 0", "PPO, 1")]
     assert json.loads(out.read_text())["versions"]["torch"]
-    assert main([*arguments, "--episodes", "2", "--seeds", "0"]) == 0
+    monkeypatch.setattr(module, "EPISODES", 2)
+    assert main([*arguments, "--seeds", "0"]) == 0
     assert swum[4:] == [("SeastarPrey-v0", "greedy", 0)]  # one episode is fewer than two
     assert "## SeastarPrey-v0" in capsys.readouterr().out and out.with_suffix(".png").is_file()
     (found,) = rows_of(json.loads(out.read_text()), module.IDS)
@@ -399,4 +401,4 @@ def test_unknown_names_are_refused():
     with assert_refused("Unknown agent 'nobody'"):
         Options(agents=("nobody",))
     with assert_refused("Unknown task 'SeastarSwim-v0'"):
-        Options(ids=("SeastarSwim-v0",))
+        Options(tasks=("SeastarSwim-v0",))

@@ -9,9 +9,9 @@ from seastar_gym.accuracy.chapter import FOLDER, file_of
 from seastar_gym.accuracy.measure import path_lengths
 from seastar_gym.scene.numerics import PRESETS, Numerics
 from studies.accuracy.page import PERIODS
-from studies.accuracy.timed import QUICK, SAMPLES, SLOWEST, Plan, errors, sequences, setting
+from studies.accuracy.timed import SAMPLES, SLOWEST, Plan, errors, sequences, setting
 
-TINY = QUICK._replace(samples=2, nodes=13, short=Numerics("implicit-midpoint", 2e-3, 1e-8))
+TINY = Plan(2, 2, 13, Numerics("implicit-midpoint", 2e-3, 1e-8), ("fast", "balanced"))
 
 
 def test_half_of_the_sequences_repeat_a_second():

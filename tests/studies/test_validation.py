@@ -1,6 +1,8 @@
 """Validation against a measured swimmer: data, scenes, weights, and intervals that are honest where truth is known."""
 
 import json
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -284,8 +286,9 @@ def test_the_command_writes_its_page(tmp_path, monkeypatch):
         monkeypatch.setattr(module, "speeds", invented)
     monkeypatch.setattr(follow, "speeds", lambda conditions, values, law: made_up(values))
     monkeypatch.setattr(turns, "swum", lambda letter, second, material, values: np.full((3, 64), 0.1))
-    arguments = ["validation", "--samples", "64", "--variants", "ramp", "--runs", str(tmp_path), "--out", str(tmp_path)]
-    assert main(arguments) == 0
+    few = partial(study.run, n_samples=64, variants=("ramp",), runs=tmp_path)
+    monkeypatch.setattr(study, "STUDY", replace(study.STUDY, run=few))
+    assert main(["validation", "--out", str(tmp_path)]) == 0
     found = json.loads((tmp_path / "validation.json").read_text(encoding="utf-8"))
     assert found["discretisation"] == 0.0 and len(found["laws"]) == 13
     assert set(found["followers"]) == set(follow.LAWS)
