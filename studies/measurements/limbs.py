@@ -5,7 +5,7 @@ curve's peak, is printed beside that of the ramp of Fig. 13.5b. Then four freque
 intervals, once from spread frequencies and once from the four lowest ones. Richer and poorer models are compared in the
 same way. The chapter's robot swims with the measured limbs.
 
-Prints tables and writes `limbs.json` and `limbs.png`. Takes about three minutes on one core.
+Prints tables and writes `limbs.json` and `limbs.png`. Takes about two minutes on one core.
 """
 
 from collections.abc import Sequence
