@@ -139,12 +139,13 @@ class Description(NamedTuple):
     @property
     def frame_stack(self) -> FrameStack | None:
         """What the policy sees of present and past observations; None for a policy without memory."""
-        return FrameStack(self.reduction, self.past) if self.reduction is not None and self.past else None
+        return FrameStack(self.reduction, self.past) if self.past and self.reduction is not None else None
 
     @property
     def input_size(self) -> int:
         """Number of inputs of the network."""
-        return self.layout.size if self.frame_stack is None else self.frame_stack.size
+        frame_stack = self.frame_stack
+        return self.layout.size if frame_stack is None else frame_stack.size
 
     @property
     def distributions(self) -> tuple[int, int]:

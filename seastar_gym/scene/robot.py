@@ -217,9 +217,7 @@ class Seastar:
     @property
     def is_symmetric(self) -> bool:
         """Whether rotation by one limb and reflection at limb 1 leave the robot unchanged; in a batch, every robot."""
-        group, n = self.point_group(), self.n_limbs
-        in_order = tuple((j - 1) % n for j in range(n)), tuple(-j % n for j in range(n))
-        return group.n_turns == n and group.axis == 0.0 and group.orders[-2:] == in_order
+        return self.point_group().is_whole
 
     def point_group(self, directed: bool = False) -> PointGroup:
         """Turns and mirrors that leave the robot unchanged; in a batch, every robot.

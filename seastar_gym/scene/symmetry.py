@@ -34,6 +34,13 @@ class PointGroup(NamedTuple):
         """Whether nothing but the turn by nothing leaves the robot unchanged."""
         return self.n_turns == 1 and self.axis is None
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether turns by one limb and a mirror at limb 1 leave the robot unchanged."""
+        n = len(self.orders[0])
+        in_order = tuple((j - 1) % n for j in range(n)), tuple(-j % n for j in range(n))
+        return self.n_turns == n and self.axis == 0.0 and self.orders[-2:] == in_order
+
 
 class _Map(NamedTuple):
     """A turn z -> factor z, or a mirror z -> factor conj(z), of places x + iy."""

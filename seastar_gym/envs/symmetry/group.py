@@ -102,11 +102,10 @@ def symmetry_of(scene: Scene) -> Group:
     """
     require_kind("scene", scene, Scene, "a Scene")
     robot, nothing = scene.robot, tuple(range(scene.robot.n_limbs))
-    if robot.discretisation == "chapter":
-        return robot.n_limbs if robot.is_symmetric else PointGroup(1, None, (nothing, nothing))
     group = robot.point_group(_feels_directions(scene))
-    is_whole = robot.is_symmetric and group.n_turns == robot.n_limbs and group.axis == 0.0
-    return robot.n_limbs if is_whole else group
+    if group.is_whole:
+        return robot.n_limbs
+    return PointGroup(1, None, (nothing, nothing)) if robot.discretisation == "chapter" else group
 
 
 def _feels_directions(scene: Scene) -> bool:
