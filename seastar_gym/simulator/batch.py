@@ -60,7 +60,7 @@ class Batch:
         self._code = KnownCode()
         n_groups, n_limbs, n_rows = -(-n_robots // N_LANES), scene.robot.n_limbs, 2 * scene.robot.n_nodes
         self._scheme = scheme_of(scene.numerics.scheme, scene.numerics.damping)
-        self.make_coefficients(scene)
+        self.coefficients = Coefficients(scene, n_robots)
         self.n_node_rows = n_rows
         body = self.coefficients.rods(0).body
         n_free_rows, n_place_rows = (n_rows, n_rows) if body is None else (n_rows + 2, n_rows + 2 + 2 * body.n_arms)
@@ -79,10 +79,6 @@ class Batch:
         self.last_hub = self.hub_position()
         self.workers = Workers(threads)
         self.memory = [self._make_memory() for _ in range(threads)]
-
-    def make_coefficients(self, scene: Scene) -> None:
-        """Make the coefficients of all robots anew, from a scene of the same terms."""
-        self.coefficients = Coefficients(scene, self.n_robots)
 
     def _make_memory(self) -> tuple[Work, Actuation]:
         n_limbs = self._scene.robot.n_limbs

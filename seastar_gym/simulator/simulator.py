@@ -79,7 +79,10 @@ class Simulator:
         self.n_robots = int(n_robots)
         self.threads = min(-(-self.n_robots // N_LANES), processors() if threads is None else int(threads))
         self.device = device
-        self._batch = self._make_batch(effort)
+        self._batch = (
+            Batch(scene, self.n_robots, self.threads, effort) if device == "cpu"
+            else DeviceBatch(scene, self.n_robots, device, effort)
+        )  # fmt: skip
         self._drive = Drive(scene.actuator, self.n_robots, scene.robot.n_limbs, scene.numerics.step)
         self._clock = Clock(self.n_robots)
         self._lock = StrokeLock()
@@ -93,11 +96,6 @@ class Simulator:
             twin._growth, twin._may_warn_of_overlap = None, False
             self._bars = ErrorBars(twin, self.n_robots)
         self.set_limb_strengths(scene.limb_strengths or 1.0)
-
-    def _make_batch(self, effort: bool) -> Batch:
-        if self.device == "cpu":
-            return Batch(self.scene, self.n_robots, self.threads, effort)
-        return DeviceBatch(self.scene, self.n_robots, self.device, effort)
 
     @property
     def coefficients(self) -> Coefficients:
@@ -143,7 +141,7 @@ class Simulator:
         """Context of a change of state; a new state of all robots repairs a simulator whose change was interrupted."""
         with self._lock.change(repairs=of_all):
             if self._lock.broken and of_all:
-                self._batch.make_coefficients(self.scene)
+                self._batch.coefficients = Coefficients(self.scene, self.n_robots)
                 self._drive.set_actuator(self.scene.actuator)
                 if self._bars is not None:
                     self._bars.twin.set_scene(twin_scene(self.scene))
