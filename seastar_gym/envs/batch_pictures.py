@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.camera import Camera
 from seastar_gym.envs.frame import Frame, frames_of
-from seastar_gym.envs.rendering import LARGEST, SMALLEST, Renderer, renderer_of
+from seastar_gym.envs.rendering import LARGEST, SMALLEST, Renderer
 from seastar_gym.envs.swimming import Swimming
 
 Picture = NDArray[np.uint8]
@@ -61,8 +61,7 @@ class BatchPictures:
 
     def _draw(self, robot: int, frame: Frame) -> Picture:
         renderer, body = self._get_renderer(), self._task.simulator.scene.of_robot(robot).robot
-        waypoints, headings = self._task.waypoints_of(robot), self._task.headings_of(robot)
-        renderer.reset(waypoints, body.limb_length, body.rod_radius, headings)
+        renderer.reset(self._task.waypoints_of(robot), body, self._task.headings_of(robot))
         renderer.camera = self._cameras.get(robot, renderer.camera)
         picture = renderer.draw(frame)
         self._cameras[robot] = renderer.camera
@@ -72,5 +71,5 @@ class BatchPictures:
         if self._renderer is None:
             body = self._task.simulator.scene.of_robot(0).robot
             size = picture_size(self._task.n_robots)
-            self._renderer = renderer_of(body, self._task.waypoints_of(0), self._task.waypoint_radius, size)
+            self._renderer = Renderer(body, self._task.waypoints_of(0), self._task.waypoint_radius, size)
         return self._renderer

@@ -75,27 +75,22 @@ class Renderer:
 
     def __init__(
         self,
-        limb_nodes: ArrayLike,
+        robot: Seastar,
         waypoints: ArrayLike,
-        *,
-        limb_length: float,
-        rod_radius: float,
         waypoint_radius: float,
         size: tuple[int, int] = LARGEST,
         headings: ArrayLike | None = None,
     ) -> None:
         """
-        limb_nodes: Numbers of the nodes of every limb from hub to tip, shape (n_limbs, nodes_per_limb).
-        waypoints: Planned path from the origin [m], shape (n, 2).
-        limb_length, rod_radius, waypoint_radius: Sizes of the robot and of the waypoints [m].
-        size: Width and height of the picture [px].
+        robot: One, of numbers. waypoints: Planned path from the origin [m], shape (n, 2).
+        waypoint_radius: Radius of the waypoints [m]. size: Width and height of the picture [px].
         headings: Asked headings at the waypoints [rad], shape (n,). None draws none.
         """
         if size[0] < SMALLEST[0] or size[1] < SMALLEST[1]:
             smallest = f"{SMALLEST[0]} x {SMALLEST[1]}"
             raise ValueError(f"A picture must be at least {smallest} pixels, not {size[0]} x {size[1]}.")
-        self._limb_nodes = np.asarray(limb_nodes)
-        self._limb_length, self._rod_radius, self._waypoint_radius = limb_length, rod_radius, waypoint_radius
+        self._robot, self._waypoint_radius = robot, waypoint_radius
+        self._limb_nodes = limb_nodes(robot.n_limbs, robot.nodes_per_limb)
         self.size = size
         self._text_height = max(12, round(0.027 * min(size)))
         self._canvas = Canvas(size, self._text_height)
@@ -103,26 +98,20 @@ class Renderer:
         self._flow: tuple[Camera, AnyCurrent | None, Flow] | None = None
         self.reset(waypoints, headings=headings)
 
-    def reset(
-        self,
-        waypoints: ArrayLike,
-        limb_length: float | None = None,
-        rod_radius: float | None = None,
-        headings: ArrayLike | None = None,
-    ) -> None:
-        """Take a new path [m], shape (n, 2), and fit the view to it; take new sizes of the robot [m], where given.
+    def reset(self, waypoints: ArrayLike, robot: Seastar | None = None, headings: ArrayLike | None = None) -> None:
+        """Take a new path [m], shape (n, 2), and fit the view to it.
 
+        robot: With as many nodes, and other sizes perhaps. None means the same.
         headings: Asked headings at the waypoints [rad], shape (n,). None draws none.
         """
         self._headings = None if headings is None else np.array(headings, dtype=np.float64)
-        self._limb_length = self._limb_length if limb_length is None else limb_length
-        self._rod_radius = self._rod_radius if rod_radius is None else rod_radius
+        self._robot = robot or self._robot
         self._waypoints = np.array(waypoints, dtype=np.float64)
         self._path = np.concatenate([np.zeros((1, 2)), self._waypoints])
         self._labels = waypoint_labels(self._path)
         width, height = self.size
         strip = round(2.0 * self._text_height)
-        margin = VIEW_MARGIN * self._limb_length
+        margin = VIEW_MARGIN * self._robot.limb_length
         corners = np.concatenate([self._path - margin, self._path + margin])
         self.camera = Camera(corners, (0, strip, width, height - 2 * strip))
 
@@ -150,7 +139,7 @@ class Renderer:
         self._check(frame)
         for points in (frame.positions, frame.roots, frame.outline, frame.scenery.points):
             if points is not None and len(points) and not self.camera.sees(points):
-                self.camera = self.camera.widened(points, REFIT_MARGIN * self._limb_length)
+                self.camera = self.camera.widened(points, REFIT_MARGIN * self._robot.limb_length)
         self._paint_background(frame)
         self._paint_trail(frame.trail)
         self._number_waypoints(frame.waypoint_index)
@@ -235,18 +224,21 @@ class Renderer:
                 self._canvas.stroke(dash, PLANNED, width=2.0)
         self._canvas.dot(self.camera.to_pixels([0.0, 0.0]), PLANNED, radius=max(2.5, 0.16 * self._text_height))
 
+    def _waypoints_to_paint(self, waypoint_index: int) -> list[tuple[int, int]]:
+        """States and numbers: where a path passes a point twice, the current one covers one to come, that one done."""
+        return sorted((_state(index, waypoint_index), index) for index in range(len(self._waypoints)))
+
     def _paint_waypoints(self, waypoint_index: int) -> None:
         radius = self._ring_radius()
-        # Where a path passes a point twice, the current waypoint is drawn over one to come, and that over one done.
-        for state, index in sorted((_state(index, waypoint_index), index) for index in range(len(self._waypoints))):
+        for state, index in self._waypoints_to_paint(waypoint_index):
             self._paint_ring(self.camera.to_pixels(self._waypoints[index]), radius, state)
 
     def _paint_headings(self, waypoint_index: int) -> None:
         """Arrows from the waypoints in the directions of their asked headings."""
         if self._headings is None:
             return
-        radius, length = self._ring_radius(), POINTER * self._limb_length * self.camera.scale
-        for state, index in sorted((_state(index, waypoint_index), index) for index in range(len(self._waypoints))):
+        radius, length = self._ring_radius(), POINTER * self._robot.limb_length * self.camera.scale
+        for state, index in self._waypoints_to_paint(waypoint_index):
             towards = np.array([np.cos(self._headings[index]), -np.sin(self._headings[index])])
             tip = self.camera.to_pixels(self._waypoints[index]) + (radius + length) * towards
             barbs = tip - 0.35 * length * (towards + np.outer([0.6, -0.6], towards[::-1] * [-1.0, 1.0]))
@@ -275,7 +267,7 @@ class Renderer:
         if frame.roots is not None:
             nodes[:, 0] = frame.roots
         limbs = self.camera.to_pixels(nodes)
-        width = max(0.16 * self._text_height, 2 * self._rod_radius * self.camera.scale)
+        width = max(0.16 * self._text_height, 2 * self._robot.rod_radius * self.camera.scale)
         widths = width * np.where(frame.command == 0.0, 1.0, 1.6)
         self._paint_body(frame, width)
         for limb, limb_width in zip(limbs, widths, strict=True):
@@ -356,28 +348,6 @@ class Renderer:
         self._canvas.stroke(np.array([[start, middle], [end, middle]]), INK, width=2.0)
         for x in (start, end):
             self._canvas.stroke(np.array([[x, middle - tick], [x, middle + tick]]), INK, width=2.0)
-
-
-def renderer_of(
-    robot: Seastar,
-    waypoints: ArrayLike,
-    waypoint_radius: float,
-    size: tuple[int, int] = LARGEST,
-    headings: ArrayLike | None = None,
-) -> Renderer:
-    """Renderer of a robot on a path through waypoints [m], shape (n, 2), of this radius [m]; size in [px].
-
-    headings: Asked headings at the waypoints [rad], shape (n,). None draws none.
-    """
-    return Renderer(
-        limb_nodes(robot.n_limbs, robot.nodes_per_limb),
-        waypoints,
-        limb_length=robot.limb_length,
-        rod_radius=robot.rod_radius,
-        waypoint_radius=waypoint_radius,
-        size=size,
-        headings=headings,
-    )
 
 
 def _dashes(ends: FloatArray, length: float) -> FloatArray:

@@ -10,7 +10,7 @@ from seastar_gym.accuracy.info import warn_uncertified
 from seastar_gym.envs.commands import to_commands, unless_strokes
 from seastar_gym.envs.frame import Frame, frames_of
 from seastar_gym.envs.options import SwimOptions, with_options
-from seastar_gym.envs.rendering import Renderer, renderer_of
+from seastar_gym.envs.rendering import Renderer
 from seastar_gym.envs.swimming import Outcome, Swimming
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.task_env import TaskEnv, checked_options
@@ -300,7 +300,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         self._frames = []
         if self._renderer is not None:
             robot = self.simulator.scene.of_robot(0).robot
-            self._renderer.reset(self.waypoints, robot.limb_length, robot.rod_radius, self._task.headings_of(0))
+            self._renderer.reset(self.waypoints, robot, self._task.headings_of(0))
         self._draw_frame()
         return self._task.observe()[0], _of_one_robot(self._task.first_info())
 
@@ -351,9 +351,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     def _get_renderer(self) -> Renderer:
         if self._renderer is None:
             robot = self.simulator.scene.of_robot(0).robot
-            self._renderer = renderer_of(
-                robot, self.waypoints, self._task.waypoint_radius, headings=self._task.headings_of(0)
-            )
+            radius, headings = self._task.waypoint_radius, self._task.headings_of(0)
+            self._renderer = Renderer(robot, self.waypoints, radius, headings=headings)
         return self._renderer
 
     def render(self) -> NDArray[np.uint8] | list[NDArray[np.uint8]] | None:  # type: ignore[override]

@@ -30,6 +30,7 @@ from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent
 
 pygame = pytest.importorskip("pygame")
 
+ROBOT = Seastar(nodes_per_limb=10)
 LIMB_NODES = np.array([[0, *range(1 + 9 * limb, 10 + 9 * limb)] for limb in range(5)])
 
 
@@ -46,7 +47,7 @@ def frame_of(hub=(0.0, 0.0), command=(0, 0, 0, 0, 0), trail=((0.0, 0.0),), waypo
 
 def renderer_of(path="pentagon", size=(480, 360)):
     waypoints = make_path(path, np.random.default_rng(0)) if isinstance(path, str) else np.array(path)
-    return Renderer(LIMB_NODES, waypoints, limb_length=0.1, rod_radius=1.6e-3, waypoint_radius=0.01, size=size)
+    return Renderer(ROBOT, waypoints, 0.01, size)
 
 
 def colour_at(picture, renderer, point):
@@ -112,7 +113,8 @@ def test_drawing_needs_no_display():
         "import numpy as np; import pygame\n"
         "from seastar_gym.envs.frame import Frame\n"
         "from seastar_gym.envs.rendering import Renderer\n"
-        "renderer = Renderer([[0, 1], [0, 2]], [[0.1, 0.0]], limb_length=0.1, rod_radius=1e-3, waypoint_radius=0.01)\n"
+        "from seastar_gym.scene import Seastar\n"
+        "renderer = Renderer(Seastar(2, 2), [[0.1, 0.0]], 0.01)\n"
         "positions = np.array([[0.0, 0.0], [0.1, 0.0], [-0.1, 0.0]])\n"
         "picture = renderer.draw(Frame(positions, np.array([1.0, 0.0]), positions[:1], 0, 0.0))\n"
         "assert not pygame.display.get_init()\n"
@@ -201,10 +203,7 @@ def test_everything_looks_as_it_did_when_somebody_looked_at_it():
         note="wires 1 and 2 swapped",
     )  # fmt: skip
     path = np.array([[0.15, 0.0], [0.15, 0.2], [0.0, 0.2], [0.15, 0.2], [-0.1, 0.3]])
-    renderer = Renderer(
-        LIMB_NODES, path, limb_length=0.1, rod_radius=1.6e-3, waypoint_radius=0.01, size=(640, 480),
-        headings=[0.0, 1.0, 2.0, -1.0, 3.0],
-    )  # fmt: skip
+    renderer = Renderer(ROBOT, path, 0.01, (640, 480), [0.0, 1.0, 2.0, -1.0, 3.0])
     roots = 0.02 * np.exp(0.4j * np.pi * np.arange(5)) + 0.1
     frame = frame_of((0.1, 0.0), (1, -1, 0.5, 0, -0.2), [(0.0, 0.0), (0.06, 0.03), (0.1, 0.0)], 1, 3.25)
     frame = replace(
