@@ -397,7 +397,15 @@ class Swimming(ABC):
         if self._tracker is not None:
             self._tracker.look(self.simulator.time)
         score = self._reward_terms(hub, pulses_of(report.heating_time, followed))
-        info = {
+        info = self._info(hub, score, commands, followed, report)
+        reward = functools.reduce(operator.add, score.terms.values())
+        return Outcome(reward, score.over | (report.status != 0), info, followed)
+
+    def _info(
+        self, hub: Floats | None, score: Score, commands: Floats, followed: Floats, report: StrokeReport
+    ) -> dict[str, NDArray[Any]]:
+        """Info after a decision; arguments as of `facts` and `_judge`."""
+        return {
             **self.facts(hub),
             "is_success": score.success,
             "limbs_heated": (followed != 0.0).sum(axis=1),
@@ -412,27 +420,15 @@ class Swimming(ABC):
             **({} if self.scene.contact is None else {"largest_overlap": report.largest_overlap}),
             **score.terms,
         }
-        reward = functools.reduce(operator.add, score.terms.values())
-        return Outcome(reward, score.over | (report.status != 0), info, followed)
 
     def first_info(self) -> dict[str, NDArray[Any]]:
         """Info before the first decision, with the names and types of a decision's info. Arrays are shared."""
-        counts, none = np.zeros(self.n_robots, np.int64), np.zeros(self.n_robots)
-        return {
-            **self.facts(),
-            "is_success": np.zeros(self.n_robots, bool),
-            "limbs_heated": counts,
-            "heating_time": none,
-            "energy": none,
-            **({"work": none, "peak_moment": none} if self._effort else {}),
-            **({"masked_limbs": counts} if self._can_be_masked else {}),
-            "newton_iterations": counts,
-            "solver_status": counts,
-            "solver_message": self._messages(counts),
-            "smallest_opening_angle": np.full(self.n_robots, min(self.scene.robot.opening_angle, np.pi)),
-            **({} if self.scene.contact is None else {"largest_overlap": none}),
-            **dict.fromkeys(self.TERMS, none),
-        }
+        counts, none, never = (np.zeros(self.n_robots, kind) for kind in (np.int64, np.float64, bool))
+        angle = np.full(self.n_robots, min(self.scene.robot.opening_angle, np.pi))
+        known = {"status": counts, "newton_iterations": counts, "smallest_opening_angle": angle}
+        report = StrokeReport(**{**dict.fromkeys(StrokeReport._fields, none), **known})
+        score, still = Score(dict.fromkeys(self.TERMS, none), never, never), np.zeros_like(self.last_commands)
+        return self._info(None, score, still, still, report)
 
     def facts(self, hub: Floats | None = None) -> dict[str, NDArray[Any]]:
         """What is known of every robot now; arrays over robots, units as in the environment's docstring.
