@@ -282,10 +282,9 @@ def settings() -> dict[str, float]:
     return {"largest_change": LARGEST, "tries": TRIES, "uneven": UNEVEN, "strokes_fitted": SWUM}
 
 
-def run(results: Results) -> str | None:
+def run(results: Results) -> None:
     """Compute what is missing."""
     results.fill(CELLS, str)
-    return None
 
 
 def table_of_pulses(results: Mapping[str, Any]) -> str:

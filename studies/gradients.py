@@ -268,14 +268,13 @@ def settings() -> dict[str, float]:
     return {"strokes": STROKES, "swims": SWIMS, "newton_tolerance": NEWTON_TOLERANCE, "timed_strokes": SWUM}
 
 
-def run(results: Results) -> str | None:
+def run(results: Results) -> None:
     """Measure all cases and costs that are missing."""
     cases = {
         ("growth", name): partial(lambda case: as_data(growth(case, STROKES, SWIMS)), CASES[name]) for name in CASES
     }
     costs = {("cost", name): partial(cost, names) for name, names in UNKNOWNS.items()}
     results.fill(cases | costs, lambda found: f"{found.get('gradient', found.get('swims'))}")
-    return None
 
 
 def cases_of(results: Mapping[str, Any]) -> dict[str, Any]:

@@ -78,14 +78,14 @@ def score(policy: Policy, actions: Actions = "continuous") -> float:
 class Stopwatch:
     """Processor time of a training, and its scores."""
 
-    def __init__(self) -> None:
+    def __init__(self, actions: Actions = "continuous") -> None:
         self.scores: Scores = []
-        self._paused, self._began = 0.0, time.process_time()
+        self._actions, self._paused, self._began = actions, 0.0, time.process_time()
 
-    def score(self, decisions: int, policy: Policy, actions: Actions = "continuous") -> None:
+    def score(self, decisions: int, policy: Policy) -> None:
         """Score what is learned so far."""
         began = time.process_time()
-        found = score(policy, actions)
+        found = score(policy, self._actions)
         self.scores.append([decisions, rounded(began - self._began - self._paused, 4), rounded(found, 4)])
         self._paused += time.process_time() - began
 
@@ -320,7 +320,7 @@ class Scoring(BaseCallback):
 
     def __init__(self, decisions: int, actions: Actions):
         super().__init__()
-        self._decisions, self._actions, self.watch = decisions, actions, Stopwatch()
+        self._decisions, self.watch = decisions, Stopwatch(actions)
 
     def _on_step(self) -> bool:
         return True
@@ -328,7 +328,7 @@ class Scoring(BaseCallback):
     def _on_rollout_start(self) -> None:
         done = self.num_timesteps
         if done * SCORES // self._decisions > len(self.watch.scores):
-            self.watch.score(done, self.model, self._actions)
+            self.watch.score(done, self.model)
 
 
 def by_ppo(decisions: int, seed: int, actions: Actions = "continuous", settings: Hyperparameters = OF_PPO) -> Scores:
@@ -336,7 +336,7 @@ def by_ppo(decisions: int, seed: int, actions: Actions = "continuous", settings:
     env = BatchVecEnv(VectorSymmetryReduction(swimmers(settings.num_envs, actions)))
     model, scoring = make_model(env, settings, seed), Scoring(decisions, actions)
     model.learn(decisions, callback=scoring)
-    scoring.watch.score(model.num_timesteps, model, actions)
+    scoring.watch.score(model.num_timesteps, model)
     return scoring.watch.scores
 
 
@@ -369,14 +369,13 @@ def settings() -> dict[str, Any]:
     return {"episode": EPISODE, "held_out": HELD_OUT, "decisions": [FEW, MANY, OF_PAIRS]}
 
 
-def run(results: Results) -> str | None:
+def run(results: Results) -> None:
     """Train what is missing, on one thread."""
     torch.set_num_threads(1)
     cells: dict[tuple[str, ...], Callable[[], Any]] = {("rules",): rules}
     for seed in SEEDS:
         cells |= {("learners", name, str(seed)): partial(train, seed) for name, train in LEARNERS.items()}
     results.fill(cells, lambda found: str(found if isinstance(found, dict) else found[-1]))
-    return None
 
 
 def reached(scores: Scores, enough: float) -> tuple[float, float]:

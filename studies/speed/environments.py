@@ -71,7 +71,7 @@ def simulated(id: str) -> float:
     return float(info["time"] if is_ours(id) else env.dt)
 
 
-def run(results: Results) -> str | None:
+def run(results: Results) -> None:
     """Time all environments."""
     kinds: dict[str, Callable[[str], Single | Batch]] = {"single": Single, "batch": Batch}
     rooms = {(id, name): kind(id) for id in BATCHES for name, kind in kinds.items()}
@@ -87,7 +87,6 @@ def run(results: Results) -> str | None:
         found = {name: float(np.median(rates[id, name])) for name in kinds}
         results.row(["decisions_per_second"])[id] = found | {"simulated": simulated(id), "robots": BATCHES[id]}
         print(id, found, flush=True)
-    return None
 
 
 def table(results: Mapping[str, Any]) -> str:

@@ -249,13 +249,12 @@ def cases() -> dict[tuple[str, str], Callable[[], dict[str, Measured]]]:
     return found | {("free fall", str(RINGING_NODES)): falling}
 
 
-def run(results: Results) -> str | None:
+def run(results: Results) -> None:
     """Compute all cases."""
     for (case, setting), compute in cases().items():
         found = {code: list(each) for code, each in compute().items()}
         results.row([case])[setting] = found
         print(case, setting, found, flush=True)
-    return None
 
 
 TOLD = {"tip load": ("20", "40"), "ringing": ("200",)}
