@@ -85,6 +85,7 @@ class LearnedPolicy:
         self.actions = description.actions
         self.scene = description.scene
         self.reduction, self.frame_stack = description.reduction, description.frame_stack
+        self._n_seen, self._outputs = description.observation_size, description.distributions  # asked every decision
         self.decision_period = description.decision_period or description.scene.actuator.period
         self.training = training or {}
         self.rng = np.random.default_rng(0) if rng is None else rng
@@ -105,11 +106,10 @@ class LearnedPolicy:
         """
         require_flag("deterministic", deterministic)
         observation, n_limbs = as_floating("observation", observation), self.scene.robot.n_limbs
-        size = self.description.observation_size
-        if observation.ndim not in (1, 2) or observation.shape[-1] != size:
+        if observation.ndim not in (1, 2) or observation.shape[-1] != self._n_seen:
             raise ValueError(
-                f"This policy was trained on a robot of {n_limbs} limbs: it sees {size} numbers, not an observation of "
-                f"shape {observation.shape}."
+                f"This policy was trained on a robot of {n_limbs} limbs: it sees {self._n_seen} numbers, not an "
+                f"observation of shape {observation.shape}."
             )
         if self.reduction is None:
             return self._choose(observation, deterministic), None
@@ -153,7 +153,7 @@ class LearnedPolicy:
             x = x @ self.weights[f"{layer}.weight"].T + self.weights[f"{layer}.bias"]
             if layer < layers - 1:
                 x = np.tanh(x)
-        return x.reshape(*x.shape[:-1], *self.description.distributions)
+        return x.reshape(*x.shape[:-1], *self._outputs)
 
     def require_fit(self, scene: Scene, actions: Actions, n_seen: int, challenge: "Challenge | None" = None) -> None:
         """ValueError, with one sentence, where this policy cannot drive the robot of an environment.
