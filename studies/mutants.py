@@ -342,11 +342,19 @@ class Options:
     """Number of mutants."""
     seed: int = 0
     """Which are drawn."""
+    rooms: tuple[str, ...] = tuple(ROOMS)
+    """Rooms."""
+    seconds: float = 600.0
+    """Time limit of a mutant."""
+
+    def __post_init__(self) -> None:
+        require_known("room", self.rooms, ROOMS)
 
 
 def run(options: Options, results: Results) -> None:
     """Draw mutants and say which survive."""
-    results.update(study(Path.cwd(), ROOMS, options.count, options.seed, SECONDS, results.out))
+    rooms = {room: ROOMS[room] for room in options.rooms}
+    results.update(study(Path.cwd(), rooms, options.count, options.seed, options.seconds, results.out))
     print(json.dumps({name: value for name, value in results.items() if name != "mutants"}))
 
 
