@@ -387,6 +387,7 @@ def test_the_confidence_of_an_interval_is_between_0_and_1(measurement, confidenc
 def test_a_synthetic_measurement_has_eight_strokes_25_pictures_a_second_and_a_millimetre_of_noise():
     scene = Scene(Seastar(nodes_per_limb=3), numerics=Numerics("implicit-midpoint", 0.02))
     found = synthetic(scene, {})
+    assert found.nodes == (0, 2, 4, 6, 8, 10)
     assert len(found.commands) == 8 and len(found.time) == 200 and np.ptp(found.time) == pytest.approx(7.96)
     exact = trajectory(found.time, found.nodes, found.commands, scene)
     assert np.std(found.positions - exact) == pytest.approx(1e-3, rel=0.05)

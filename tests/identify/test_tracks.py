@@ -61,7 +61,7 @@ Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,,X,Y,Z,,X,Y,Z
 2,0.016667,0.0,0.5,0.0,0.8660254,11.0,500.0,19.0,0.1,1,2,3,1.0,1.5,500.0,-4.5
 """
 MOTIVE_WITH_PARENTS = """\
-Format Version,1.25,Take Name,Take 2,Capture Frame Rate,120.0,Rotation Type,Quaternion,Length Units,Meters
+Format Version,1.25,Take Name,Take 2,Capture Frame Rate,120.0,Rotation Type,Quaternion,Length Units,Meters,
 ,Type,,Marker,Marker,Marker
 ,Name,,Tip,Tip,Tip
 ,ID,,"4CF0B31A","4CF0B31A","4CF0B31A"
@@ -181,6 +181,9 @@ def test_four_points_tell_the_plane_of_a_camera_that_looks_from_the_side(tmp_pat
     np.testing.assert_allclose(mapped(found, pixels_of(inside)), inside, atol=1e-12)
     many = homography(pixels_of(inside), inside)
     np.testing.assert_allclose(mapped(many, pixels_of(corners)), corners, atol=1e-12)
+    noisy = pixels_of(inside) + rng.normal(size=(20, 2))  # wherever pixels are counted from
+    here, there = (mapped(homography(noisy + begin, inside), noisy + begin) for begin in (0.0, [1e4, 0.0]))
+    np.testing.assert_allclose(there, here, atol=1e-9)
     lines = [",".join(f"{x:.12g}" for x in row) for row in np.hstack([pixels_of(corners), corners])]
     file = written(tmp_path, "corners.csv", "u,v,x,y\n" + "\n".join(lines) + "\n")
     np.testing.assert_allclose(mapped(read_homography(file), pixels_of(inside)), inside, atol=1e-9)

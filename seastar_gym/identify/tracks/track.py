@@ -107,5 +107,5 @@ def _turn(places: Floats, nodes: NDArray[np.intp], scene: Scene) -> float:
             "the track as it is, with --aligned, if it begins at the origin with limb 1 along +x."
         )
     shape = scene.robot.nodes()[nodes]
-    (x, y), (a, b) = (places - places.mean(axis=0)).T, (shape - shape.mean(axis=0)).T
+    (x, y), (a, b) = (places - places.mean(axis=0)).T, shape.T
     return float(np.arctan2(y @ a - x @ b, x @ a + y @ b))
