@@ -23,6 +23,7 @@ from seastar_gym.scene import Contact, Limb, Numerics, Scene, Seastar, SmaPulse,
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.results_file import rounded
 from studies.style import DPI, INK, PERCENT, as_percent, subplots
 
@@ -157,12 +158,12 @@ def table(results: Mapping[str, Any]) -> str:
     """Errors [%] and orders of all scenes in Markdown, both discretisations side by side."""
     kinds = ("continuum", "chapter")
     head = [f"{kind}, N = {n}" if n == TOLD[0] else str(n) for kind in kinds for n in (*TOLD, "order")]
-    lines = [["scene", *head], ["---", *["---:"] * len(head)]]
+    lines = []
     found = {(row.name, row.discretisation): row for row in rows_of(results)}
     for name in dict.fromkeys(name for name, _ in found):
         rows = [found.get((name, kind)) for kind in kinds]
         lines.append([name, *(cell for row in rows for cell in _cells(row))])
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown(["scene", *head], lines)
 
 
 def _cells(row: Row | None) -> list[str]:

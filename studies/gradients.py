@@ -32,6 +32,7 @@ from seastar_gym.scene import Contact, Scene, SmaWires, Vortex, Water
 from seastar_gym.scene.per_robot import at, side_by_side, with_numbers
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.results_file import rounded
 from studies.style import DPI, INK, subplots
 
@@ -256,11 +257,10 @@ def cost(names: list[str]) -> dict[str, float]:
 
 def cost_table(results: Mapping[str, Any]) -> str:
     """Table of costs in Markdown."""
-    lines = ["| unknowns | gradient | dual lanes | differences |", "|---|---:|---:|---:|"]
-    for name, found in results["cost"].items():
-        cells = [f"{found[way]:.2g}" if way in found else "" for way in ("gradient", "dual lanes", "differences")]
-        lines.append(f"| {name} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+    ways = ("gradient", "dual lanes", "differences")
+    costs = results["cost"].items()
+    rows = [[name, *(f"{found[way]:.2g}" if way in found else "" for way in ways)] for name, found in costs]
+    return markdown(["unknowns", *ways], rows)
 
 
 def settings() -> dict[str, float]:
@@ -290,17 +290,14 @@ def largest(case: Mapping[str, Any], of: str) -> Floats:
 
 def table(results: Mapping[str, Any]) -> str:
     """Table of growth in Markdown."""
-    strokes = [f"after {n}" for n in SHOWN]
-    lines = [
-        f"| swims | {' | '.join(strokes)} | above {LIMIT:.0f} from stroke | shape after {SHOWN[0]} |",
-        f"|---|{'---:|' * (len(SHOWN) + 2)}",
-    ]
+    rows = []
     for name, case in cases_of(results).items():
         worst, shape = largest(case, "nodes"), largest(case, "shape")
         above = np.flatnonzero(worst > LIMIT)
-        cells = [f"{worst[n - 1]:.2g}" for n in SHOWN] + [str(above[0] + 1) if above.size else "-"]
-        lines.append(f"| {name} | {' | '.join(cells)} | {shape[SHOWN[0] - 1]:.1g} |")
-    return "\n".join(lines)
+        cells = [*(f"{worst[n - 1]:.2g}" for n in SHOWN), above[0] + 1 if above.size else "-"]
+        rows.append([name, *cells, f"{shape[SHOWN[0] - 1]:.1g}"])
+    strokes = (f"after {n}" for n in SHOWN)
+    return markdown(["swims", *strokes, f"above {LIMIT:.0f} from stroke", f"shape after {SHOWN[0]}"], rows)
 
 
 def draw(results: Mapping[str, Any], path: Path) -> None:

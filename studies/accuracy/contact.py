@@ -29,6 +29,7 @@ from seastar_gym.simulator import Simulator
 from studies.accuracy.settings import MS
 from studies.accuracy.work_precision import cost, draw_sequences, finite
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.results_file import rounded
 from studies.style import PERCENT
 
@@ -134,20 +135,16 @@ def run(results: Results) -> None:
 
 def table(results: Mapping[str, Any]) -> str:
     """Table of the contacts that were examined as a whole in Markdown."""
-    nodes = " | ".join(f"N = {n}" for n in NODES)
-    lines = [
-        f"| contact | {nodes} | `certify` | from the default's path | thrown, m/s | cost |",
-        f"|---|{'---:|' * (len(NODES) + 4)}",
-    ]
+    rows = []
     for name in KINDS:
         bounds, speed = (results[what][name] for what in ("bounds", "thrown"))
         row = results["contacts"][name]
         each = [f"{_percent(row['largest'][str(n)])}, {_percent(row['median'][str(n)])}" for n in NODES]
         away = ", ".join(map(_percent, reversed(row["away"])))
         shown = name if name == CONES else f"`{name}`"
-        cells = *each, _percent(bounds), away, f"{speed:g}", f"x {row['cost']:.1f}"
-        lines.append(f"| {shown} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        rows.append([shown, *each, _percent(bounds), away, f"{speed:g}", f"x {row['cost']:.1f}"])
+    nodes = (f"N = {n}" for n in NODES)
+    return markdown(["contact", *nodes, "`certify`", "from the default's path", "thrown, m/s", "cost"], rows)
 
 
 def _percent(share: float | None) -> str:

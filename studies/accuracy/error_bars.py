@@ -28,6 +28,7 @@ from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.error_bars import factor
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.style import FAINT, INK, PERCENT, subplots
 
 Floats = NDArray[np.float64]
@@ -151,25 +152,18 @@ def rows_of(results: Mapping[str, Any]) -> list[Row]:
 def of_robots(results: Mapping[str, Any]) -> str:
     """Table of coverage and sharpness at the fidelities in Markdown."""
     rows = rows_of(results)
-    lines = [
-        "| robot | fidelity | true error [um] | coverage | lowest class | estimate / true error | factor needed |",
-        "|---|---|---:|---:|---|---:|---:|",
-        *(_line(row) for row in rows if row.setting in FIDELITIES),
-        "",
-        _shortfall(rows),
-    ]
-    return "\n".join(lines)
+    head = [
+        "robot", "fidelity", "true error [um]", "coverage", "lowest class", "estimate / true error", "factor needed",
+    ]  # fmt: skip
+    table = markdown(head, [_line(row) for row in rows if row.setting in FIDELITIES], (0, 1, 4))
+    return f"{table}\n\n{_shortfall(rows)}"
 
 
 def of_settings(results: Mapping[str, Any]) -> str:
     """Table of factors, coverage and costs of all settings in Markdown."""
     rows, costs = rows_of(results), results["costs"]
-    lines = [
-        "| setting | factor | needed | lowest coverage | estimate / true error | cost |",
-        "|---|---:|---:|---:|---:|---:|",
-        *(_summary(name, [row for row in rows if row.setting == name], costs[name]) for name in SETTINGS),
-    ]
-    return "\n".join(lines)
+    found = [_summary(name, [row for row in rows if row.setting == name], costs[name]) for name in SETTINGS]
+    return markdown(["setting", "factor", "needed", "lowest coverage", "estimate / true error", "cost"], found)
 
 
 def _shortfall(rows: list[Row]) -> str:
@@ -178,18 +172,18 @@ def _shortfall(rows: list[Row]) -> str:
     return f"Below {PERCENT * LEVEL:.0f} %, here and at the settings below: {'; '.join(short) or 'none'}."
 
 
-def _line(row: Row) -> str:
+def _line(row: Row) -> list[str]:
     lowest = "all 100 %" if row.lowest == 1.0 else f"{row.lowest_class}, {PERCENT * row.lowest:.0f} %"
-    return (
-        f"| {row.robot} | {row.setting} | {1e6 * row.error:.3g} | {PERCENT * row.coverage:.1f} % | {lowest} | "
-        f"{row.sharpness:.1f} | {row.needed:.1f} |"
-    )
+    return [
+        row.robot, row.setting, f"{1e6 * row.error:.3g}", f"{PERCENT * row.coverage:.1f} %", lowest,
+        f"{row.sharpness:.1f}", f"{row.needed:.1f}",
+    ]  # fmt: skip
 
 
-def _summary(name: str, rows: list[Row], times: float) -> str:
+def _summary(name: str, rows: list[Row], times: float) -> list[str]:
     used, needed = factor(at(Scene(), SETTINGS[name])), max(row.needed for row in rows)
     lowest, dullest = min(row.coverage for row in rows), max(row.sharpness for row in rows)
-    return f"| {name} | {used:g} | {needed:.1f} | {PERCENT * lowest:.1f} % | {dullest:.1f} | x {times:.1f} |"
+    return [name, f"{used:g}", f"{needed:.1f}", f"{PERCENT * lowest:.1f} %", f"{dullest:.1f}", f"x {times:.1f}"]
 
 
 def draw(rows: list[Row], path: Path) -> None:

@@ -24,6 +24,7 @@ from seastar_gym.scene.limb import Limb
 from seastar_gym.scene.section import AnySection, Disc, Section
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.style import INK, subplots
 
 Floats = NDArray[np.float64]
@@ -183,11 +184,11 @@ def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
 
 def table(results: Mapping[str, Any]) -> str:
     """Table of scenes in Markdown: pictures, code and costs."""
-    lines = ["| | scene | cost |", "|---|---|---:|"]
+    rows = []
     for exhibit in exhibits():
         picture, cost = f"![{exhibit.name}](gallery/{_file_name(exhibit)})", results["scenes"][exhibit.name]["cost"]
-        lines.append(f"| {picture} | **{exhibit.name}**<br>`{exhibit.code}` | {cost:.2f} |")
-    return "\n".join(lines)
+        rows.append([picture, f"**{exhibit.name}**<br>`{exhibit.code}`", f"{cost:.2f}"])
+    return markdown(["", "scene", "cost"], rows, (0, 1))
 
 
 def _file_name(exhibit: Exhibit) -> str:
