@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from seastar_gym import DomainRandomization, HeadingTargets, Sight, Uniform
 from seastar_gym.envs.buffers import Buffers
+from seastar_gym.files import save_figure
 from seastar_gym.scene import (
     AlongLimb,
     Attachment,
@@ -377,7 +378,7 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
     )
     axes.grid(color=FAINT, lw=0.4)
     axes.legend()
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def settings(options: Options) -> dict[str, Any]:

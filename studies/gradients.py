@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.learned import bundled_file, load
 from seastar_gym.envs.commands import to_commands
+from seastar_gym.files import save_figure
 from seastar_gym.gaits import PAIRS, STRAIGHT, lagged_gait, pentagon_gait, timed
 from seastar_gym.gradients import differentiate, record
 from seastar_gym.scene import Contact, Scene, SmaWires, Vortex, Water
@@ -34,7 +35,7 @@ from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study
 from studies.pages import markdown
 from studies.results_file import rounded
-from studies.style import DPI, INK, subplots
+from studies.style import CYCLE, INK, subplots
 
 Floats = NDArray[np.float64]
 Commands = Callable[[int, int, np.random.Generator], Floats]
@@ -46,7 +47,7 @@ SHOWN = (10, 100)
 """Strokes of the table."""
 LIMIT = 10.0
 """Growth up to which whole swims are differentiated."""
-OTHERS = {"random, in a vortex": "#cc7a00", "random, vacuum": "#cc3355"}
+OTHERS = {"random, in a vortex": CYCLE[1], "random, vacuum": CYCLE[3]}
 """Cases whose tangents grow, and their colours."""
 TANGENTS = ("start", "pulse")
 
@@ -306,16 +307,16 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
     for axis, of, title in zip(axes, ("nodes", "shape"), ("Positions of the nodes", "Shape"), strict=True):
         for name, case in cases_of(results).items():
             growth_of_case = largest(case, of)
-            colour = OTHERS.get(name, "#3366aa")
+            colour = OTHERS.get(name, CYCLE[0])
             axis.loglog(np.arange(1, len(growth_of_case) + 1), growth_of_case, color=colour, lw=1.2, alpha=0.8)
         axis.axhline(LIMIT, color=INK, lw=0.8, ls=":")
-        axis.set_title(title, loc="left", color=INK, fontsize=10)
+        axis.set_title(title, loc="left")
         axis.set_xlabel("strokes")
     axes[0].set_ylabel("tangent over that after the first stroke")
     axes[0].text(10, 1e6, "vacuum", color=OTHERS["random, vacuum"], ha="right")
     axes[0].text(3, 3e1, "in a vortex", color=OTHERS["random, in a vortex"])
-    axes[0].text(3, 1e-2, "in water at rest: all others", color="#3366aa")
-    figure.savefig(path, dpi=DPI)
+    axes[0].text(3, 1e-2, "in water at rest: all others", color=CYCLE[0])
+    save_figure(figure, path)
 
 
 STUDY = Study(

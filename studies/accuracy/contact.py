@@ -26,7 +26,7 @@ from seastar_gym.der.contact import contact
 from seastar_gym.scene import Contact, Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import DAMPING, PRESETS, Resolution
 from seastar_gym.simulator import Simulator
-from studies.accuracy.settings import MS
+from studies.accuracy.settings import MILLI
 from studies.accuracy.work_precision import cost, draw_sequences, finite
 from studies.frame import Results, Study
 from studies.pages import markdown
@@ -46,12 +46,12 @@ CONES = "cones"
 NODES = (10, 19, 37)
 LIMIT = 73
 """Nodes per limb, and of the swims that stand for the continuum."""
-STEPS = {10: 1 * MS, 19: 1 * MS, 37: 0.5 * MS, LIMIT: 0.25 * MS}
+STEPS = {10: 1 * MILLI, 19: 1 * MILLI, 37: 0.5 * MILLI, LIMIT: 0.25 * MILLI}
 SPEEDS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0)
 """Speeds of tips that are thrown at each other [m/s]."""
 WORST = ("repeated ternary", "repeated continuous", "alternating ternary")
 """Classes of commands for which `certify` finds the largest errors of contact."""
-CERTIFIED = Resolution("continuum", 19, Numerics("implicit-midpoint", 1 * MS, 1e-7, damping=DAMPING))
+CERTIFIED = Resolution("continuum", 19, Numerics("implicit-midpoint", 1 * MILLI, 1e-7, damping=DAMPING))
 
 
 def cone(reach: float, distance: float, opening_angle: float) -> float:
@@ -101,7 +101,7 @@ def thrown(name: str) -> float:
 def survives(touch: Contact, speed: float) -> bool:
     """Whether a robot swims on whose limbs 1 and 2 are thrown at each other, their tips so fast [m/s]."""
     robot = Seastar(nodes_per_limb=10)
-    simulator = Simulator(Scene(robot, None, numerics=Numerics("sdirk2", 20 * MS), contact=touch))
+    simulator = Simulator(Scene(robot, None, numerics=Numerics("sdirk2", 20 * MILLI), contact=touch))
     state = simulator.get_state()
     x, y = np.moveaxis(state.positions[0, 1:] - state.positions[0, 0], -1, 0)
     turning = np.repeat([1.0, -1.0, 0.0, 0.0, 0.0], 9) * speed / robot.limb_length

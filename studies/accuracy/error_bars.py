@@ -23,13 +23,14 @@ from tqdm import tqdm
 from seastar_gym.accuracy.commands import CLASSES, draw_classes
 from seastar_gym.accuracy.measure import SHORT, swim
 from seastar_gym.accuracy.setting import at
+from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar, Water, relaxation_time
 from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.error_bars import factor
 from studies.frame import Results, Study
 from studies.pages import markdown
-from studies.style import FAINT, INK, PERCENT, subplots
+from studies.style import CYCLE, FAINT, PERCENT, subplots
 
 Floats = NDArray[np.float64]
 
@@ -190,7 +191,7 @@ def draw(rows: list[Row], path: Path) -> None:
     """Picture of coverage and sharpness over robots, for the fidelities."""
     figure, (left, right) = subplots(1, 2, figsize=(9.2, 3.8), sharey=True)
     names = list(dict.fromkeys(row.robot for row in rows))
-    for shift, (fidelity, colour) in enumerate(zip(FIDELITIES, ("#cc7a00", "#3366aa", "#118855"), strict=True)):
+    for shift, (fidelity, colour) in enumerate(zip(FIDELITIES, (CYCLE[1], CYCLE[0], CYCLE[2]), strict=True)):
         some = [row for row in rows if row.setting == fidelity]
         y = [names.index(row.robot) + 0.2 * (shift - 1) for row in some]
         left.plot([PERCENT * row.coverage for row in some], y, "o", color=colour, label=fidelity)
@@ -204,10 +205,9 @@ def draw(rows: list[Row], path: Path) -> None:
     left.set_xlabel("strokes covered [%]; bars: lowest class; line: wanted")
     right.set_xlabel("median of estimate / true error; lines: 1 and 5")
     right.set_xlim(0.0, None)
-    left.set_title("Held-out sequences of all classes", color=INK, fontsize=10, loc="left")
-    figure.legend(*left.get_legend_handles_labels(), loc="outside upper right", ncols=3, frameon=False)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=130)
+    left.set_title("Held-out sequences of all classes", loc="left")
+    figure.legend(*left.get_legend_handles_labels(), loc="outside upper right", ncols=3)
+    save_figure(figure, path)
 
 
 def run(results: Results) -> str | None:

@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from seastar_gym.files import save_figure
 from seastar_gym.scene.numerics import Fidelity
 from studies.accuracy.pictures import CHAPTERS, OTHERS, OURS, PUBLISHED, published_error
 from studies.pages import markdown
-from studies.style import DPI, INK, MS, PERCENT, as_numbers, as_percent, subplots
+from studies.style import INK, MS, PERCENT, as_numbers, as_percent, subplots
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,7 +58,6 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
         each.remove()
     wide = figure.add_subplot(grid[0, :], sharey=axes[1, 0])
     wide.grid(True, which="major", color="0.92", lw=0.8)
-    wide.spines[["top", "right"]].set_visible(False)
     small = axes[1:].ravel()
     for each in small[1:]:
         each.sharex(small[0])
@@ -72,9 +72,8 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
         each.set_axis_off()
     figure.supxlabel("processor time per stroke of a robot, one core [ms]  (slower →)", fontsize=11)
     figure.supylabel("largest distance from the path in the continuum, over its length", fontsize=11)
-    figure.legend(*wide.get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False, fontsize=10)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=DPI)
+    figure.legend(*wide.get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=10)
+    save_figure(figure, file)
 
 
 def _draw_panel(axes: Axes, rows: Sequence[Row], title: str, column: Column) -> None:
@@ -96,7 +95,7 @@ def _draw_panel(axes: Axes, rows: Sequence[Row], title: str, column: Column) -> 
         axes.annotate(preset["preset"][0], (x, y), (0, -0.5), textcoords="offset points", fontsize=7.5,
                       color="white", ha="center", va="center", fontweight="bold")  # fmt: skip
     axes.set(xscale="log", yscale="log")
-    axes.set_title(title, fontsize=10, loc="left", color=INK)
+    axes.set_title(title, loc="left")
     as_numbers(axes.xaxis)
     as_percent(axes.yaxis)
 

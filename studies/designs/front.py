@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from seastar_gym.executors.processes import Processes
+from seastar_gym.files import save_figure
 from seastar_gym.scene import Contact, Scene, SmaPulse
 from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.configurations import Swim, configuration_with
@@ -21,7 +22,7 @@ from studies.designs.space import MEASURED, SETTLING, Body
 from studies.frame import Results, Study
 from studies.pages import markdown
 from studies.results_file import rounded
-from studies.style import DPI, INK, MM, subplots
+from studies.style import INK, MM, subplots
 
 Table = dict[str, Any]
 SWIM = Swim(SETTLING, MEASURED)
@@ -150,7 +151,7 @@ def draw(results: Table, file: Path) -> None:
     ticks = (3, 5, 10, 20)
     ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     ax.set_xticks([], minor=True)
-    figure.savefig(file, dpi=DPI)
+    save_figure(figure, file)
 
 
 STUDY = Study(

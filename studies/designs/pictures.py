@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from seastar_gym.files import save_figure
 from studies.pages import markdown
-from studies.style import CYCLE, DPI, FAINT, INK, subplots
+from studies.style import CYCLE, FAINT, INK, MM, subplots
 
-MM = 1e3
 COLOURS = {1.0: FAINT, 0.75: CYCLE[5], 0.5: CYCLE[0], 0.25: CYCLE[1]}
 """Colours of the tapers."""
 RANGES = (
@@ -108,7 +108,7 @@ def draw(found: dict[str, Any], file: Path) -> None:
     for ax in axes[:, 0]:
         ax.set_ylabel("speed [mm/s]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
-    figure.savefig(file, dpi=DPI)
+    save_figure(figure, file)
 
 
 def _boxes(ax: Any, spreads: dict[str, list[float]]) -> None:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.files import save_figure
 from seastar_gym.scene import Contact, Numerics, Scene, Seastar, Strip, Tube
 from seastar_gym.scene.actuators.limited import Limited
 from seastar_gym.scene.actuators.measured import MeasuredCurve
@@ -179,7 +180,7 @@ def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
     axes.set_xlim(-128, 128)
     axes.set_ylim(-128, 128)
     axes.axis("off")
-    figure.savefig(file, dpi=320, bbox_inches="tight", pad_inches=0.02)
+    save_figure(figure, file, dpi=320, bbox_inches="tight", pad_inches=0.02)
 
 
 def table(results: Mapping[str, Any]) -> str:

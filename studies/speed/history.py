@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from seastar_gym.files import save_figure
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
@@ -146,7 +147,7 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
     axes.set(ylabel="time over that of the first run", ylim=(0.0, None))
     axes.set_xticks(range(len(runs)), [f"{date.split()[0]}\n{row['commit']}" for date, row in runs.items()])
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 STUDY = Study(

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from seastar_gym.evaluation.statistics import crossed_interval
+from seastar_gym.files import save_figure
 from studies.pages import markdown
 from studies.style import CYCLE, FAINT, as_numbers, subplots
 from studies.tasks.rows import MORE_IS_BETTER, ORDER, Row
@@ -91,7 +92,7 @@ def draw(rows: Sequence[Row], file: Path) -> None:
     handles = [grid[0, 0].plot([], [], "o-", color=colour, lw=2.5)[0] for colour in (FAINT, CYCLE[0])]
     figure.legend(handles, ["rule or planner", "learned"], title="mean and its 95 % interval",
                   loc="outside upper center", ncols=2)  # fmt: skip
-    figure.savefig(file)
+    save_figure(figure, file)
 
 
 def _draw_row(axes: Any, row: Row) -> None:

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.pages import markdown
+from studies.style import PERCENT
 from studies.validation.speeds import Condition
 from studies.validation.swimmer import measured_curve
 
 Floats = NDArray[np.float64]
 
 POWERS_OF_FREQUENCY, POWERS_OF_CHANGE = (0.0, 0.5, 1.0), (0.0, 0.5, 1.0, 2.0)
-PER_CENT = 100.0
 ERRORS = "error of 33 speeds [%]", "with other fours [%]: median (5 to 95)"
 """Columns of the tables."""
 LARGEST = 0.25
@@ -101,7 +101,7 @@ def tried(results: dict[str, Any]) -> str:
 
 def tell(one: dict[str, Any]) -> str:
     """Errors of a model in a line."""
-    error, middle = PER_CENT * one["score"]["error"], PER_CENT * one["fours"]["error"][1]
+    error, middle = PERCENT * one["score"]["error"], PERCENT * one["fours"]["error"][1]
     return f"{error:.1f} %, {middle:.1f} % with other fours, powers {one['powers']}"
 
 
@@ -115,5 +115,5 @@ def _name(law: dict[str, Any]) -> str:
 
 
 def _row(name: str, error: float, fours: Sequence[float]) -> list[str]:
-    low, middle, high = (PER_CENT * each for each in fours)
-    return [name, f"{PER_CENT * error:.1f}", f"{middle:.1f} ({low:.1f} to {high:.1f})"]
+    low, middle, high = (PERCENT * each for each in fours)
+    return [name, f"{PERCENT * error:.1f}", f"{middle:.1f} ({low:.1f} to {high:.1f})"]

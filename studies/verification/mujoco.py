@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simulator import Simulator, State
@@ -303,7 +304,7 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     axes.set_xlabel("processor time for a simulated second [s]")
     axes.set_ylabel("largest error of the tip [% of its amplitude]")
     axes.legend()
-    figure.savefig(file)
+    save_figure(figure, file)
 
 
 STUDY = Study(
