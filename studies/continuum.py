@@ -18,13 +18,15 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from seastar_gym.accuracy.measure import path_lengths
+from seastar_gym.files import save_figure
 from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene import Contact, Limb, Numerics, Scene, Seastar, SmaPulse, Vortex, Water
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.results_file import rounded
-from studies.style import DPI, INK, PERCENT, as_percent, subplots
+from studies.style import CYCLE, PERCENT, as_percent, subplots
 
 TAU = 5e-3
 """Relaxation time of the damping [s] that keeps orders of convergence clean: undamped limbs ring for the whole swim."""
@@ -157,12 +159,12 @@ def table(results: Mapping[str, Any]) -> str:
     """Errors [%] and orders of all scenes in Markdown, both discretisations side by side."""
     kinds = ("continuum", "chapter")
     head = [f"{kind}, N = {n}" if n == TOLD[0] else str(n) for kind in kinds for n in (*TOLD, "order")]
-    lines = [["scene", *head], ["---", *["---:"] * len(head)]]
+    lines = []
     found = {(row.name, row.discretisation): row for row in rows_of(results)}
     for name in dict.fromkeys(name for name, _ in found):
         rows = [found.get((name, kind)) for kind in kinds]
         lines.append([name, *(cell for row in rows for cell in _cells(row))])
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown(["scene", *head], lines)
 
 
 def _cells(row: Row | None) -> list[str]:
@@ -175,7 +177,7 @@ def _cells(row: Row | None) -> list[str]:
 def draw(rows: list[Row], path: Path) -> None:
     """Picture of errors over nodes, one line per scene; colours tell the discretisations apart."""
     figure, axes = subplots(figsize=(6.4, 4.8))
-    colours = {"chapter": "#cc7a00", "continuum": "#3366aa"}
+    colours = {"chapter": CYCLE[1], "continuum": CYCLE[0]}
     label: dict[str, Any] = {"transform": axes.transAxes, "ha": "right", "fontweight": "bold"}
     for discretisation, colour in colours.items():
         lines = [row.errors for row in rows if row.discretisation == discretisation and row.name != LUMPED]
@@ -194,8 +196,8 @@ def draw(rows: list[Row], path: Path) -> None:
     as_percent(axes.yaxis)
     axes.set_xlabel("nodes per limb")
     axes.set_ylabel("largest error of the hub's path")
-    axes.set_title("A line per scene, thick lines their geometric mean", color=INK, fontsize=10, loc="left")
-    figure.savefig(path, dpi=DPI)
+    axes.set_title("A line per scene, thick lines their geometric mean", loc="left")
+    save_figure(figure, path)
 
 
 def run(results: Results) -> str | None:

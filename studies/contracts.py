@@ -12,6 +12,7 @@ from gymnasium.envs.registration import EnvSpec
 import seastar_gym
 from seastar_gym.benchmark import page, results
 from studies.frame import DOCS, Study
+from studies.pages import markdown
 
 DEEPER = re.compile(r"^#", re.MULTILINE)
 SETTINGS = re.compile(r"(?<= are)\n\n\| id .*?\n(?=\n)", re.DOTALL)
@@ -38,17 +39,17 @@ def environment(entry_point: str) -> type[Any]:
 
 def registered() -> str:
     """Table of all ids: what `gym.make` gives by default."""
-    head = "| id | contract | actions | numbers seen | decision [s] | limit [decisions] | threshold |"
-    return "\n".join([head, "|---|---|---|---:|---:|---:|---:|", *map(row, specs())])
+    head = ["id", "contract", "actions", "numbers seen", "decision [s]", "limit [decisions]", "threshold"]
+    return markdown(head, map(row, specs()), (0, 1, 2))
 
 
-def row(spec: EnvSpec) -> str:
+def row(spec: EnvSpec) -> list[str]:
     """Row of an id. An environment of a task has a link to its challenge, whose docstring is the contract."""
     env: Any = gym.make(spec.id, disable_env_checker=True).unwrapped
     (size,) = env.observation_space.shape
     limit, threshold = (f"{value:g}" if value else "-" for value in (spec.max_episode_steps, spec.reward_threshold))
-    cells = [f"`{spec.id}`", of_class(env), actions(env.action_space), str(size), f"{env.decision_period:g}", limit]
-    return f"| {' | '.join([*cells, threshold])} |"
+    period = f"{env.decision_period:g}"
+    return [f"`{spec.id}`", of_class(env), actions(env.action_space), str(size), period, limit, threshold]
 
 
 def of_class(env: Any) -> str:

@@ -31,6 +31,7 @@ from seastar_gym.scene import Contact, Limb, Scene, SmaWires
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.per_robot import with_numbers
 from studies.frame import DOCS, RESULTS, Results, Study
+from studies.pages import markdown
 from studies.results_file import rounded
 
 Floats = NDArray[np.float64]
@@ -291,31 +292,24 @@ def table_of_pulses(results: Mapping[str, Any]) -> str:
     """Table in Markdown of the shortest swims."""
     found = results["pulses"]["pentagon"]["shortest_s"]
     found = found[:: max(len(found) // 2, 1)]
-    return "\n".join(
-        [
-            f"| gradients | {' | '.join(str(int(spent)) for spent, _ in found)} |",
-            f"|---|{'---:|' * len(found)}",
-            f"| round the pentagon [s] | {' | '.join(f'{seconds:.1f}' for _, seconds in found)} |",
-        ]
-    )
+    row = ["round the pentagon [s]", *(f"{seconds:.1f}" for _, seconds in found)]
+    return markdown(["gradients", *(int(spent) for spent, _ in found)], [row])
 
 
 def table_of_radii(results: Mapping[str, Any]) -> str:
     """Table in Markdown of the limbs."""
-    lines = ["| limb | radii from root to tip [mm] | speed [mm/s] | work [mJ] |", "|---|---|---:|---:|"]
+    rows = []
     for name, found in results["radii"].items():
         fine = found["at"]["reference"]
         radii = ", ".join(f"{radius:.2f}" for radius in found["radii_mm"])
-        lines.append(f"| {name} | {radii} | {fine['mm_per_s']:.2f} | {fine['mJ_per_stroke']:.3g} |")
-    return "\n".join(lines)
+        rows.append([name, radii, f"{fine['mm_per_s']:.2f}", f"{fine['mJ_per_stroke']:.3g}"])
+    return markdown(["limb", "radii from root to tip [mm]", "speed [mm/s]", "work [mJ]"], rows, (0, 1))
 
 
 def table_of_fits(results: Mapping[str, Any]) -> str:
     """Table in Markdown of both fits."""
-    lines = ["| twenty radii fitted by | processor time [s] | misfit left [µm] |", "|---|---:|---:|"]
-    for name, found in results["fit"].items():
-        lines.append(f"| {name} | {found['processor_s']:.2g} | {found['rms_um']:.2g} |")
-    return "\n".join(lines)
+    rows = [[name, f"{one['processor_s']:.2g}", f"{one['rms_um']:.2g}"] for name, one in results["fit"].items()]
+    return markdown(["twenty radii fitted by", "processor time [s]", "misfit left [µm]"], rows)
 
 
 STUDY = Study(

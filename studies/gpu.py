@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from seastar_gym import DomainRandomization, HeadingTargets, Sight, Uniform
 from seastar_gym.envs.buffers import Buffers
+from seastar_gym.files import save_figure
 from seastar_gym.scene import (
     AlongLimb,
     Attachment,
@@ -37,6 +38,7 @@ from seastar_gym.scene.numerics import Fidelity, SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.results_file import rounded
 from studies.speed.operations import count_operations, numbers_moved
 from studies.speed.terms import scenes as scenes_of_terms
@@ -340,21 +342,21 @@ def share_of_bandwidth(results: Mapping[str, Any], preset: str, n_robots: str) -
 
 def speeds(results: Mapping[str, Any]) -> str:
     """Table of speeds: the GPU's largest batch, 4,096 robots on it, and on the processor beside it."""
-    lines = [
-        "| scene | robots on the GPU | million steps per second | share of its bandwidth | with 4,096 robots |"
-        " on the host | ratio |",
-        "|---|---:|---:|---:|---:|---:|---:|",
-    ]
+    head = [
+        "scene", "robots on the GPU", "million steps per second", "share of its bandwidth", "with 4,096 robots",
+        "on the host", "ratio",
+    ]  # fmt: skip
+    rows = []
     for name, row in results.get("speed", {}).items():
         of_gpu, beside = row["cuda"], row["cpu"][str(USUAL)]["steps_per_second"]
         largest = max(of_gpu, key=int)
         share = f"{100 * share_of_bandwidth(results, name, largest):.0f} %" if name in results["traffic"] else ""
         fastest, usual = (of_gpu[size]["steps_per_second"] for size in (largest, str(min(USUAL, int(largest)))))
-        lines.append(
-            f"| {name} | {int(largest):,} | {fastest / 1e6:.1f} | {share} | {usual / 1e6:.1f} | {beside / 1e6:.2f} "
-            f"| {fastest / beside:.1f} |"
-        )
-    return "\n".join(lines)
+        rows.append([
+            name, f"{int(largest):,}", f"{fastest / 1e6:.1f}", share, f"{usual / 1e6:.1f}", f"{beside / 1e6:.2f}",
+            f"{fastest / beside:.1f}",
+        ])  # fmt: skip
+    return markdown(head, rows)
 
 
 def draw(results: Mapping[str, Any], path: Path) -> None:
@@ -376,7 +378,7 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
     )
     axes.grid(color=FAINT, lw=0.4)
     axes.legend()
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def settings(options: Options) -> dict[str, Any]:

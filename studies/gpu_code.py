@@ -23,6 +23,7 @@ from seastar_gym.simd.device import Program
 from seastar_gym.simulator.device_batch import DeviceBatch, program_of
 from studies.frame import Results, Study
 from studies.gpu import EVERYTHING, scenes
+from studies.pages import markdown
 
 ARCHITECTURES = ("sm_80", "sm_90")
 """NVIDIA's names of the A100's and the H100's instructions."""
@@ -89,17 +90,13 @@ def run(results: Results) -> str | None:
 
 def registers(results: Mapping[str, Any]) -> str:
     """Table of registers and of bytes spilled, by scene and architecture."""
-    lines = [
-        f"| scene | {' | '.join(f'{name}: registers | bytes spilled, read back' for name in ARCHITECTURES)} |",
-        "|---|" + "---:|---:|" * len(ARCHITECTURES),
-    ]
+    head = [column for name in ARCHITECTURES for column in (f"{name}: registers", "bytes spilled, read back")]
+    rows = []
     for name, row in results["needs"].items():
-        cells = [
-            f"{row[each]['registers']} | {row[each]['spill_stores']}, {row[each]['spill_loads']}"
-            for each in ARCHITECTURES
-        ]
-        lines.append(f"| {name} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        found = [row[each] for each in ARCHITECTURES]
+        pairs = [(one["registers"], f"{one['spill_stores']}, {one['spill_loads']}") for one in found]
+        rows.append([name, *(cell for pair in pairs for cell in pair)])
+    return markdown(["scene", *head], rows)
 
 
 STUDY = Study("gpu_code", run, file="speed/gpu_code.json", out=Path("runs/gpu_code"), tables={"gpu_code": registers})

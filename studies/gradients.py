@@ -26,14 +26,16 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.learned import bundled_file, load
 from seastar_gym.envs.commands import to_commands
+from seastar_gym.files import save_figure
 from seastar_gym.gaits import PAIRS, STRAIGHT, lagged_gait, pentagon_gait, timed
 from seastar_gym.gradients import differentiate, record
 from seastar_gym.scene import Contact, Scene, SmaWires, Vortex, Water
 from seastar_gym.scene.per_robot import at, side_by_side, with_numbers
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.results_file import rounded
-from studies.style import DPI, INK, subplots
+from studies.style import CYCLE, INK, subplots
 
 Floats = NDArray[np.float64]
 Commands = Callable[[int, int, np.random.Generator], Floats]
@@ -45,7 +47,7 @@ SHOWN = (10, 100)
 """Strokes of the table."""
 LIMIT = 10.0
 """Growth up to which whole swims are differentiated."""
-OTHERS = {"random, in a vortex": "#cc7a00", "random, vacuum": "#cc3355"}
+OTHERS = {"random, in a vortex": CYCLE[1], "random, vacuum": CYCLE[3]}
 """Cases whose tangents grow, and their colours."""
 TANGENTS = ("start", "pulse")
 
@@ -256,11 +258,10 @@ def cost(names: list[str]) -> dict[str, float]:
 
 def cost_table(results: Mapping[str, Any]) -> str:
     """Table of costs in Markdown."""
-    lines = ["| unknowns | gradient | dual lanes | differences |", "|---|---:|---:|---:|"]
-    for name, found in results["cost"].items():
-        cells = [f"{found[way]:.2g}" if way in found else "" for way in ("gradient", "dual lanes", "differences")]
-        lines.append(f"| {name} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+    ways = ("gradient", "dual lanes", "differences")
+    costs = results["cost"].items()
+    rows = [[name, *(f"{found[way]:.2g}" if way in found else "" for way in ways)] for name, found in costs]
+    return markdown(["unknowns", *ways], rows)
 
 
 def settings() -> dict[str, float]:
@@ -289,17 +290,14 @@ def largest(case: Mapping[str, Any], of: str) -> Floats:
 
 def table(results: Mapping[str, Any]) -> str:
     """Table of growth in Markdown."""
-    strokes = [f"after {n}" for n in SHOWN]
-    lines = [
-        f"| swims | {' | '.join(strokes)} | above {LIMIT:.0f} from stroke | shape after {SHOWN[0]} |",
-        f"|---|{'---:|' * (len(SHOWN) + 2)}",
-    ]
+    rows = []
     for name, case in cases_of(results).items():
         worst, shape = largest(case, "nodes"), largest(case, "shape")
         above = np.flatnonzero(worst > LIMIT)
-        cells = [f"{worst[n - 1]:.2g}" for n in SHOWN] + [str(above[0] + 1) if above.size else "-"]
-        lines.append(f"| {name} | {' | '.join(cells)} | {shape[SHOWN[0] - 1]:.1g} |")
-    return "\n".join(lines)
+        cells = [*(f"{worst[n - 1]:.2g}" for n in SHOWN), above[0] + 1 if above.size else "-"]
+        rows.append([name, *cells, f"{shape[SHOWN[0] - 1]:.1g}"])
+    strokes = (f"after {n}" for n in SHOWN)
+    return markdown(["swims", *strokes, f"above {LIMIT:.0f} from stroke", f"shape after {SHOWN[0]}"], rows)
 
 
 def draw(results: Mapping[str, Any], path: Path) -> None:
@@ -308,16 +306,16 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
     for axis, of, title in zip(axes, ("nodes", "shape"), ("Positions of the nodes", "Shape"), strict=True):
         for name, case in cases_of(results).items():
             growth_of_case = largest(case, of)
-            colour = OTHERS.get(name, "#3366aa")
+            colour = OTHERS.get(name, CYCLE[0])
             axis.loglog(np.arange(1, len(growth_of_case) + 1), growth_of_case, color=colour, lw=1.2, alpha=0.8)
         axis.axhline(LIMIT, color=INK, lw=0.8, ls=":")
-        axis.set_title(title, loc="left", color=INK, fontsize=10)
+        axis.set_title(title, loc="left")
         axis.set_xlabel("strokes")
     axes[0].set_ylabel("tangent over that after the first stroke")
     axes[0].text(10, 1e6, "vacuum", color=OTHERS["random, vacuum"], ha="right")
     axes[0].text(3, 3e1, "in a vortex", color=OTHERS["random, in a vortex"])
-    axes[0].text(3, 1e-2, "in water at rest: all others", color="#3366aa")
-    figure.savefig(path, dpi=DPI)
+    axes[0].text(3, 1e-2, "in water at rest: all others", color=CYCLE[0])
+    save_figure(figure, path)
 
 
 STUDY = Study(

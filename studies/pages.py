@@ -6,7 +6,7 @@ A page has tables and footers between lines `<!-- made: NAME -->` and `<!-- end 
 import json
 import re
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -40,6 +40,13 @@ def numbers(docs: Path, study: Study) -> Any:
 def told(docs: Path, studies: Sequence[Study]) -> list[Study]:
     """Studies whose numbers are in the folder, or that keep none."""
     return [study for study in studies if not study.file or study.committed(docs, study.file).exists()]
+
+
+def markdown(head: Sequence[object], rows: Iterable[Sequence[object]], texts: Collection[int] = (0,)) -> str:
+    """Table in Markdown. texts: Columns that hold texts; others hold numbers, which stand on the right."""
+    rule = "|".join("---" if column in texts else "---:" for column in range(len(head)))
+    first, *others = (f"| {' | '.join(map(str, line))} |" for line in (head, *rows))
+    return "\n".join([first, f"|{rule}|", *others])
 
 
 def show(text: str) -> None:

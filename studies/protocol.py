@@ -38,8 +38,8 @@ from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.simulated import SimulatedPlant
 from seastar_gym.plant.swim import PlantSwim
 from seastar_gym.scene.per_robot import with_numbers
-from studies.accuracy.page import markdown
 from studies.frame import Results, Study
+from studies.pages import markdown
 
 Floats = NDArray[np.float64]
 

@@ -1,6 +1,7 @@
 """Style of all studies' pictures: one place for colours, letters, units and axes.
 
-A picture begins with `subplots` or `new_figure`. matplotlib is imported only where something is drawn.
+A picture begins with `subplots` or `new_figure`, and `seastar_gym.files.save_figure` writes it. matplotlib is imported
+only where something is drawn.
 """
 
 from __future__ import annotations
@@ -17,13 +18,12 @@ INK, FAINT, GRID = "#1b1f26", "#80868f", "#ebebeb"
 CYCLE = ("#3366aa", "#cc7a00", "#118855", "#cc3355", "#8844aa", "#5aa2d6")
 """Colours of lines that have no name of their own."""
 COLOURS = {
-    "implicit-euler": "#cc7a00",
-    "sdirk2": "#cc3355",
-    "sdirk3": "#8844aa",
-    "implicit-midpoint": "#3366aa",
-    "adapted": "#118855",
-}
+    "implicit-euler": CYCLE[1], "sdirk2": CYCLE[3], "sdirk3": CYCLE[4], "implicit-midpoint": CYCLE[0],
+    "adapted": CYCLE[2],
+}  # fmt: skip
+"""Colours of schemes."""
 MM, MS, PERCENT = 1e3, 1e3, 100.0
+"""Millimetres per metre, milliseconds per second, and per cent of one."""
 DPI = 130
 SETTINGS: dict[str, Any] = {
     "text.color": INK,

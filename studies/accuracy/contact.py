@@ -26,9 +26,10 @@ from seastar_gym.der.contact import contact
 from seastar_gym.scene import Contact, Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import DAMPING, PRESETS, Resolution
 from seastar_gym.simulator import Simulator
-from studies.accuracy.settings import MS
+from studies.accuracy.settings import MILLI
 from studies.accuracy.work_precision import cost, draw_sequences, finite
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.results_file import rounded
 from studies.style import PERCENT
 
@@ -45,12 +46,12 @@ CONES = "cones"
 NODES = (10, 19, 37)
 LIMIT = 73
 """Nodes per limb, and of the swims that stand for the continuum."""
-STEPS = {10: 1 * MS, 19: 1 * MS, 37: 0.5 * MS, LIMIT: 0.25 * MS}
+STEPS = {10: 1 * MILLI, 19: 1 * MILLI, 37: 0.5 * MILLI, LIMIT: 0.25 * MILLI}
 SPEEDS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0)
 """Speeds of tips that are thrown at each other [m/s]."""
 WORST = ("repeated ternary", "repeated continuous", "alternating ternary")
 """Classes of commands for which `certify` finds the largest errors of contact."""
-CERTIFIED = Resolution("continuum", 19, Numerics("implicit-midpoint", 1 * MS, 1e-7, damping=DAMPING))
+CERTIFIED = Resolution("continuum", 19, Numerics("implicit-midpoint", 1 * MILLI, 1e-7, damping=DAMPING))
 
 
 def cone(reach: float, distance: float, opening_angle: float) -> float:
@@ -100,7 +101,7 @@ def thrown(name: str) -> float:
 def survives(touch: Contact, speed: float) -> bool:
     """Whether a robot swims on whose limbs 1 and 2 are thrown at each other, their tips so fast [m/s]."""
     robot = Seastar(nodes_per_limb=10)
-    simulator = Simulator(Scene(robot, None, numerics=Numerics("sdirk2", 20 * MS), contact=touch))
+    simulator = Simulator(Scene(robot, None, numerics=Numerics("sdirk2", 20 * MILLI), contact=touch))
     state = simulator.get_state()
     x, y = np.moveaxis(state.positions[0, 1:] - state.positions[0, 0], -1, 0)
     turning = np.repeat([1.0, -1.0, 0.0, 0.0, 0.0], 9) * speed / robot.limb_length
@@ -134,20 +135,16 @@ def run(results: Results) -> None:
 
 def table(results: Mapping[str, Any]) -> str:
     """Table of the contacts that were examined as a whole in Markdown."""
-    nodes = " | ".join(f"N = {n}" for n in NODES)
-    lines = [
-        f"| contact | {nodes} | `certify` | from the default's path | thrown, m/s | cost |",
-        f"|---|{'---:|' * (len(NODES) + 4)}",
-    ]
+    rows = []
     for name in KINDS:
         bounds, speed = (results[what][name] for what in ("bounds", "thrown"))
         row = results["contacts"][name]
         each = [f"{_percent(row['largest'][str(n)])}, {_percent(row['median'][str(n)])}" for n in NODES]
         away = ", ".join(map(_percent, reversed(row["away"])))
         shown = name if name == CONES else f"`{name}`"
-        cells = *each, _percent(bounds), away, f"{speed:g}", f"x {row['cost']:.1f}"
-        lines.append(f"| {shown} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        rows.append([shown, *each, _percent(bounds), away, f"{speed:g}", f"x {row['cost']:.1f}"])
+    nodes = (f"N = {n}" for n in NODES)
+    return markdown(["contact", *nodes, "`certify`", "from the default's path", "thrown, m/s", "cost"], rows)
 
 
 def _percent(share: float | None) -> str:

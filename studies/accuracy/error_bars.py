@@ -23,12 +23,14 @@ from tqdm import tqdm
 from seastar_gym.accuracy.commands import CLASSES, draw_classes
 from seastar_gym.accuracy.measure import SHORT, swim
 from seastar_gym.accuracy.setting import at
+from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar, Water, relaxation_time
 from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.error_bars import factor
 from studies.frame import Results, Study
-from studies.style import FAINT, INK, PERCENT, subplots
+from studies.pages import markdown
+from studies.style import CYCLE, FAINT, PERCENT, subplots
 
 Floats = NDArray[np.float64]
 
@@ -151,25 +153,18 @@ def rows_of(results: Mapping[str, Any]) -> list[Row]:
 def of_robots(results: Mapping[str, Any]) -> str:
     """Table of coverage and sharpness at the fidelities in Markdown."""
     rows = rows_of(results)
-    lines = [
-        "| robot | fidelity | true error [um] | coverage | lowest class | estimate / true error | factor needed |",
-        "|---|---|---:|---:|---|---:|---:|",
-        *(_line(row) for row in rows if row.setting in FIDELITIES),
-        "",
-        _shortfall(rows),
-    ]
-    return "\n".join(lines)
+    head = [
+        "robot", "fidelity", "true error [um]", "coverage", "lowest class", "estimate / true error", "factor needed",
+    ]  # fmt: skip
+    table = markdown(head, [_line(row) for row in rows if row.setting in FIDELITIES], (0, 1, 4))
+    return f"{table}\n\n{_shortfall(rows)}"
 
 
 def of_settings(results: Mapping[str, Any]) -> str:
     """Table of factors, coverage and costs of all settings in Markdown."""
     rows, costs = rows_of(results), results["costs"]
-    lines = [
-        "| setting | factor | needed | lowest coverage | estimate / true error | cost |",
-        "|---|---:|---:|---:|---:|---:|",
-        *(_summary(name, [row for row in rows if row.setting == name], costs[name]) for name in SETTINGS),
-    ]
-    return "\n".join(lines)
+    found = [_summary(name, [row for row in rows if row.setting == name], costs[name]) for name in SETTINGS]
+    return markdown(["setting", "factor", "needed", "lowest coverage", "estimate / true error", "cost"], found)
 
 
 def _shortfall(rows: list[Row]) -> str:
@@ -178,25 +173,25 @@ def _shortfall(rows: list[Row]) -> str:
     return f"Below {PERCENT * LEVEL:.0f} %, here and at the settings below: {'; '.join(short) or 'none'}."
 
 
-def _line(row: Row) -> str:
+def _line(row: Row) -> list[str]:
     lowest = "all 100 %" if row.lowest == 1.0 else f"{row.lowest_class}, {PERCENT * row.lowest:.0f} %"
-    return (
-        f"| {row.robot} | {row.setting} | {1e6 * row.error:.3g} | {PERCENT * row.coverage:.1f} % | {lowest} | "
-        f"{row.sharpness:.1f} | {row.needed:.1f} |"
-    )
+    return [
+        row.robot, row.setting, f"{1e6 * row.error:.3g}", f"{PERCENT * row.coverage:.1f} %", lowest,
+        f"{row.sharpness:.1f}", f"{row.needed:.1f}",
+    ]  # fmt: skip
 
 
-def _summary(name: str, rows: list[Row], times: float) -> str:
+def _summary(name: str, rows: list[Row], times: float) -> list[str]:
     used, needed = factor(at(Scene(), SETTINGS[name])), max(row.needed for row in rows)
     lowest, dullest = min(row.coverage for row in rows), max(row.sharpness for row in rows)
-    return f"| {name} | {used:g} | {needed:.1f} | {PERCENT * lowest:.1f} % | {dullest:.1f} | x {times:.1f} |"
+    return [name, f"{used:g}", f"{needed:.1f}", f"{PERCENT * lowest:.1f} %", f"{dullest:.1f}", f"x {times:.1f}"]
 
 
 def draw(rows: list[Row], path: Path) -> None:
     """Picture of coverage and sharpness over robots, for the fidelities."""
     figure, (left, right) = subplots(1, 2, figsize=(9.2, 3.8), sharey=True)
     names = list(dict.fromkeys(row.robot for row in rows))
-    for shift, (fidelity, colour) in enumerate(zip(FIDELITIES, ("#cc7a00", "#3366aa", "#118855"), strict=True)):
+    for shift, (fidelity, colour) in enumerate(zip(FIDELITIES, (CYCLE[1], CYCLE[0], CYCLE[2]), strict=True)):
         some = [row for row in rows if row.setting == fidelity]
         y = [names.index(row.robot) + 0.2 * (shift - 1) for row in some]
         left.plot([PERCENT * row.coverage for row in some], y, "o", color=colour, label=fidelity)
@@ -210,10 +205,9 @@ def draw(rows: list[Row], path: Path) -> None:
     left.set_xlabel("strokes covered [%]; bars: lowest class; line: wanted")
     right.set_xlabel("median of estimate / true error; lines: 1 and 5")
     right.set_xlim(0.0, None)
-    left.set_title("Held-out sequences of all classes", color=INK, fontsize=10, loc="left")
-    figure.legend(*left.get_legend_handles_labels(), loc="outside upper right", ncols=3, frameon=False)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=130)
+    left.set_title("Held-out sequences of all classes", loc="left")
+    figure.legend(*left.get_legend_handles_labels(), loc="outside upper right", ncols=3)
+    save_figure(figure, path)
 
 
 def run(results: Results) -> str | None:

@@ -11,6 +11,7 @@ from seastar_gym.accuracy import Setting, chapters_certificate, timed_certificat
 from seastar_gym.scene import Scene, SmaWires
 from seastar_gym.scene.numerics import Fidelity
 from studies.accuracy.tables import two_digits
+from studies.pages import markdown
 
 IN_README: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
 PERIODS = (0.5, 0.2, 0.1)
@@ -55,12 +56,6 @@ def cells(known: Setting) -> list[str]:
     return [pair(known.errors[name], known.typical[name]) for name in ("random", "repeated")]
 
 
-def markdown(head: list[str], rows: list[list[str]], n_texts: int = 1) -> str:
-    """Table whose first columns are texts and whose others are numbers."""
-    lines = [head, ["---"] * n_texts + ["---:"] * (len(head) - n_texts), *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
-
-
 ERRORS = ["random, every 1 s", "repeated, every 1 s", f"random, every {PERIOD:g} s", f"repeated, every {PERIOD:g} s"]
 
 
@@ -78,7 +73,7 @@ def choosing() -> str:
         [why, f'`fidelity="{name}"`', *cells(preset(name)), *cells(in_time(name)), f"{preset(name).speed:,.0f}"]
         for name, why in PURPOSES.items()
     ]
-    return markdown(["you are", "take", *ERRORS, "× real time"], rows, 2)
+    return markdown(["you are", "take", *ERRORS, "× real time"], rows, (0, 1))
 
 
 def presets() -> str:

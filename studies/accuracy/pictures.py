@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.files import save_figure
 from studies.accuracy.rows import Column, front
 from studies.accuracy.settings import presets
-from studies.style import COLOURS, DPI, INK, MS, PERCENT, as_numbers, as_percent, subplots
+from studies.style import COLOURS, CYCLE, FAINT, INK, MS, PERCENT, as_numbers, as_percent, subplots
 from studies.verification.published import PUBLISHED_FINALS
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-OURS, CHAPTERS, OTHERS = "#3366aa", "#cc7a00", "#80868f"
+(OURS, CHAPTERS), OTHERS = CYCLE[:2], FAINT
 PUBLISHED_LIMIT = 38.65e-3
 """Hub x [m] after ten strokes to which the published codes tend for short steps."""
 
@@ -54,7 +55,7 @@ def draw_all(found: Study, folder: Path) -> list[Path]:
     for name, draw in (("work_precision", work_precision), ("convergence", convergence)):
         figure: Figure = draw(found)
         paths.append(folder / f"{name}.png")
-        figure.savefig(paths[-1], dpi=DPI)
+        save_figure(figure, paths[-1])
     return paths
 
 
@@ -75,7 +76,7 @@ def work_precision(found: Study) -> Figure:
     path.set_ylabel("error of space + error of time", fontsize=11.5)
     straight.set_ylabel("error of space + error of time", fontsize=11.5)
     path.set_xlim(right=3.0 * path.get_xlim()[1])
-    figure.legend(*path.get_legend_handles_labels(), frameon=False, fontsize=11, loc="outside upper left")
+    figure.legend(*path.get_legend_handles_labels(), fontsize=11, loc="outside upper left")
     return figure
 
 
@@ -162,7 +163,7 @@ def convergence(found: Study) -> Figure:
                 time.loglog(*np.array(points).T, f"o{line}", ms=4, lw=1.4, color=colour, label=label)
     time.set(xlabel="time step h [ms]", ylabel="error of time, worst path, N = 10")
     time.set_title("Time: the chapter's discretisation dotted, ours solid", fontsize=10.5, loc="left")
-    time.legend(frameon=False, fontsize=8.5)
+    time.legend(fontsize=8.5)
     time.set_xticks([0.1, 0.3, 1, 3, 10, 30], minor=False)
     time.xaxis.set_minor_locator(NullLocator())
     as_numbers(time.xaxis)
@@ -179,5 +180,5 @@ def convergence(found: Study) -> Figure:
     space.set(xlabel="nodes per limb N", ylabel="error of space")
     space.set_title("Space: against infinitely many nodes", fontsize=10.5, loc="left")
     as_percent(space.yaxis)
-    space.legend(frameon=False, fontsize=8.5, loc="center right")
+    space.legend(fontsize=8.5, loc="center right")
     return figure

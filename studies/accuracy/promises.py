@@ -32,6 +32,7 @@ from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 from studies.accuracy.error_bars import ROBOTS
 from studies.frame import Results, Study
+from studies.pages import markdown
 
 Floats = NDArray[np.float64]
 
@@ -42,6 +43,7 @@ CLOSE = 0.5
 """Sequences are swum with short steps if their error against `SCREEN` is above this share of a bound."""
 SHARE = 0.05
 """Share of a class that may exceed its promised error."""
+COLUMNS = ("robot", "sequences that exceed", "the most in a class at a setting", "classes and settings above 5 %")
 PRESETS: tuple[Fidelity, ...] = tuple(name for name in get_args(Fidelity) if name not in ("reference", "chapter"))
 """Fidelities that are held against the package's table: a dearer one has the limit's own error."""
 
@@ -124,44 +126,42 @@ def examine(name: str, folder: Path, samples: int) -> dict[str, Any]:
 
 def table(results: dict[str, Any]) -> str:
     """Table of the results in Markdown, without the class and the setting that exceed most."""
-    rows = [line.split(" | ") for line in summary(results).partition("\n\n")[0].splitlines()]
-    lines = [" | ".join([name, share, last]) for name, share, _, last in rows[:1] + rows[2:]]
-    return "\n".join([lines[0], "|---|---:|---:|", *lines[1:]])
+    chosen = (0, 1, 3)
+    return markdown([COLUMNS[k] for k in chosen], [[row[k] for k in chosen] for row in rows_of(results)])
 
 
 def summary(results: dict[str, Any]) -> str:
     """Table and sentence of the results in Markdown."""
-    samples = results["samples"]
-    lines = [
-        "| robot | sequences that exceed | the most in a class at a setting | classes and settings above 5 % |",
-        "|---|---:|---|---:|",
-    ]
-    above, all_cells = 0, 0
+    certified = [_shares(results, found)[""].values() for found in results["robots"].values()]
+    broken = [share > SHARE for shares in certified for share in shares]
+    return (
+        f"{markdown(COLUMNS, rows_of(results), (0, 2))}\n\n"
+        f"{results['samples']} fresh sequences per class; certificates of {len(certified)} robots: {sum(broken)} of "
+        f"{len(broken)} classes and settings exceed in more than 5 % of sequences, where {SHARE * len(broken):.0f} may."
+    )
+
+
+def rows_of(results: dict[str, Any]) -> list[list[str]]:
+    """Rows of COLUMNS: one for every certificate, and one for the package's table."""
+    rows = []
     for name, found in results["robots"].items():
-        for kind, cells in _cells(found):
-            shares = {key: count / samples for key, count in cells.items()}
-            worst = max(shares, key=lambda key: shares[key])
-            broken = sum(share > SHARE for share in shares.values())
-            if kind == "":
-                above, all_cells = above + broken, all_cells + len(shares)
-            most = f"{100 * shares[worst]:.1f} %: {worst[1]}, {worst[0]}" if shares[worst] else "none"
-            lines.append(
-                f"| {name}{kind} | {100 * np.mean(list(shares.values())):.2f} % | {most} | {broken} of {len(shares)} |"
-            )
-    lines += [
-        "",
-        f"{samples} fresh sequences per class; certificates of {len(results['robots'])} robots: {above} of {all_cells} "
-        f"classes and settings exceed in more than 5 % of sequences, where {SHARE * all_cells:.0f} may.",
-    ]
-    return "\n".join(lines)
+        for kind, shares in _shares(results, found).items():
+            (setting, of), most = max(shares.items(), key=lambda item: item[1])
+            rows.append([
+                f"{name}{kind}", f"{100 * np.mean(list(shares.values())):.2f} %",
+                f"{100 * most:.1f} %: {of}, {setting}" if most else "none",
+                f"{sum(share > SHARE for share in shares.values())} of {len(shares)}",
+            ])  # fmt: skip
+    return rows
 
 
-def _cells(found: dict[str, Any]) -> list[tuple[str, dict[tuple[str, str], int]]]:
-    """Exceedances by setting and class: of the certificate, and of the package's table where it was held."""
-    cells = {(check, name): count for check, row in found["exceeded"].items() for name, count in row.items()}
-    table = {key: count for key, count in cells.items() if key[0] in PRESETS}
-    kinds = [("", {key: count for key, count in cells.items() if key not in table}), (", the package's table", table)]
-    return [(kind, some) for kind, some in kinds if some]
+def _shares(results: dict[str, Any], found: dict[str, Any]) -> dict[str, dict[tuple[str, str], float]]:
+    """Shares that exceed, by setting and class: of the certificate, and of the package's table where it was held."""
+    kinds: dict[str, dict[tuple[str, str], float]] = {}
+    for check, row in found["exceeded"].items():
+        of = kinds.setdefault(", the package's table" if check in PRESETS else "", {})
+        of.update({(check, name): count / results["samples"] for name, count in row.items()})
+    return kinds
 
 
 def run(

@@ -7,7 +7,7 @@ from seastar_gym.scene import Numerics
 from seastar_gym.scene.numerics import DAMPING, PRESETS, Fidelity, Resolution, SchemeName
 from seastar_gym.scene.robot import Discretisation
 
-MS = 1e-3
+MILLI = 1e-3
 """Seconds per millisecond."""
 STEPS: dict[SchemeName, tuple[float, ...]] = {
     "implicit-euler": (20, 10, 5, 3, 1),
@@ -20,7 +20,7 @@ UNDAMPED = (5, 1)
 """Time steps [ms] at which the midpoint rule is measured without `Numerics.damping`, too."""
 ADAPTED = (0.02, 0.01, 0.005)
 """Path tolerances of the settings with adapted steps."""
-LARGEST_ADAPTED = 5 * MS
+LARGEST_ADAPTED = 5 * MILLI
 """Largest adapted time step [s]."""
 Mesh = tuple[Discretisation, int]
 """Discretisation and nodes per limb N."""
@@ -47,20 +47,20 @@ class Plan:
     n_slow: int = 8
     n_gaits: int = 20
     side: tuple[int, int] = (6, 1)
-    limit: tuple[int, float] = (73, 0.1 * MS)
-    fine: float = 0.05 * MS
-    opinion: tuple[int, float] = (37, 0.1 * MS)
+    limit: tuple[int, float] = (73, 0.1 * MILLI)
+    fine: float = 0.05 * MILLI
+    opinion: tuple[int, float] = (37, 0.1 * MILLI)
     meshes: tuple[Mesh, ...] = (
         *(("continuum", n) for n in (6, 7, 8, 10, 11, 12, 13, 19, 25, 28, 37)), *(("chapter", n) for n in (10, 37, 73)),
     )  # fmt: skip
-    shortest: float = 0.1 * MS
+    shortest: float = 0.1 * MILLI
     finest: int = 19
     rounds: int = 3
 
 
 QUICK = Plan(
-    n_random=6, n_slow=2, n_gaits=2, side=(1, 0), limit=(37, 0.4 * MS), fine=0.4 * MS, opinion=(10, 1 * MS),
-    meshes=(("continuum", 7), ("continuum", 10), ("chapter", 10)), shortest=2 * MS, rounds=1,
+    n_random=6, n_slow=2, n_gaits=2, side=(1, 0), limit=(37, 0.4 * MILLI), fine=0.4 * MILLI, opinion=(10, 1 * MILLI),
+    meshes=(("continuum", 7), ("continuum", 10), ("chapter", 10)), shortest=2 * MILLI, rounds=1,
 )  # fmt: skip
 
 
@@ -71,9 +71,9 @@ def presets() -> dict[str, Resolution]:
 
 def tolerances(step: float) -> tuple[float, ...]:
     """Newton tolerances that are measured with a time step [s]: short steps bring small updates, so need small ones."""
-    if step >= 5 * MS:
+    if step >= 5 * MILLI:
         return 3e-5, 1e-5, 1e-6
-    return (1e-6, 1e-7) if step >= 1 * MS else (1e-8,)
+    return (1e-6, 1e-7) if step >= 1 * MILLI else (1e-8,)
 
 
 def dampings(discretisation: Discretisation, scheme: SchemeName, step: float) -> tuple[float, ...]:
@@ -92,16 +92,17 @@ def settings(plan: Plan) -> list[Resolution]:
 def _numerics(plan: Plan, mesh: Mesh) -> list[Numerics]:
     """Numerics that are measured with a mesh: fewer with many nodes, which are dear."""
     discretisation, nodes = mesh
-    shortest = max(plan.shortest, 0.1 * MS if nodes == 10 else 0.3 * MS if discretisation == "continuum" else 1 * MS)
+    allowed = 0.1 if nodes == 10 else 0.3 if discretisation == "continuum" else 1
+    shortest = max(plan.shortest, allowed * MILLI)
     fixed = [
-        Numerics(scheme, step * MS, tolerance, damping=damping)
+        Numerics(scheme, step * MILLI, tolerance, damping=damping)
         for scheme, steps in STEPS.items()
         for step in steps
         for damping in dampings(discretisation, scheme, step)
-        for tolerance in tolerances(step * MS)
-        if step * MS >= shortest and (nodes <= plan.finest or tolerance == tolerances(step * MS)[-1])
+        for tolerance in tolerances(step * MILLI)
+        if step * MILLI >= shortest and (nodes <= plan.finest or tolerance == tolerances(step * MILLI)[-1])
     ]
-    damping = dampings(discretisation, "implicit-midpoint", LARGEST_ADAPTED / MS)[0]
+    damping = dampings(discretisation, "implicit-midpoint", LARGEST_ADAPTED / MILLI)[0]
     adapted = [
         Numerics("implicit-midpoint", LARGEST_ADAPTED, 1e-7, path_tolerance=tolerance, damping=damping)
         for tolerance in ADAPTED

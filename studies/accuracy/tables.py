@@ -14,6 +14,7 @@ from seastar_gym.version import __version__
 from studies.accuracy.cases import STROKES, gaits
 from studies.accuracy.rows import UNSEEN, Column, Figures, Row, Study, fronts, path_front
 from studies.accuracy.settings import Plan, presets
+from studies.pages import markdown
 
 LARGEST_DOUBT = 3e-4
 """Largest path error of the limit itself, of each kind, with which results are stored."""
@@ -70,9 +71,8 @@ def facts(found: Study) -> list[str]:
 
 def as_markdown(found: Study) -> str:
     """Summary in Markdown."""
-    lines = [f"| {' | '.join(COLUMNS)} |", "|---|---:|---|---:|" + "---:|" * (len(COLUMNS) - 4)]
-    lines += [f"| {' | '.join(as_cells(preset, row))} |" for preset, row in summary(found)]
-    return "\n".join([*lines, "", *facts(found), f"Speeds: one core of {machine()}."]) + "\n"
+    table = markdown(COLUMNS, [as_cells(preset, row) for preset, row in summary(found)], (0, 2))
+    return "\n".join([table, "", *facts(found), f"Speeds: one core of {machine()}."]) + "\n"
 
 
 COSTS = ("iterations", "steps", "rejections", "halvings", "speed", "straight_speed")

@@ -21,7 +21,7 @@ from studies.accuracy import timed
 from studies.accuracy.error_bars import FIDELITIES, SETTINGS, SMALLEST, TRUE
 from studies.accuracy.page import PERIODS
 from studies.frame import Results, Study
-from studies.pages import show
+from studies.pages import markdown, show
 from studies.style import PERCENT
 
 Floats = NDArray[np.float64]
@@ -46,11 +46,11 @@ def measure(
 
 def table(found: dict[float, dict[str, tuple[float, float]]]) -> str:
     """Coverage, and estimate over true error, by preset and time between decisions, in Markdown."""
-    lines = [f"| preset | {' | '.join(f'{period:g} s' for period in found)} |", f"| --- |{' ---: |' * len(found)}"]
-    for name in FIDELITIES:
-        cells = [f"{PERCENT * found[period][name][0]:.1f} %, {found[period][name][1]:.1f}" for period in found]
-        lines.append(f"| `{name}` | {' | '.join(cells)} |")
-    return "\n".join(lines)
+    rows = [
+        [f"`{name}`", *(f"{PERCENT * one[name][0]:.1f} %, {one[name][1]:.1f}" for one in found.values())]
+        for name in FIDELITIES
+    ]
+    return markdown(["preset", *(f"{period:g} s" for period in found)], rows)
 
 
 def run(results: Results) -> None:

@@ -26,7 +26,7 @@ from seastar_gym.scene import Contact, Numerics, Scene, Seastar, SmaPulse
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
-from studies.accuracy.settings import MS
+from studies.accuracy.settings import MILLI
 from studies.accuracy.work_precision_page import draw, of_presets, of_settings
 from studies.frame import Results, Study
 from studies.speed.terms import SILICONE
@@ -44,16 +44,16 @@ PROBLEMS: dict[str, Scene] = {
 """Scenes. Hub hinges of the chapter's discretisation allow three and twelve limbs no larger peak angles."""
 SETTINGS: tuple[Resolution, ...] = (
     *PRESETS.values(),
-    *(Resolution("continuum", n, Numerics("sdirk2", 20 * MS, 1e-6)) for n in (7, 10)),
-    *(Resolution("continuum", n, Numerics("implicit-midpoint", 5 * MS, 1e-5)) for n in (10, 19)),
-    *(Resolution("continuum", n, Numerics("implicit-midpoint", 2 * MS, 1e-7)) for n in (10, 13)),
-    Resolution("chapter", 10, Numerics("implicit-euler", 10 * MS)),
-    *(Resolution("chapter", 10, Numerics("implicit-midpoint", h * MS, 1e-7)) for h in (5, 1)),
-    *(Resolution("chapter", n, Numerics("implicit-midpoint", 1 * MS, 1e-7)) for n in (19, 37)),
+    *(Resolution("continuum", n, Numerics("sdirk2", 20 * MILLI, 1e-6)) for n in (7, 10)),
+    *(Resolution("continuum", n, Numerics("implicit-midpoint", 5 * MILLI, 1e-5)) for n in (10, 19)),
+    *(Resolution("continuum", n, Numerics("implicit-midpoint", 2 * MILLI, 1e-7)) for n in (10, 13)),
+    Resolution("chapter", 10, Numerics("implicit-euler", 10 * MILLI)),
+    *(Resolution("chapter", 10, Numerics("implicit-midpoint", h * MILLI, 1e-7)) for h in (5, 1)),
+    *(Resolution("chapter", n, Numerics("implicit-midpoint", 1 * MILLI, 1e-7)) for n in (19, 37)),
 )
 """Settings of both discretisations, the presets first."""
-LIMIT = Resolution("continuum", 73, Numerics("implicit-midpoint", 0.125 * MS, 1e-9))
-HALF = Resolution("continuum", 37, Numerics("implicit-midpoint", 0.25 * MS, 1e-9))
+LIMIT = Resolution("continuum", 73, Numerics("implicit-midpoint", 0.125 * MILLI, 1e-9))
+HALF = Resolution("continuum", 37, Numerics("implicit-midpoint", 0.25 * MILLI, 1e-9))
 """What stands for the continuum, and twice its edges and steps: its own error is a third of their difference."""
 SAMPLES, SEED = 2, 7
 """Sequences per class, and their seed."""

@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from seastar_gym.files import save_figure
 from seastar_gym.scene.numerics import Fidelity
 from studies.accuracy.pictures import CHAPTERS, OTHERS, OURS, PUBLISHED, published_error
-from studies.style import DPI, INK, MS, PERCENT, as_numbers, as_percent, subplots
+from studies.pages import markdown
+from studies.style import INK, MS, PERCENT, as_numbers, as_percent, subplots
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,10 +24,10 @@ SETTLED = 0.01
 """Problems whose limit errs by more have no largest errors that mean anything: their medians are told instead."""
 
 
-def label(row: Row) -> str:
-    """Setting in words."""
+def label(row: Row) -> tuple[str, str]:
+    """Nodes, and scheme and step, in words."""
     nodes = f"{row['nodes_per_limb']}" + (", chapter's" if row["discretisation"] == "chapter" else "")
-    return f"{nodes} | {row['scheme']}, {MS * row['step']:g} ms"
+    return nodes, f"{row['scheme']}, {MS * row['step']:g} ms"
 
 
 def error(row: Row, column: Column = "largest_error") -> float:
@@ -56,7 +58,6 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
         each.remove()
     wide = figure.add_subplot(grid[0, :], sharey=axes[1, 0])
     wide.grid(True, which="major", color="0.92", lw=0.8)
-    wide.spines[["top", "right"]].set_visible(False)
     small = axes[1:].ravel()
     for each in small[1:]:
         each.sharex(small[0])
@@ -71,9 +72,8 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
         each.set_axis_off()
     figure.supxlabel("processor time per stroke of a robot, one core [ms]  (slower →)", fontsize=11)
     figure.supylabel("largest distance from the path in the continuum, over its length", fontsize=11)
-    figure.legend(*wide.get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False, fontsize=10)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=DPI)
+    figure.legend(*wide.get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=10)
+    save_figure(figure, file)
 
 
 def _draw_panel(axes: Axes, rows: Sequence[Row], title: str, column: Column) -> None:
@@ -95,7 +95,7 @@ def _draw_panel(axes: Axes, rows: Sequence[Row], title: str, column: Column) -> 
         axes.annotate(preset["preset"][0], (x, y), (0, -0.5), textcoords="offset points", fontsize=7.5,
                       color="white", ha="center", va="center", fontweight="bold")  # fmt: skip
     axes.set(xscale="log", yscale="log")
-    axes.set_title(title, fontsize=10, loc="left", color=INK)
+    axes.set_title(title, loc="left")
     as_numbers(axes.xaxis)
     as_percent(axes.yaxis)
 
@@ -115,19 +115,15 @@ def _draw_published(axes: Axes, limit: float) -> None:
 def of_presets(results: Mapping[str, Any]) -> str:
     """Table of the presets in Markdown, and what is concluded from all settings."""
     problems = results["problems"]
-    lines = [
-        "| preset | error, chapter's robot | error, others | time per stroke, chapter's robot [ms] |",
-        "|---|---:|---:|---:|",
-        *(_use(preset, problems) for preset in get_args(Fidelity)), "", f"{_conclusion(problems)} {_doubt(problems)}",
-    ]  # fmt: skip
-    return "\n".join(lines)
+    head = ["preset", "error, chapter's robot", "error, others", "time per stroke, chapter's robot [ms]"]
+    table = markdown(head, [_use(preset, problems) for preset in get_args(Fidelity)])
+    return f"{table}\n\n{_conclusion(problems)} {_doubt(problems)}"
 
 
 def of_settings(results: Mapping[str, Any]) -> str:
     """Table of all settings in Markdown."""
     problems = results["problems"]
-    head = [f"| N | scheme and step | {' | '.join(problems)} |", "|---|---|" + "---:|" * len(problems)]
-    return "\n".join([*head, *_rows(problems)])
+    return markdown(["N", "scheme and step", *problems], _rows(problems), (0, 1))
 
 
 def _doubt(problems: Mapping[str, Any]) -> str:
@@ -147,11 +143,11 @@ def _of(preset: str, found: Mapping[str, Any]) -> Row:
     return next(row for row in found["settings"] if row["preset"] == preset)
 
 
-def _use(preset: str, problems: Mapping[str, Any]) -> str:
+def _use(preset: str, problems: Mapping[str, Any]) -> list[str]:
     first, *others = (_of(preset, found) for found in problems.values() if settled(found))
     errors = sorted(error(row) for row in others)
     span = f"{errors[0]:.2g} to {errors[-1]:.2g} %" if errors else ""
-    return f"| `{preset}` | {error(first):.2g} % | {span} | {first['ms_per_stroke']:.2g} |"
+    return [f"`{preset}`", f"{error(first):.2g} %", span, f"{first['ms_per_stroke']:.2g}"]
 
 
 def _conclusion(problems: Mapping[str, Any]) -> str:
@@ -171,11 +167,11 @@ def _conclusion(problems: Mapping[str, Any]) -> str:
     )
 
 
-def _rows(problems: Mapping[str, Any]) -> list[str]:
+def _rows(problems: Mapping[str, Any]) -> list[list[str]]:
     def cell(row: Row) -> str:
         errors = (error(row), error(row, "median_error"))
         worst, median = (f"{each:.2g} %" if math.isfinite(each) else "fails" for each in errors)
         return f"{worst}, {median}; {row['ms_per_stroke']:.2g}"
 
     columns = [found["settings"] for found in problems.values()]
-    return [f"| {label(same[0])} | {' | '.join(map(cell, same))} |" for same in zip(*columns, strict=True)]
+    return [[*label(same[0]), *map(cell, same)] for same in zip(*columns, strict=True)]

@@ -12,50 +12,29 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.files import save_figure
 from seastar_gym.scene import SmaPulse
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
 from studies.chapter.cost import Cost
 from studies.chapter.statements import stroke_motion
-from studies.chapter.swims import MM, MS, Swim
-from studies.style import new_figure
+from studies.chapter.swims import Swim
+from studies.style import FAINT, INK, MM, MS, new_figure, subplots
 
 Floats = NDArray[np.float64]
 
-INK, FAINT_INK, GRID = "#3a404a", "#80868f", "#eceff3"
 LIMB, ACTUATED = "#9aa1ab", "#1f4fd8"
 PLUS, MINUS = "#d62728", "#1f4fd8"
-DARK, ORANGE = "#1b1f26", "#e07b00"
-CONTINUUM: dict[str, Any] = {"color": DARK, "linestyle": "-", "linewidth": 1.3, "zorder": 2.2}
+ORANGE = "#e07b00"
+CONTINUUM: dict[str, Any] = {"color": INK, "linestyle": "-", "linewidth": 1.3, "zorder": 2.2}
 CHAPTER: dict[str, Any] = {"color": ORANGE, "linestyle": (0, (4, 2)), "linewidth": 1.3, "zorder": 2.4}
 CONTINUUM_PATH: dict[str, Any] = {"color": INK, "linewidth": 2.4, "zorder": 3.5}
 CHAPTER_PATH: dict[str, Any] = {"color": ORANGE, "linewidth": 1.1, "zorder": 3.6}
 """Line of the chapter's paths. It is solid, because a robot swims back and forth and dashes would overlap."""
 PAIR_COLOURS = ("#0072b2", "#009e73", "#cc3d7a", "#8c6d1f")
-DPI = 150
-
-
-def style(axes: Axes, **labels: Any) -> None:
-    """Apply the study's style to axes; labels: Arguments of `axes.set`."""
-    axes.set(**labels)
-    axes.tick_params(labelcolor=INK, color=FAINT_INK)
-    axes.grid(color=GRID, linewidth=0.8)
-    axes.set_axisbelow(True)
-    axes.title.set(color=INK, fontsize=10)
-    for label in (axes.xaxis.label, axes.yaxis.label):
-        label.set_color(INK)
-    for side, spine in axes.spines.items():
-        spine.set_visible(side in ("left", "bottom"))
-        spine.set_color(FAINT_INK)
-
-
-def save(figure: Figure, file: Path) -> None:
-    """Write a figure as PNG."""
-    figure.savefig(file, dpi=DPI)
 
 
 def draw_robot(axes: Axes, swim: Swim, time: float, size: float = 1.0) -> None:
@@ -71,24 +50,23 @@ def draw_robot(axes: Axes, swim: Swim, time: float, size: float = 1.0) -> None:
 
 def draw_pulse(actuator: SmaPulse, file: Path) -> None:
     """Fig. 13.5b: rotation of limbs #2 and #5 over one actuation period."""
-    figure = new_figure(5.6, 3.6)
-    axes = figure.subplots()
+    figure, axes = subplots(figsize=(5.6, 3.6))
     heating, period, peak = actuator.heating_time, actuator.period, actuator.peak_angle
     corners = np.array(actuator.corners)
     axes.plot(corners, actuator.delta_psi(corners), color=PLUS, label="limb 2")
     axes.plot(corners, -actuator.delta_psi(corners), color=MINUS, linestyle="--", label="limb 5")
-    style(axes, xlabel="time t [s]", ylabel="rotation δψ [rad]", xlim=(0.0, period), ylim=(-1.5 * peak, 1.65 * peak))
+    axes.set(xlabel="time t [s]", ylabel="rotation δψ [rad]", xlim=(0.0, period), ylim=(-1.5 * peak, 1.65 * peak))
     axes.set_xticks([0.0, heating, *np.arange(0.2, period, 0.2), period])
     axes.set_yticks([-peak, 0.0, peak], [f"−{peak:.3f}\n(−π/5)", "0", f"{peak:.3f}\n(π/5)"])
     for begin, end, text in ((0.0, heating, f"Δt₁ = {heating:g} s\nheated"), (heating, period, "Δt₂ = 0.9 s\ncools")):
         axes.annotate(
             "", (begin, 1.12 * peak), (end, 1.12 * peak),
-            arrowprops={"arrowstyle": "<->", "color": FAINT_INK, "shrinkA": 0, "shrinkB": 0},
+            arrowprops={"arrowstyle": "<->", "color": FAINT, "shrinkA": 0, "shrinkB": 0},
         )  # fmt: skip
         place = max(0.5 * (begin + end), 0.1)
         axes.text(place, 1.2 * peak, text, ha="center", va="bottom", color=INK, fontsize=9)
-    axes.legend(frameon=False, loc="lower right")
-    save(figure, file)
+    axes.legend(loc="lower right")
+    save_figure(figure, file)
 
 
 STRAIGHT_TIMES = (0.0, 2.2, 5.5, 10.0)
@@ -99,11 +77,13 @@ def draw_straight(continuum: Swim, chapter: Swim, file: Path) -> None:
     """Fig. 13.6: snapshots, hub position and hub velocity of ten strokes of {2+,5-}."""
     figure = new_figure(9.0, 7.6)
     panels = figure.subplot_mosaic([["a1", "a2", "a3", "a4"], ["b"] * 4, ["c"] * 4], height_ratios=[1.15, 1.0, 1.0])
+    for axes in panels.values():
+        axes.grid(True)
     for name, time in zip(("a1", "a2", "a3", "a4"), STRAIGHT_TIMES, strict=True):
         axes = panels[name]
         draw_robot(axes, continuum, time)
-        axes.axvline(0.0, color=FAINT_INK, linewidth=0.8, linestyle=":", zorder=1.0)
-        style(axes, aspect="equal", xlim=(-100.0, 155.0), ylim=(-115.0, 115.0), title=f"({name})  t = {time:.1f} s")
+        axes.axvline(0.0, color=FAINT, linewidth=0.8, linestyle=":", zorder=1.0)
+        axes.set(aspect="equal", xlim=(-100.0, 155.0), ylim=(-115.0, 115.0), title=f"({name})  t = {time:.1f} s")
         axes.set(xticks=[-100, 0, 100], yticks=[-100, 0, 100], xlabel="x [mm]")
     panels["a1"].set_ylabel("y [mm]")
     for name, continuum_values, chapter_values in (
@@ -125,11 +105,11 @@ def draw_straight(continuum: Swim, chapter: Swim, file: Path) -> None:
         f"The last stroke: {MM * heated:.1f} mm forward while heated,\n{MM * after:.1f} mm more until {turn:.2f} s "
         f"into the stroke, then {MM * back:.1f} mm back"
     )
-    style(panels["b"], ylabel="hub position [mm]", title=f"(b)  pink: limbs 2 and 5 are heated. {moves}", xlim=span)
-    style(panels["c"], ylabel="hub velocity [mm/s]", xlabel="time [s]", title="(c)", xlim=span)
-    panels["b"].legend(frameon=False, loc="upper left", fontsize=9)
+    panels["b"].set(ylabel="hub position [mm]", title=f"(b)  pink: limbs 2 and 5 are heated. {moves}", xlim=span)
+    panels["c"].set(ylabel="hub velocity [mm/s]", xlabel="time [s]", title="(c)", xlim=span)
+    panels["b"].legend(loc="upper left", fontsize=9)
     figure.align_ylabels([panels["b"], panels["c"]])
-    save(figure, file)
+    save_figure(figure, file)
 
 
 PENTAGON_TIMES = (22.1, 72.1, 122.1, 172.1, 222.1)
@@ -138,8 +118,7 @@ PENTAGON_TIMES = (22.1, 72.1, 122.1, 172.1, 222.1)
 
 def draw_pentagon_snapshots(continuum: Swim, chapter: Swim, file: Path) -> None:
     """Fig. 13.2: the robot on its way around the pentagon."""
-    figure = new_figure(6.6, 7.0)
-    axes = figure.subplots()
+    figure, axes = subplots(figsize=(6.6, 7.0))
     axes.plot(*MM * continuum.hub().T, **CONTINUUM_PATH, label=f"hub, {continuum.label}")
     axes.plot(*MM * chapter.hub().T, **CHAPTER_PATH, label=f"hub, {chapter.label}")
     for time in PENTAGON_TIMES:
@@ -151,17 +130,16 @@ def draw_pentagon_snapshots(continuum: Swim, chapter: Swim, file: Path) -> None:
             f"{time:.1f} s", MM * hub, MM * hub + free, color=INK, fontsize=10, ha="center", va="center", zorder=6.0
         )
     axes.plot([], [], color=ACTUATED, linewidth=3.2, label="actuated limbs")
-    style(axes, aspect="equal", xlabel="x [mm]", ylabel="y [mm]", ylim=(-108.0, 355.0))
+    axes.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]", ylim=(-108.0, 355.0))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_ticks(range(-100, 301, 100))
-    axes.legend(frameon=False, loc="upper left", fontsize=9)
-    save(figure, file)
+    axes.legend(loc="upper left", fontsize=9)
+    save_figure(figure, file)
 
 
 def draw_pentagon(continuum: Swim, chapter: Swim, file: Path) -> None:
     """Fig. 13.7a: the hub's path around the pentagon."""
-    figure = new_figure(6.4, 6.4)
-    axes = figure.subplots()
+    figure, axes = subplots(figsize=(6.4, 6.4))
     for swim, look in ((continuum, CONTINUUM_PATH), (chapter, CHAPTER_PATH)):
         path = MM * swim.hub()
         axes.plot(*path.T, **look, label=f"{swim.label}: sides of {np.hypot(*path[swim.at(50.0)]):.1f} mm")
@@ -169,22 +147,22 @@ def draw_pentagon(continuum: Swim, chapter: Swim, file: Path) -> None:
     corners = path[[continuum.at(50.0 * k) for k in range(5)]]
     middle = corners.mean(axis=0)
     for k, corner in enumerate(corners):
-        axes.plot(*corner, marker="o", color=DARK, markersize=6, zorder=3.7)
+        axes.plot(*corner, marker="o", color=INK, markersize=6, zorder=3.7)
         beside = tuple(28.0 * (middle - corner) / np.hypot(*(corner - middle)))
         axes.annotate(f"{50 * k} s", tuple(corner), beside, textcoords="offset points", color=INK, ha="center",
                       va="center")  # fmt: skip
     for k, name in enumerate(("{2⁺, 5⁻}", "{3⁺, 1⁻}", "{4⁺, 2⁻}", "{5⁺, 3⁻}", "{1⁺, 4⁻}")):
         side = 0.5 * (corners[k] + corners[(k + 1) % 5])
-        x, y = side + 0.21 * (middle - side)
+        x, y = side + 0.25 * (middle - side)
         axes.text(x, y, name, color=INK, ha="center", va="center")
     spur = path[: continuum.at(50.0), 0].max() - corners[1, 0]
     note = (
         f"spurs at the corners: strokes carry the hub forth and back,\nthe last of a side {spur:.0f} mm beyond its end"
     )
     axes.text(-80.0, -37.0, note, color=INK, fontsize=9, va="center")
-    style(axes, aspect="equal", xlabel="x [mm]", ylabel="y [mm]", xlim=(-85.0, 240.0), ylim=(-50.0, 305.0))
-    axes.legend(frameon=False, loc="upper center", fontsize=9)
-    save(figure, file)
+    axes.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]", xlim=(-85.0, 240.0), ylim=(-50.0, 305.0))
+    axes.legend(loc="upper center", fontsize=9)
+    save_figure(figure, file)
 
 
 def signal_curves(swim: Swim, limb: int) -> tuple[Floats, Floats, Floats]:
@@ -199,8 +177,7 @@ def signal_curves(swim: Swim, limb: int) -> tuple[Floats, Floats, Floats]:
 def draw_pentagon_signals(swim: Swim, file: Path, zoom: tuple[float, float] = (43.0, 53.0)) -> None:
     """Fig. 13.7b: the actuation signals of the pentagon. zoom: Interval [s] that is shown in detail."""
     n_limbs, peak = swim.scene.robot.n_limbs, swim.scene.actuator.peak_angle
-    figure = new_figure(9.6, 5.8)
-    panels = figure.subplots(n_limbs, 2, sharex="col", sharey=True, width_ratios=[2.0, 1.0])
+    figure, panels = subplots(n_limbs, 2, figsize=(9.6, 5.8), sharex="col", sharey=True, width_ratios=[2.0, 1.0])
     for limb, row in enumerate(panels):
         time, plus, minus = signal_curves(swim, limb)
         for axes, width in zip(row, (0.5, 1.4), strict=True):
@@ -208,17 +185,17 @@ def draw_pentagon_signals(swim: Swim, file: Path, zoom: tuple[float, float] = (4
                 pulses = np.where(np.abs(np.gradient(values)) + np.abs(values) > 0.0, values, np.nan)
                 axes.fill_between(time, values, color=colour, alpha=0.15, linewidth=0)
                 axes.plot(time, pulses, color=colour, linestyle=dashes, linewidth=width)
-            axes.axhline(0.0, color=FAINT_INK, linewidth=0.6, zorder=0.9)
-            style(axes, ylim=(-1.25 * peak, 1.25 * peak))
+            axes.axhline(0.0, color=FAINT, linewidth=0.6, zorder=0.9)
+            axes.set(ylim=(-1.25 * peak, 1.25 * peak))
         row[0].set_ylabel(f"limb {limb + 1}\nδψ [rad]")
         row[0].set_yticks([-peak, 0.0, peak], ["−π/5", "0", "π/5"])
         row[0].axvspan(*zoom, color="#e3e8ee", linewidth=0, zorder=0.5)
-    style(panels[0, 0], xlim=(0.0, 250.0), title="red, solid: anti-clockwise (+)     blue, dashed: clockwise (−)")
-    style(panels[0, 1], xlim=zoom, title="the shaded ten seconds")
+    panels[0, 0].set(xlim=(0.0, 250.0), title="red, solid: anti-clockwise (+)     blue, dashed: clockwise (−)")
+    panels[0, 1].set(xlim=zoom, title="the shaded ten seconds")
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
     panels[0, 0].set_xticks(range(0, 251, 25))
-    save(figure, file)
+    save_figure(figure, file)
 
 
 PAIR_LABELS = ((42.0, 22.0), (26.0, 50.0), (-18.0, 60.0), (-46.0, 12.0))
@@ -228,11 +205,10 @@ PAIR_LABELS = ((42.0, 22.0), (26.0, 50.0), (-18.0, 60.0), (-46.0, 12.0))
 def draw_pairs(continuum: Swim, chapter: Swim, names: Sequence[str], file: Path) -> None:
     """Fig. 13.8: paths of ten strokes by each pair of limbs; names: Names of the pairs, one per robot."""
     robot = continuum.scene.robot
-    figure = new_figure(9.0, 4.6)
-    left, right = figure.subplots(1, 2, width_ratios=[1.05, 1.0])
+    figure, (left, right) = subplots(1, 2, figsize=(9.0, 4.6), width_ratios=[1.05, 1.0])
     for limb, tip in enumerate(MM * robot.nodes()[robot.nodes_per_limb - 1 :: robot.nodes_per_limb - 1]):
         left.plot([0.0, tip[0]], [0.0, tip[1]], color="#dfe3e8", linewidth=4.0, solid_capstyle="round", zorder=1.0)
-        left.text(1.07 * tip[0], 1.07 * tip[1], str(limb + 1), color=FAINT_INK, ha="center", va="center")
+        left.text(1.07 * tip[0], 1.07 * tip[1], str(limb + 1), color=FAINT, ha="center", va="center")
     note = "a dot per stroke\ncircle, (): the chapter's setting"
     left.text(0.01, 0.01, note, transform=left.transAxes, color=INK, fontsize=8.5)
     for number, (name, colour, place) in enumerate(zip(names, PAIR_COLOURS, PAIR_LABELS, strict=True)):
@@ -246,13 +222,13 @@ def draw_pairs(continuum: Swim, chapter: Swim, names: Sequence[str], file: Path)
                   ha="left" if place[0] > 0.0 else "right")  # fmt: skip
         right.plot(continuum.time, path @ ahead, color=colour, linewidth=1.3)
         right.plot(chapter.time, other @ ahead, **{**CHAPTER, "color": colour, "linewidth": 1.0})
-    style(left, aspect="equal", xlabel="x [mm]", ylabel="y [mm]", xlim=(-98.0, 112.0), ylim=(-108.0, 108.0))
-    style(right, xlabel="time [s]", ylabel="hub along the bisector [mm]", xlim=(0.0, continuum.time[-1]))
+    left.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]", xlim=(-98.0, 112.0), ylim=(-108.0, 108.0))
+    right.set(xlabel="time [s]", ylabel="hub along the bisector [mm]", xlim=(0.0, continuum.time[-1]))
     right.set_ylim(0.0, 60.0)
     right.plot([], [], color=INK, linewidth=1.3, label=continuum.label)
     right.plot([], [], **{**CHAPTER, "color": INK, "linewidth": 1.0}, label=chapter.label)
-    right.legend(frameon=False, fontsize=9, loc="upper left")
-    save(figure, file)
+    right.legend(fontsize=9, loc="upper left")
+    save_figure(figure, file)
 
 
 def draw_cost(costs: Sequence[Cost], file: Path) -> None:
@@ -260,12 +236,11 @@ def draw_cost(costs: Sequence[Cost], file: Path) -> None:
 
     costs: Of the chapter's discretisation and the continuum's.
     """
-    figure = new_figure(7.2, 5.0)
-    axes = figure.subplots()
+    figure, axes = subplots(figsize=(7.2, 5.0))
     steps, issues, real_time = MS * costs[0].steps, MS * ISSUES_FROM, MS * REAL_TIME_FROM
     line = np.array([steps.min(), issues])
     axes.axvspan(issues, 1.3 * steps.max(), color="#fbeedd", linewidth=0, zorder=0.5)
-    axes.axhline(1.0, color=FAINT_INK, linewidth=0.8)
+    axes.axhline(1.0, color=FAINT, linewidth=0.8)
     axes.loglog(line, real_time / line, **CHAPTER, label="the chapter: proportional to 1/h, real time at 3 ms")
     axes.plot(real_time, 1.0, marker="D", color=ORANGE, zorder=3.0)
     for cost, name, dashes in zip(costs, ("its discretisation", "continuum"), ("-", (0, (2, 2))), strict=True):
@@ -280,10 +255,10 @@ def draw_cost(costs: Sequence[Cost], file: Path) -> None:
               label="open: Newton's matrix regularised in some steps")  # fmt: skip
     axes.text(steps.min(), 1.15, "real time", va="bottom", color=INK, fontsize=9)
     axes.text(1.06 * issues, 2.0, "the chapter:\nnumerical\nissues", va="bottom", color="#9a5a00", fontsize=9)
-    style(axes, xlabel="time step h [ms]", ylabel="computing time over simulated time",
-          xlim=(0.8 * steps.min(), 1.3 * steps.max()), ylim=(0.004 * costs[0].in_batch.min(), 60.0))  # fmt: skip
+    axes.set(xlabel="time step h [ms]", ylabel="computing time over simulated time",
+             xlim=(0.8 * steps.min(), 1.3 * steps.max()), ylim=(0.004 * costs[0].in_batch.min(), 60.0))  # fmt: skip
     ticks = [tick for tick in (0.1, 0.3, 1.0, 3.0, 10.0, 20.0, 40.0) if steps.min() <= tick <= steps.max()]
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.minorticks_off()
-    axes.legend(frameon=False, fontsize=8.5, loc="lower left")
-    save(figure, file)
+    axes.legend(fontsize=8.5, loc="lower left")
+    save_figure(figure, file)

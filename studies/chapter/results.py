@@ -9,8 +9,10 @@ from seastar_gym import gaits
 from seastar_gym.scene import Scene
 from studies.chapter.pictures import PENTAGON_TIMES
 from studies.chapter.statements import PAIRS, stroke_motion
-from studies.chapter.swims import MM, QUICK, SETTINGS, Floats, Swim
+from studies.chapter.swims import QUICK, SETTINGS, Floats, Swim
+from studies.pages import markdown
 from studies.results_file import rounded
+from studies.style import MM
 
 UNIT = 1e-6
 """Length that counts as one in the data [m]."""
@@ -75,24 +77,23 @@ def motions(straight: Sequence[Swim]) -> dict[str, dict[str, list[float]]]:
 def pairs_table(results: Mapping[str, Any]) -> str:
     """Distances of the pairs in Markdown, a column for every setting."""
     columns = results["pairs_mm"]
-    lines = [f"| pair | {' | '.join(columns)} |", f"|---|{'---:|' * len(columns)}"]
-    for name, *row in zip(gaits.PAIRS, *columns.values(), strict=True):
-        lines.append(f"| {name} | {' | '.join(f'{each:.2f}' for each in row)} |")
-    return "\n".join(lines)
+    rows = zip(gaits.PAIRS, *columns.values(), strict=True)
+    return markdown(["pair", *columns], [[name, *(f"{each:.2f}" for each in row)] for name, *row in rows])
 
 
 def strokes_table(results: Mapping[str, Any]) -> str:
     """Motion of the hub in the first and the last stroke in Markdown."""
-    lines = [
-        "| setting | stroke | forward while heated, 0.1 s [mm] | forward after that [mm] | until [s] | back [mm] "
-        "| left [mm] |",
-        "|---|---|---:|---:|---:|---:|---:|",
-    ]
-    for label, strokes in results["straight_mm"].items():
-        for stroke, (heated, after, back, turn) in strokes.items():
-            left = heated + after - back
-            lines.append(f"| {label} | {stroke} | {heated:.1f} | {after:.1f} | {turn:.2f} | {back:.1f} | {left:.1f} |")
-    return "\n".join(lines)
+    head = [
+        "setting", "stroke", "forward while heated, 0.1 s [mm]", "forward after that [mm]", "until [s]", "back [mm]",
+        "left [mm]",
+    ]  # fmt: skip
+    rows = [
+        [label, stroke, *(f"{each:.1f}" for each in (heated, after)), f"{turn:.2f}",
+         *(f"{each:.1f}" for each in (back, heated + after - back))]
+        for label, strokes in results["straight_mm"].items()
+        for stroke, (heated, after, back, turn) in strokes.items()
+    ]  # fmt: skip
+    return markdown(head, rows, (0, 1))
 
 
 def as_results(straight: Sequence[Swim], pentagon: Sequence[Swim], pairs: Sequence[Swim]) -> dict[str, Any]:

@@ -11,7 +11,8 @@ from rich.table import Table
 from seastar_gym import gaits
 from studies.chapter import REAL_TIME_FROM
 from studies.chapter.cost import Cost
-from studies.chapter.swims import MM, MS, Swim
+from studies.chapter.swims import Swim
+from studies.style import MM, MS
 
 PAIRS = {name.replace(",", ", ").replace("-", "⁻").replace("+", "⁺"): command for name, command in gaits.PAIRS.items()}
 SIDE = gaits.SWIMMING_STROKES + gaits.RESTING_STROKES

@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator, SolverStatus
+from studies.style import MS
 
 Floats = NDArray[np.float64]
-MM, MS = 1e3, 1e3
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from studies.designs import front, study
 from studies.designs.front import AT_WORK, THRIFTIEST
 from studies.designs.space import MEASURED, SETTLING, Body
 from studies.frame import DOCS, Results, Study, require_known
-from studies.pages import numbers
+from studies.pages import markdown, numbers
 
 Table = dict[str, Any]
 WINNERS = (
@@ -107,15 +107,12 @@ def told(certificate: Certificate) -> Table:
 
 def table(found: Table) -> str:
     """Table in Markdown of all robots and settings."""
-    lines = [
-        f"| robot | sequences | {' | '.join(f'{n} nodes, repeated [%] | all [%] | energy' for n in NODES)} |",
-        f"|---|---:|{'---:|' * 3 * len(NODES)}",
-    ]
+    head, rows = [column for n in NODES for column in (f"{n} nodes, repeated [%]", "all [%]", "energy")], []
     for name, robot in found["robots"].items():
-        rows = (robot[f"{nodes} nodes, {1e3 * step:g} ms"] for nodes, step in zip(NODES, STEPS, strict=True))
-        cells = [f"{row[key]:g}" for row in rows for key in ("repeated_percent", "promised_percent", "energy_growth")]
-        lines.append(f"| {name} | {robot['samples']} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        row = (robot[f"{nodes} nodes, {1e3 * step:g} ms"] for nodes, step in zip(NODES, STEPS, strict=True))
+        cells = (f"{one[key]:g}" for one in row for key in ("repeated_percent", "promised_percent", "energy_growth"))
+        rows.append([name, robot["samples"], *cells])
+    return markdown(["robot", "sequences", *head], rows)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from seastar_gym.executors.processes import Processes
+from seastar_gym.files import save_figure
 from seastar_gym.scene import Contact, Scene, SmaPulse
 from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.configurations import Swim, configuration_with
@@ -19,8 +20,9 @@ from seastar_gym.sweep.swimming import swim
 from studies.designs.search import BODIES, CHILDREN, GENERATIONS, SPEEDS, Limit, Row, fastest, grown, search, thriftiest
 from studies.designs.space import MEASURED, SETTLING, Body
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.results_file import rounded
-from studies.style import DPI, INK, MM, subplots
+from studies.style import INK, MM, subplots
 
 Table = dict[str, Any]
 SWIM = Swim(SETTLING, MEASURED)
@@ -105,29 +107,26 @@ SHOWN = {THRIFTIEST: "least work at its speed"}
 
 def robots(results: Table) -> str:
     """Table in Markdown of the robots."""
-    lines = [
-        "| robot | limbs | radius [mm] | length [mm] | modulus [MPa] | angle [rad] | speed [mm/s] | work [mJ] "
-        "| moment [mN m] |",
-        "|---|---:|---:|---:|---:|---:|---:|---:|---:|",
-    ]
+    head = [
+        "robot", "limbs", "radius [mm]", "length [mm]", "modulus [MPa]", "angle [rad]", "speed [mm/s]", "work [mJ]",
+        "moment [mN m]",
+    ]  # fmt: skip
+    rows = []
     for name, row in results["robots"].items():
         root, tip = row["radius_mm"]
-        lines.append(
-            f"| {SHOWN.get(name, name)} | {row['n_limbs']} | {root:.3g} to {tip:.3g} | {row['limb_length_mm']:.3g} "
-            f"| {row['youngs_modulus_MPa']:.2g} | {row['peak_angle_rad']:.3f} | {row['mm_per_s']:.2f} "
-            f"| {row['mJ_per_stroke']:.3g} | {row['peak_mN_m']:.3g} |"
-        )
-    return "\n".join(lines)
+        rows.append([
+            SHOWN.get(name, name), row["n_limbs"], f"{root:.3g} to {tip:.3g}", f"{row['limb_length_mm']:.3g}",
+            f"{row['youngs_modulus_MPa']:.2g}", f"{row['peak_angle_rad']:.3f}", f"{row['mm_per_s']:.2f}",
+            f"{row['mJ_per_stroke']:.3g}", f"{row['peak_mN_m']:.3g}",
+        ])  # fmt: skip
+    return markdown(head, rows)
 
 
 def by_work(results: Table) -> str:
     """Table in Markdown of the fastest robots that do with some times the work of the chapter's."""
     rows = results["by_work"]
-    return "\n".join([
-        f"| work per stroke at most, of the chapter's | {' | '.join(f'{factor:g}' for factor, _ in rows)} |",
-        f"|---|{'---:|' * len(rows)}",
-        f"| fastest [mm/s] | {' | '.join(format(row['mm_per_s'], '.2f') for _, row in rows)} |",
-    ])
+    head = ["work per stroke at most, of the chapter's", *(f"{factor:g}" for factor, _ in rows)]
+    return markdown(head, [["fastest [mm/s]", *(f"{row['mm_per_s']:.2f}" for _, row in rows)]])
 
 
 LABELS = {
@@ -152,7 +151,7 @@ def draw(results: Table, file: Path) -> None:
     ticks = (3, 5, 10, 20)
     ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     ax.set_xticks([], minor=True)
-    figure.savefig(file, dpi=DPI)
+    save_figure(figure, file)
 
 
 STUDY = Study(

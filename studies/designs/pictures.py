@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from studies.style import CYCLE, DPI, FAINT, INK, subplots
+from seastar_gym.files import save_figure
+from studies.pages import markdown
+from studies.style import CYCLE, FAINT, INK, MM, subplots
 
-MM = 1e3
 COLOURS = {1.0: FAINT, 0.75: CYCLE[5], 0.5: CYCLE[0], 0.25: CYCLE[1]}
 """Colours of the tapers."""
 RANGES = (
@@ -39,22 +40,21 @@ CHAPTER = {
 
 def robots(found: dict[str, Any]) -> str:
     """Table in Markdown of the best robots: speeds [mm/s] at three fidelities, and work and moment at `reference`."""
-    lines = [
-        "| robot | limbs | radius [mm] | length [mm] | modulus [MPa] | angle [rad] | `fast` | `balanced` | `reference` "
-        "| work [mJ] | moment [mN m] |",
-        "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
-    ]
+    head = [
+        "robot", "limbs", "radius [mm]", "length [mm]", "modulus [MPa]", "angle [rad]", "`fast`", "`balanced`",
+        "`reference`", "work [mJ]", "moment [mN m]",
+    ]  # fmt: skip
+    rows = []
     for name, label in ROBOTS.items():
         row = CHAPTER | found[name]
         root, tip = row["root_radius_mm"], row["taper"] * row["root_radius_mm"]
         radius = f"{root:g}" if row["taper"] == 1.0 else f"{root:g} to {tip:.3g}"
-        speeds = " | ".join(f"{speed:.2f}" for speed in row["mm_per_s"].values())
-        lines.append(
-            f"| {label} | {row['n_limbs']} | {radius} | {row['limb_length_mm']:.0f} "
-            f"| {row['youngs_modulus_MPa']:.2g} | {row['peak_angle_rad']:.3f} | {speeds} "
-            f"| {row['mJ_per_stroke']['reference']:.3g} | {row['peak_mN_m']['reference']:.3g} |"
-        )
-    return "\n".join(lines)
+        rows.append([
+            label, row["n_limbs"], radius, f"{row['limb_length_mm']:.0f}", f"{row['youngs_modulus_MPa']:.2g}",
+            f"{row['peak_angle_rad']:.3f}", *(f"{speed:.2f}" for speed in row["mm_per_s"].values()),
+            f"{row['mJ_per_stroke']['reference']:.3g}", f"{row['peak_mN_m']['reference']:.3g}",
+        ])  # fmt: skip
+    return markdown(head, rows)
 
 
 def summary(table: Any) -> dict[str, Any]:
@@ -108,7 +108,7 @@ def draw(found: dict[str, Any], file: Path) -> None:
     for ax in axes[:, 0]:
         ax.set_ylabel("speed [mm/s]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
-    figure.savefig(file, dpi=DPI)
+    save_figure(figure, file)
 
 
 def _boxes(ax: Any, spreads: dict[str, list[float]]) -> None:

@@ -35,11 +35,11 @@ from studies.designs.space import (
     masses,
 )
 from studies.frame import Results, Study
+from studies.style import MM
 
 Table = dict[str, Any]
 CHECKS = ("fast", "balanced", "reference")
 """Fidelities at which the winners swim."""
-MM = 1e3
 MEASURES = {"mm_per_s": ("speed", MM), "mJ_per_stroke": ("work", 1e3 / MEASURED), "peak_mN_m": ("peak_moment", 1e3)}
 """What is told of a robot: a column of results, and its factor."""
 

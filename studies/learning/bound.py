@@ -30,16 +30,16 @@ from seastar_gym.envs.paths import LINE_LENGTH, WAYPOINT_RADIUS, make_path
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import action_table
 from seastar_gym.evaluation.many import swim_many
+from seastar_gym.files import save_figure
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator, State
 from studies.frame import Results, Study
-from studies.style import CYCLE, subplots
+from studies.style import CYCLE, MM, subplots
 
 Floats = NDArray[np.float64]
 Gaits = NDArray[np.intp]
 
-MM = 1000.0
 SETTLING, MEASURED = 12, 12
 """Strokes before and during the measurement of a gait; 12 strokes are whole periods of gaits of one to four strokes."""
 CHUNK = 4096
@@ -136,7 +136,7 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.4 * (high - low))
     axes.legend(loc="upper right")
-    figure.savefig(file)
+    save_figure(figure, file)
 
 
 @dataclass(frozen=True)

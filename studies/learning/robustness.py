@@ -25,8 +25,8 @@ from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
-from studies.accuracy.page import markdown
 from studies.frame import Results, Study
+from studies.pages import markdown
 
 N_PATHS = 200
 FIDELITY: Fidelity = "fast"

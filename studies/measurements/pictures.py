@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from seastar_gym.files import save_figure
 from seastar_gym.scene.actuators.pulse import pulse
 from studies.measurements.curves import Curve, read_curves
 from studies.measurements.model import curvature
@@ -37,7 +38,7 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     above.legend(handles=[handles[2], handles[1], handles[0]], labels=["measured", "fit", "ramp of the chapter"],
                  loc="outside upper center", ncols=3)  # fmt: skip
     _draw_errors(below, fits)
-    figure.savefig(file)
+    save_figure(figure, file)
 
 
 def _draw_material(row: Any, curves: Sequence[Curve], fit: Mapping[str, Any]) -> None:

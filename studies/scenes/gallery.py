@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.files import save_figure
 from seastar_gym.scene import Contact, Numerics, Scene, Seastar, Strip, Tube
 from seastar_gym.scene.actuators.limited import Limited
 from seastar_gym.scene.actuators.measured import MeasuredCurve
@@ -24,6 +25,7 @@ from seastar_gym.scene.limb import Limb
 from seastar_gym.scene.section import AnySection, Disc, Section
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.style import INK, subplots
 
 Floats = NDArray[np.float64]
@@ -178,16 +180,16 @@ def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
     axes.set_xlim(-128, 128)
     axes.set_ylim(-128, 128)
     axes.axis("off")
-    figure.savefig(file, dpi=320, bbox_inches="tight", pad_inches=0.02)
+    save_figure(figure, file, dpi=320, bbox_inches="tight", pad_inches=0.02)
 
 
 def table(results: Mapping[str, Any]) -> str:
     """Table of scenes in Markdown: pictures, code and costs."""
-    lines = ["| | scene | cost |", "|---|---|---:|"]
+    rows = []
     for exhibit in exhibits():
         picture, cost = f"![{exhibit.name}](gallery/{_file_name(exhibit)})", results["scenes"][exhibit.name]["cost"]
-        lines.append(f"| {picture} | **{exhibit.name}**<br>`{exhibit.code}` | {cost:.2f} |")
-    return "\n".join(lines)
+        rows.append([picture, f"**{exhibit.name}**<br>`{exhibit.code}`", f"{cost:.2f}"])
+    return markdown(["", "scene", "cost"], rows, (0, 1))
 
 
 def _file_name(exhibit: Exhibit) -> str:

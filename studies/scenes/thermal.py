@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from seastar_gym.files import save_figure
 from seastar_gym.scene.actuators.pulse import SmaPulse
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from studies.frame import Results, Study
@@ -88,7 +89,7 @@ def draw(actuator: ThermalSma, file: Path) -> None:
     loop.set(xlabel="temperature [deg C]", ylabel="share of austenite")
     angles.legend()
     loop.legend()
-    figure.savefig(file)
+    save_figure(figure, file)
 
 
 def run(results: Results) -> None:

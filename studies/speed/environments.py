@@ -14,6 +14,7 @@ import numpy as np
 
 import seastar_gym  # noqa: F401, registers the ids
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.results_file import rounded
 
 DECISIONS, ROUNDS = 256, 15
@@ -91,15 +92,15 @@ def run(results: Results) -> None:
 
 def table(results: Mapping[str, Any]) -> str:
     """Decisions per second, and simulated time per processor time, by environment."""
-    lines = [
-        "| environment | simulated time of a decision [s] | one robot: decisions per second | × real time | "
-        "batch: robots | decisions per second | × real time |",
-        "|---|---:|---:|---:|---:|---:|---:|",
-    ]
+    head = [
+        "environment", "simulated time of a decision [s]", "one robot: decisions per second", "× real time",
+        "batch: robots", "decisions per second", "× real time",
+    ]  # fmt: skip
+    rows = []
     for id, row in results["decisions_per_second"].items():
-        cells = [f"{_two(row[name])} | {_two(row[name] * row['simulated'])}" for name in ("single", "batch")]
-        lines.append(f"| `{id}` | {row['simulated']:g} | {cells[0]} | {row['robots']} | {cells[1]} |")
-    return "\n".join(lines)
+        single, batch = ([_two(row[name]), _two(row[name] * row["simulated"])] for name in ("single", "batch"))
+        rows.append([f"`{id}`", f"{row['simulated']:g}", *single, row["robots"], *batch])
+    return markdown(head, rows)
 
 
 def _two(number: float) -> str:

@@ -17,12 +17,14 @@ from typing import Any
 
 import numpy as np
 
+from seastar_gym.files import save_figure
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.provenance import provenance
 from studies.results_file import rounded
 from studies.speed import terms
@@ -126,12 +128,12 @@ def table(results: Mapping[str, Any]) -> str:
     """Table in Markdown of the first run and of the last."""
     runs = results["runs"]
     first, last = next(iter(runs)), next(reversed(runs))
-    told = " | ".join(f"{date} (`{runs[date]['commit']}`)" for date in (first, last))
-    lines = [f"| what | {told} | last over first |", "|---|---:|---:|---:|"]
+    told = (f"{date} (`{runs[date]['commit']}`)" for date in (first, last))
+    rows = []
     for name, now in runs[last]["ratios"].items():
         before = runs[first]["ratios"][name]
-        lines.append(f"| {name} | {before:,.3g} | {now:,.3g} | {now / before:.2f} |")
-    return "\n".join(lines)
+        rows.append([name, f"{before:,.3g}", f"{now:,.3g}", f"{now / before:.2f}"])
+    return markdown(["what", *told, "last over first"], rows)
 
 
 def draw(results: Mapping[str, Any], path: Path) -> None:
@@ -145,7 +147,7 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
     axes.set(ylabel="time over that of the first run", ylim=(0.0, None))
     axes.set_xticks(range(len(runs)), [f"{date.split()[0]}\n{row['commit']}" for date, row in runs.items()])
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 STUDY = Study(

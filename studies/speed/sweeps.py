@@ -27,6 +27,7 @@ from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.result_files import ResultFiles, result_file_of
 from seastar_gym.sweep.run import run
 from studies.frame import Results, Study
+from studies.pages import markdown
 
 require_extra("Sweeps", "sweep", "pyarrow")
 
@@ -130,14 +131,14 @@ def reckon(found: dict[str, Any], workers: int) -> dict[str, object]:
 
 def table(found: dict[str, Any]) -> str:
     """Table in Markdown of what NODES nodes would do with cells of several sizes."""
-    lines = ["| batch | its time [s] | nodes busy | strokes per second | limit |", "|---|---:|---:|---:|---|"]
+    rows = []
     for name, row in found[f"reckoned: {NODES} such nodes"].items():
         limit = "the workers" if row["nodes kept busy"] >= NODES else "the process that hands out batches"
-        lines.append(
-            f"| {name.removeprefix('a cell ')} | {row['time of a cell [s]']:.2g} | {row['nodes kept busy']:.2g} "
-            f"| {round(row['strokes per second'], -2):,.0f} | {limit} |"
-        )
-    return "\n".join(lines)
+        rows.append([
+            name.removeprefix("a cell "), f"{row['time of a cell [s]']:.2g}", f"{row['nodes kept busy']:.2g}",
+            f"{round(row['strokes per second'], -2):,.0f}", limit,
+        ])  # fmt: skip
+    return markdown(["batch", "its time [s]", "nodes busy", "strokes per second", "limit"], rows, (0, 4))
 
 
 def run_cells(results: Results) -> None:

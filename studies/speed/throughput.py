@@ -17,6 +17,7 @@ from rich.table import Table
 from tqdm import tqdm
 
 from seastar_gym.accuracy.measure import machine
+from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar
 from studies.frame import Results, Study
 from studies.speed.operations import count_operations, flops
@@ -185,7 +186,7 @@ def draw(curves: dict[str, list[tuple[int, float]]], path: Path) -> None:
     right.set_xticks(n, [f"{int(k)}" for k in n])
     right.minorticks_off()
     right.legend()
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def run(results: Results) -> None:

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.files import save_figure
 from studies.chapter import ISSUES_FROM
 from studies.stability.cases import Sweep, format_step, format_value
-from studies.style import new_figure
+from studies.style import FAINT, INK, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-INK, FAINT_INK, MARK, EMPTY = "#3a404a", "#80868f", "#d62728", "#eceff3"
+MARK, EMPTY = "#d62728", "#eceff3"
 NEEDS = ("plain Newton", "regularised matrix or line search", "substeps", "failed")
 """Needs of the solver, from least to most."""
 NEED_COLOURS = ("#c7e0f4", "#5aa2d6", "#1b4f8f", "#d62728")
@@ -34,32 +35,31 @@ NAMES = {
 }
 FRAME: dict[str, Any] = {"fill": False, "edgecolor": INK, "linewidth": 1.4}
 DASHES: dict[str, Any] = {"color": MARK, "linewidth": 1.6, "linestyle": (0, (4, 2))}
-DPI = 120
 
 
-def draw(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], scheme: str, file: Path) -> Path:
-    """Write the picture that a file's name ends with, such as stability_needs.png; returns the file."""
-    return DRAWN[file.stem.rpartition("_")[2]](cells, sweeps, steps, NAMES[scheme], file)
+def draw(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], scheme: str, file: Path) -> None:
+    """Write the picture that a file's name ends with, such as stability_needs.png."""
+    DRAWN[file.stem.rpartition("_")[2]](cells, sweeps, steps, NAMES[scheme], file)
 
 
 def _draw_iterations(
     cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], name: str, file: Path
-) -> Path:
-    return _draw_numbers(
+) -> None:
+    _draw_numbers(
         cells, sweeps, steps, f"{name}: Newton iterations per time step", file,
         lambda cell: cell.iterations, "viridis_r", (1.0, 300.0), "{:g}", "Newton iterations per time step",
     )  # fmt: skip
 
 
-def _draw_error(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], name: str, file: Path) -> Path:
-    return _draw_numbers(
+def _draw_error(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], name: str, file: Path) -> None:
+    _draw_numbers(
         cells, sweeps, steps, f"{name}: error of the hub's path against the converged run", file,
         lambda cell: 100.0 * cell.error, "magma_r", (0.01, 100.0), "{:g} %",
         "error of the hub's path", "no converged run",
     )  # fmt: skip
 
 
-def _draw_needs(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], name: str, file: Path) -> Path:
+def _draw_needs(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], name: str, file: Path) -> None:
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
@@ -70,7 +70,7 @@ def _draw_needs(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[
         _finish(axes, cells, sweep, steps)
     patches = [Patch(color=colour, label=need) for colour, need in zip(NEED_COLOURS, NEEDS, strict=True)]
     _legend(foot, [*patches, _refused_patch()])
-    return _save(figure, file)
+    save_figure(figure, file)
 
 
 def _need(cell: Cell) -> float:
@@ -92,7 +92,7 @@ def _draw_numbers(
     tick: str,
     label: str,
     missing: str = "",
-) -> Path:
+) -> None:
     """Draw maps of a positive number on a logarithmic scale; missing: legend of empty cells that were not refused."""
     from matplotlib.colors import LogNorm
     from matplotlib.patches import Patch
@@ -105,11 +105,11 @@ def _draw_numbers(
     bar = figure.colorbar(image, cax=foot.inset_axes((0.0, 0.55, 0.5, 0.3)), orientation="horizontal", extend="both")
     ticks = [10.0**k for k in range(round(math.log10(limits[0])), math.floor(math.log10(limits[1])) + 1)]
     bar.set_ticks(ticks, labels=[tick.format(value) for value in ticks])
-    bar.set_label(label, color=INK)
+    bar.set_label(label)
     bar.ax.minorticks_off()
     patches = [Patch(facecolor=EMPTY, label=missing)] if missing else []
     _legend(foot, [*patches, _refused_patch()], 0.56)
-    return _save(figure, file)
+    save_figure(figure, file)
 
 
 def _panels(sweeps: Sequence[Sweep], title: str) -> tuple[Figure, list[Axes], Axes]:
@@ -117,13 +117,13 @@ def _panels(sweeps: Sequence[Sweep], title: str) -> tuple[Figure, list[Axes], Ax
     columns = min(4, len(sweeps))
     rows = math.ceil(len(sweeps) / columns)
     figure = new_figure(3.1 * columns + 0.3, 2.75 * rows + 1.2)
-    figure.suptitle(title, x=0.01, ha="left", color=INK, fontsize=13)
+    figure.suptitle(title, x=0.01, ha="left", fontsize=13)
     note = "Strokes with steps below 1 ms are cut short after 2000 steps."
-    figure.text(0.99, 0.975, note, ha="right", fontsize=8.5, color=FAINT_INK)
+    figure.text(0.99, 0.975, note, ha="right", fontsize=8.5, color=FAINT)
     grid = figure.add_gridspec(rows + 1, columns, height_ratios=[*[1.0] * rows, 0.16])
     panels = [figure.add_subplot(grid[k // columns, k % columns]) for k in range(len(sweeps))]
     for axes in panels[-columns:]:
-        axes.set_xlabel("time step h", fontsize=8.5, color=INK)
+        axes.set_xlabel("time step h", fontsize=8.5)
     foot = figure.add_subplot(grid[rows, :])
     foot.axis("off")
     return figure, panels, foot
@@ -145,11 +145,11 @@ def _finish(axes: Axes, cells: Sequence[Cell], sweep: Sweep, steps: Sequence[flo
     for cell in cells:
         if cell.sweep == sweep.name and cell.refused:
             corner = (steps.index(cell.step), sweep.values.index(cell.value))
-            axes.add_patch(Rectangle(corner, 1, 1, facecolor="white", edgecolor=FAINT_INK, hatch="////", linewidth=0.0))
+            axes.add_patch(Rectangle(corner, 1, 1, facecolor="white", edgecolor=FAINT, hatch="////", linewidth=0.0))
     axes.set_xticks(np.arange(len(steps)) + 0.5, [format_step(step) for step in steps], rotation=90)
     axes.set_yticks(np.arange(len(sweep.values)) + 0.5, [format_value(sweep, value) for value in sweep.values])
-    axes.tick_params(length=0, labelsize=8, labelcolor=INK)
-    axes.set_title(f"{sweep.label} [{sweep.unit}]" if sweep.unit else sweep.label, fontsize=10, color=INK, loc="left")
+    axes.tick_params(length=0, labelsize=8)
+    axes.set_title(f"{sweep.label} [{sweep.unit}]" if sweep.unit else sweep.label, loc="left")
     for spine in axes.spines.values():
         spine.set_visible(False)
     if sweep.chapter in sweep.values:
@@ -172,7 +172,7 @@ def _halo() -> list[Any]:
 def _refused_patch() -> Any:
     from matplotlib.patches import Patch
 
-    return Patch(facecolor="white", edgecolor=FAINT_INK, hatch="////", label="scene refused")
+    return Patch(facecolor="white", edgecolor=FAINT, hatch="////", label="scene refused")
 
 
 def _legend(foot: Axes, patches: list[Any], left: float = 0.0) -> None:
@@ -185,13 +185,8 @@ def _legend(foot: Axes, patches: list[Any], left: float = 0.0) -> None:
     ]
     foot.legend(
         handles=[*patches, *marks], loc="upper left", bbox_to_anchor=(left, 1.0), ncols=4 if left == 0.0 else 2,
-        frameon=False, fontsize=9, labelcolor=INK, borderaxespad=0.0,
+        fontsize=9, borderaxespad=0.0,
     )  # fmt: skip
-
-
-def _save(figure: Figure, file: Path) -> Path:
-    figure.savefig(file, dpi=DPI)
-    return file
 
 
 DRAWN = {"needs": _draw_needs, "iterations": _draw_iterations, "error": _draw_error}

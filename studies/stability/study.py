@@ -25,6 +25,7 @@ from tqdm import tqdm
 from seastar_gym.scene.numerics import SchemeName
 from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.results_file import rounded
 from studies.stability.cases import STEPS, SWEEPS, Sweep, format_value
 from studies.stability.cells import Cell, commands_of, converged_displacements, run_cell, stroke_duration
@@ -111,12 +112,6 @@ def _errors(cells: list[Cell], sweep: Sweep) -> str:
     return ", ".join(f"{100 * error:.2g}" if math.isfinite(error) else "-" for error in errors) + " %"
 
 
-def as_markdown(rows: Sequence[Sequence[str]]) -> str:
-    """Summary as a table in Markdown."""
-    lines = [SUMMARY, ["---", *["---:"] * (len(SUMMARY) - 1)], *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
-
-
 KEPT = (
     "sweep", "value", "step", "refused", "robots", "failed", "iterations", "regularised", "backtracks", "halvings",
     "growth", "growth_in_vacuum", "error",
@@ -193,11 +188,8 @@ TOLD = ("against", "failed", "Newton iterations per step (most)")
 def table(results: Mapping[str, Any]) -> str:
     """Some columns of the summary in Markdown, from plain data."""
     cells = from_data(results)
-    rows = [list(SUMMARY), *summarise(cells, sweeps_of(cells))]
     kept = [SUMMARY.index(name) for name in TOLD]
-    lines = [[row[k] for k in kept] for row in rows]
-    lines[1:1] = [["---", *["---:"] * (len(TOLD) - 1)]]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    return markdown(TOLD, [[row[k] for k in kept] for row in summarise(cells, sweeps_of(cells))])
 
 
 STUDY = Study(

@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from seastar_gym.evaluation.statistics import crossed_interval
+from seastar_gym.files import save_figure
+from studies.pages import markdown
 from studies.style import CYCLE, FAINT, as_numbers, subplots
 from studies.tasks.rows import MORE_IS_BETTER, ORDER, Row
 
@@ -47,29 +49,29 @@ IN_TABLE = {
 
 def means(rows: Sequence[Row]) -> str:
     """Table in Markdown of the means of all tasks that have a greedy agent."""
-    lines = [["task", "measure", *COLUMNS.values()], ["---", "---", *["---:"] * len(COLUMNS)]]
+    lines = []
     for row in (row for row in rows if "greedy" in row.agents):
         numbers = [f"{row.mean(agent):.3g}" if agent in row.agents else "" for agent in COLUMNS]
         lines.append([f"`{row.id.removeprefix('Seastar').removesuffix('-v0')}`", IN_TABLE[row.challenge], *numbers])
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown(["task", "measure", *COLUMNS.values()], lines, (0, 1))
 
 
 def table(row: Row, has_cell: Callable[[str, str], bool] = lambda id, agent: True) -> str:
     """Everything about a task in Markdown, for the terminal. has_cell: Whether an agent can swim a task, by its id."""
-    lines = [f"## {row.id}", "", f"{UNITS[row.challenge].capitalize()}.", ""]
-    lines += ["| agent | mean | 95 % interval | episodes | means of seeds |", "|---|---:|---|---:|---|"]
+    rows = []
     for agent, seeds in row.in_order:
         low, high = crossed_interval(seeds)
         each = ", ".join(f"{values.mean():.3g}" for values in seeds) if len(seeds) > 1 else ""
-        n_episodes = min(map(len, seeds))
-        lines.append(f"| {agent} | {row.mean(agent):.3g} | {low:.3g} to {high:.3g} | {n_episodes} | {each} |")
+        rows.append([agent, f"{row.mean(agent):.3g}", f"{low:.3g} to {high:.3g}", min(map(len, seeds)), each])
+    head = ["agent", "mean", "95 % interval", "episodes", "means of seeds"]
+    parts = [f"## {row.id}", f"{UNITS[row.challenge].capitalize()}.", markdown(head, rows, (0, 2, 4))]
     missing = [agent for agent in ORDER if agent not in (*row.agents, OPTIONAL) and has_cell(row.id, agent)]
     if missing:
-        lines += ["", f"Not swum yet: {'; '.join(missing)}."]
+        parts.append(f"Not swum yet: {'; '.join(missing)}.")
     if {"greedy", "informed"} <= row.agents.keys():
         judged = _verdict(row) if "PPO" in row.agents else ""
-        lines += ["", f"Bound: {row.bound}, {row.better} better than greedy.{judged}"]
-    return "\n".join(lines)
+        parts.append(f"Bound: {row.bound}, {row.better} better than greedy.{judged}")
+    return "\n\n".join(parts)
 
 
 def _verdict(row: Row) -> str:
@@ -90,7 +92,7 @@ def draw(rows: Sequence[Row], file: Path) -> None:
     handles = [grid[0, 0].plot([], [], "o-", color=colour, lw=2.5)[0] for colour in (FAINT, CYCLE[0])]
     figure.legend(handles, ["rule or planner", "learned"], title="mean and its 95 % interval",
                   loc="outside upper center", ncols=2)  # fmt: skip
-    figure.savefig(file)
+    save_figure(figure, file)
 
 
 def _draw_row(axes: Any, row: Row) -> None:

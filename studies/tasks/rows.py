@@ -63,12 +63,8 @@ class Row(NamedTuple):
     @property
     def left(self) -> float:
         """Share of the headroom that PPO leaves."""
-        return self.left_by("PPO")
-
-    def left_by(self, agent: str) -> float:
-        """Share of the headroom that an agent leaves."""
         greedy, bound = self.shared("greedy"), self.shared(self.bound)
-        return abs(bound - self.shared(agent)) / abs(bound - greedy)
+        return abs(bound - self.shared("PPO")) / abs(bound - greedy)
 
     @property
     def is_kept(self) -> bool:

@@ -119,7 +119,7 @@ STUDY = Study(
     pictures={"tasks.png": lambda results, file: draw(rows_of(results, IDS), file)},
     tables={
         "tasks": lambda results: means(rows_of(results, IDS)),
-        "tasks verdicts": lambda results: verdicts(rows_of(results, IDS)).partition("\n\n")[2],
+        "tasks verdicts": lambda results: verdicts(rows_of(results, IDS)),
     },
     packages=("torch", "stable_baselines3"),
 )

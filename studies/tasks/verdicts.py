@@ -15,19 +15,7 @@ def verdicts(rows: Sequence[Row]) -> str:
     judged = [row for row in rows if {"greedy", "informed", "PPO"} <= row.agents.keys()]
     boxed = [row for row in rows if {BUNDLED, MEMORY, *RULES[:3]} <= row.agents.keys()]
     paragraphs = [_kept(judged)] * bool(judged) + [_in_the_box(boxed)] * bool(boxed)
-    text = "".join(f"{textwrap.fill(each, 120, break_on_hyphens=False)}\n\n" for each in paragraphs)
-    return f"{_summary(judged)}\n\n{text}" if judged else text
-
-
-def _summary(rows: Sequence[Row]) -> str:
-    lines = ["| task | bound | better than greedy | gap left by PPO | gap left by the bundled policy | kept |"]
-    lines.append("|---|---|---:|---:|---:|---|")
-    for row in rows:
-        left = (f"{100.0 * row.left_by(agent):.0f} %" if agent in row.agents else "" for agent in ("PPO", BUNDLED))
-        lines.append(
-            f"| {_name(row)} | {row.bound} | {row.better} | {' | '.join(left)} | {'yes' if row.is_kept else 'no'} |"
-        )
-    return "\n".join(lines)
+    return "\n\n".join(textwrap.fill(each, 120, break_on_hyphens=False) for each in paragraphs)
 
 
 def _kept(rows: Sequence[Row]) -> str:

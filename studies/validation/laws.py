@@ -11,13 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.pages import markdown
+from studies.style import PERCENT
 from studies.validation.speeds import Condition
 from studies.validation.swimmer import measured_curve
 
 Floats = NDArray[np.float64]
 
 POWERS_OF_FREQUENCY, POWERS_OF_CHANGE = (0.0, 0.5, 1.0), (0.0, 0.5, 1.0, 2.0)
-PER_CENT = 100.0
+ERRORS = "error of 33 speeds [%]", "with other fours [%]: median (5 to 95)"
+"""Columns of the tables."""
 LARGEST = 0.25
 """Error over other fours of what the page still shows."""
 ADDED = {
@@ -81,28 +84,24 @@ def table(results: dict[str, Any]) -> str:
     rows = [("**the model**", full["score"]["error"], full["fours"]["error"])]
     rows += [(_name(law), law["error"], law["fours"]) for law in results["laws"]]
     rows = sorted((row for row in rows if row[2][1] < LARGEST or "one speed" in row[0]), key=lambda row: row[2][1])
-    lines = ["| prediction | error of 33 speeds [%] | with other fours [%]: median (5 to 95) |", "|---|---:|---:|"]
-    return "\n".join([*lines, *(_row(*row) for row in rows)])
+    return markdown(["prediction", *ERRORS], [_row(*row) for row in rows])
 
 
 def tried(results: dict[str, Any]) -> str:
     """Models with what the full one lacks, and swimmers whose limbs follow their curves, in Markdown."""
     told_all = next(law for law in results["laws"] if law["told_all"])
     (p, q), (more, most) = told_all["powers"], told_all["standard_errors"]
-    lines = ["| model | error of 33 speeds [%] | with other fours [%]: median (5 to 95) | speeds go with |",
-             "|---|---:|---:|---|",
-             f"| measured | | | f^({p:.2f} ± {more:.2f}) dk^({q:.2f} ± {most:.2f}) |"]  # fmt: skip
+    rows = [["measured", "", "", f"f^({p:.2f} ± {more:.2f}) dk^({q:.2f} ± {most:.2f})"]]
     shown = [(shown_as, results["models"][name]) for name, shown_as in ADDED.items() if name in results["models"]]
     for name, one in (*shown, *results["followers"].items()):
         p, q = one["powers"]
-        row = _row(name, one["score"]["error"], one["fours"]["error"])
-        lines.append(f"{row} f^{p:.2f} dk^{q:.2f} |")
-    return "\n".join(lines)
+        rows.append([*_row(name, one["score"]["error"], one["fours"]["error"]), f"f^{p:.2f} dk^{q:.2f}"])
+    return markdown(["model", *ERRORS, "speeds go with"], rows, (0, 3))
 
 
 def tell(one: dict[str, Any]) -> str:
     """Errors of a model in a line."""
-    error, middle = PER_CENT * one["score"]["error"], PER_CENT * one["fours"]["error"][1]
+    error, middle = PERCENT * one["score"]["error"], PERCENT * one["fours"]["error"][1]
     return f"{error:.1f} %, {middle:.1f} % with other fours, powers {one['powers']}"
 
 
@@ -115,6 +114,6 @@ def _name(law: dict[str, Any]) -> str:
     return " ".join(["a", *filter(None, shown)]) + (", one speed for all" if not any(shown) else "")
 
 
-def _row(name: str, error: float, fours: Sequence[float]) -> str:
-    low, middle, high = (PER_CENT * each for each in fours)
-    return f"| {name} | {PER_CENT * error:.1f} | {middle:.1f} ({low:.1f} to {high:.1f}) |"
+def _row(name: str, error: float, fours: Sequence[float]) -> list[str]:
+    low, middle, high = (PERCENT * each for each in fours)
+    return [name, f"{PERCENT * error:.1f}", f"{middle:.1f} ({low:.1f} to {high:.1f})"]

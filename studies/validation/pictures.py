@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from studies.style import CYCLE, DPI, INK, subplots
+from seastar_gym.files import save_figure
+from studies.style import CYCLE, INK, subplots
 
 COLOURS = {0: CYCLE[0], 10: CYCLE[2], 30: CYCLE[1], 40: CYCLE[3], 50: CYCLE[4]}
 AUTHORS = 0.19
@@ -39,4 +40,4 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
         ylabel="measured speed [mm/s]", title=f"{predicted} predicted speeds, {off:.0f} % off on average",
     )  # fmt: skip
     axes.legend(fontsize="small", loc="upper left", ncols=2)
-    figure.savefig(file, dpi=DPI)
+    save_figure(figure, file)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.simulator import Simulator
+from studies.pages import markdown
 from studies.results_file import rounded
 from studies.style import MM, PERCENT
 from studies.validation.inference import predict, score
@@ -127,11 +128,8 @@ def tell(one: dict[str, Any]) -> str:
 
 def table(results: dict[str, Any]) -> str:
     """Predictions of turns and ways and their scores in Markdown."""
-    lines = [
-        "| second stroke heats | of a letter | measured, mean | predicted, mean (90 %) | error | mean error "
-        "| within 90 % |",
-        "|---|---|---:|---:|---:|---:|---:|",
-    ]
+    head = ["measured, mean", "predicted, mean (90 %)", "error", "mean error", "within 90 %"]
+    rows = []
     for second, found in results["turns"].items():
         for what in ("turn_rad", "way_mm"):
             name, unit = what.split("_")
@@ -139,9 +137,9 @@ def table(results: dict[str, Any]) -> str:
             measured, middle, low, high = (
                 f"{round(float(np.mean(one[column])), 2):.3g}" for column in ("measured", "predicted", "low", "high")
             )
-            lines.append(
-                f"| {second} | {name} | {measured} {unit} | {middle} {unit} ({low} to {high}) "
-                f"| {PERCENT * of_all['error']:.0f} % | {PERCENT * of_all['bias']:+.0f} % "
-                f"| {PERCENT * of_all['covered']:.0f} % of {len(one['measured'])} |"
-            )
-    return "\n".join(lines)
+            rows.append([
+                second, name, f"{measured} {unit}", f"{middle} {unit} ({low} to {high})",
+                f"{PERCENT * of_all['error']:.0f} %", f"{PERCENT * of_all['bias']:+.0f} %",
+                f"{PERCENT * of_all['covered']:.0f} % of {len(one['measured'])}",
+            ])  # fmt: skip
+    return markdown(["second stroke heats", "of a letter", *head], rows, (0, 1))

@@ -7,9 +7,10 @@ from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Numerics, Scene, Seastar, Water
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator, State
+from studies.style import MM
 from studies.verification import exact
 from studies.verification.page import Row, Section
-from studies.verification.unactuated import MM, let_pass, pause
+from studies.verification.unactuated import let_pass, pause
 
 Floats = NDArray[np.float64]
 

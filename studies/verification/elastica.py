@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene import Numerics, Scene, Seastar, Water
 from seastar_gym.simulator import Simulator
+from studies.style import MM
 from studies.verification import exact
 from studies.verification.page import Row, Section, order_row
-from studies.verification.unactuated import HUB, IN_LINE, MM, let_pass, pause
+from studies.verification.unactuated import HUB, IN_LINE, let_pass, pause
 
 Floats = NDArray[np.float64]
 

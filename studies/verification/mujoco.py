@@ -15,10 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simulator import Simulator, State
 from studies.frame import Results, Study
+from studies.pages import markdown
 from studies.results_file import rounded
 from studies.style import COLOURS, FAINT, MS, PERCENT, subplots
 from studies.verification import exact
@@ -277,14 +279,14 @@ def microseconds(seconds: float) -> str:
 
 def table(results: Mapping[str, Any]) -> str:
     """Errors and times of all cases."""
-    lines = [f"| case | code | error | time per step [µs] | in a batch of {BATCH} |", "|---|---|---:|---:|---:|"]
+    rows = []
     for case, settings in ((case, results[case]) for case in ("tip load", "ringing", "free fall")):
         for setting in TOLD.get(case, tuple(settings)):
             for code, (error, alone, in_batch) in settings[setting].items():
                 batch = microseconds(in_batch) if in_batch else ""
                 shown = "rounding" if error < ROUNDING else f"{PERCENT * error:.2g} %"
-                lines.append(f"| {named(case, setting)} | {NAMES[code]} | {shown} | {microseconds(alone)} | {batch} |")
-    return "\n".join(lines)
+                rows.append([named(case, setting), NAMES[code], shown, microseconds(alone), batch])
+    return markdown(["case", "code", "error", "time per step [µs]", f"in a batch of {BATCH}"], rows, (0, 1))
 
 
 def draw(results: Mapping[str, Any], file: Path) -> None:
@@ -301,7 +303,7 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     axes.set_xlabel("processor time for a simulated second [s]")
     axes.set_ylabel("largest error of the tip [% of its amplitude]")
     axes.legend()
-    figure.savefig(file)
+    save_figure(figure, file)
 
 
 STUDY = Study(

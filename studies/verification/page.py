@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from studies.pages import markdown
+
 
 @dataclass(frozen=True)
 class Row:
@@ -75,11 +77,10 @@ def as_page(sections: Sequence[Section]) -> str:
     parts = [INTRODUCTION]
     for section in sections:
         parts.append(f"## {section.title}\n\n{section.method}\n")
-        parts.append(as_table([row for row in section.rows if row.shown]))
+        parts.append(f"{as_table([row for row in section.rows if row.shown])}\n")
     return "\n".join(parts)
 
 
 def as_table(rows: Sequence[Row]) -> str:
     """Rows as a table in Markdown."""
-    lines = ["| quantity | reference | ours | difference |", "|---|---:|---:|---:|"]
-    return "".join(f"{line}\n" for line in [*lines, *(f"| {' | '.join(as_cells(row))} |" for row in rows)])
+    return markdown(["quantity", "reference", "ours", "difference"], map(as_cells, rows))

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from seastar_gym.gaits import straight_gait
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator
+from studies.style import MM
 from studies.verification.page import Row, Section
-from studies.verification.unactuated import MM
 
 Floats = NDArray[np.float64]
 

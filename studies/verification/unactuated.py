@@ -5,9 +5,6 @@ import numpy as np
 from seastar_gym.scene import Seastar, SmaPulse
 from seastar_gym.simulator import Simulator, SolverStatus
 
-MM = 1e3
-"""Millimetres per metre."""
-
 
 def pause(duration: float) -> SmaPulse:
     """Actuator that stays at rest, so that a stroke simulates a duration [s] without actuation."""

@@ -30,11 +30,11 @@ from studies.accuracy.cases import (
     symmetric_form,
 )
 from studies.accuracy.rows import Figures, Row, medians
-from studies.accuracy.settings import MS, Plan, presets, settings
+from studies.accuracy.settings import MILLI, Plan, presets, settings
 
 TINY = Plan(
-    n_random=2, n_slow=1, n_gaits=1, side=(1, 0), limit=(13, 5 * MS), fine=5 * MS, opinion=(4, 5 * MS),
-    meshes=(("continuum", 10), ("chapter", 4)), shortest=10 * MS, rounds=1,
+    n_random=2, n_slow=1, n_gaits=1, side=(1, 0), limit=(13, 5 * MILLI), fine=5 * MILLI, opinion=(4, 5 * MILLI),
+    meshes=(("continuum", 10), ("chapter", 4)), shortest=10 * MILLI, rounds=1,
 )  # fmt: skip
 KINDS = ("path", "straight", "pair", "pentagon", "random", "slow", "gait", "heading", "end")
 
@@ -148,8 +148,8 @@ def test_limit_is_that_of_the_continuum():
 def test_two_schemes_of_different_kind_agree_on_the_converged_straight_swim():
     """38.4133 mm after ten strokes and 4.91276 mm after one in the chapter's discretisation, to 1e-5."""
     straight = swims().first(1)
-    sdirk3 = swim(straight, ten(Numerics("sdirk3", 0.02 * MS, 1e-12)))
-    midpoint = swim(straight, ten(Numerics("implicit-midpoint", 0.01 * MS, 1e-12)))
+    sdirk3 = swim(straight, ten(Numerics("sdirk3", 0.02 * MILLI, 1e-12)))
+    midpoint = swim(straight, ten(Numerics("implicit-midpoint", 0.01 * MILLI, 1e-12)))
     assert errors(midpoint, sdirk3, path_lengths(Scene(), sdirk3.hub)).path[0] < 1e-5
     for found in (sdirk3, midpoint):
         assert found.hub[0, 0, 0] == pytest.approx(4.91276e-3, rel=1e-5)
@@ -251,7 +251,7 @@ def test_study_knows_its_limit_and_the_doubt_about_it(found):
 
 def test_presets_and_the_chapters_steps_are_among_the_settings():
     measured = settings(Plan())
-    chapter = {Resolution("chapter", 10, Numerics("implicit-euler", 20 * MS, 1e-6))}
+    chapter = {Resolution("chapter", 10, Numerics("implicit-euler", 20 * MILLI, 1e-6))}
     assert {*presets().values()} | chapter <= set(measured)
     assert len(measured) == len(set(measured))
 

@@ -19,10 +19,11 @@ from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 from studies.accuracy.tables import two_digits
 from studies.command import all_studies
-from studies.learning.bound import MEASURED, MM, SETTLING
+from studies.learning.bound import MEASURED, SETTLING
 from studies.pages import BLOCK, check, draw, filled, is_drawn_so, pages, tables, told
 from studies.provenance import FINAL, footer, machine, provenance
 from studies.scenes.page import UNIT, transitions
+from studies.style import MM
 
 DOCS = Path(__file__).parents[2] / "docs"
 STUDIES = list(all_studies())

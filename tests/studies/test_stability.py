@@ -73,14 +73,13 @@ def test_the_csv_has_every_cell_and_the_summary_counts_it(cells, folder):
     lines = list(csv.DictReader((folder / "cells.csv").read_text(encoding="utf-8").splitlines()))
     assert [(one["sweep"], float(one["step"])) for one in lines] == [(cell.sweep, cell.step) for cell in cells]
     assert lines[9]["value"] == "vacuum"
-    summary = stability.as_markdown(stability.summarise(cells, GRID))
-    table = [line.strip("| ").split(" | ") for line in summary.splitlines()]
-    assert table[0] == list(stability.SUMMARY) and len(table) == 2 + len(GRID) + 1
+    table = stability.summarise(cells, GRID)
+    assert len(table) == len(GRID) + 1
     names = [sweep.name for sweep in GRID]
-    for name, row in zip([*names, None], table[2:], strict=True):
+    for name, row in zip([*names, None], table, strict=True):
         own = [line for line in lines if name is None or line["sweep"] == name]
         ran = [line for line in own if not line["refused"]]
-        figures = dict(zip(stability.SUMMARY, row, strict=False))
+        figures = dict(zip(stability.SUMMARY, row, strict=True))
         assert figures["cells"] == str(len(own)) and figures["refused"] == str(len(own) - len(ran))
         assert figures["strokes"] == str(sum(int(line["robots"]) for line in ran))
         assert figures["failed"] == str(sum(int(line["failed"]) for line in ran)) == "0"

@@ -47,7 +47,7 @@ def test_largest_errors_are_told_of_robots_whose_worst_sequences_have_a_limit():
     assert "Not so for contact, where 30 % are in doubt" in page._doubt(problems)
     assert "2 to 2 times faster" in page._conclusion(problems)
     rows[-1] |= {"largest_error": study.finite(np.inf)}
-    assert "fails, 5 %" in page._rows(problems)[-1]
+    assert page._rows(problems)[-1][-1].startswith("fails, 5 %")
 
 
 @pytest.fixture
