@@ -112,6 +112,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return check(DOCS, chosen) if asked.check else draw(DOCS, chosen)
         if name:
             return run(module_of(name).STUDY, given, module_of(name).__doc__, asked.out)
+        if asked.out:
+            raise ValueError("--out is for a study: name it.")
         require_known("study", [each for each in given[:1] if each not in ("-h", "--help")], names)
     except (ValueError, ModuleNotFoundError) as wrong:
         print(wrong, file=sys.stderr)

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from studies.frame import Results, Study
+from studies.frame import Results, Study, require_known
 
 ROOMS = {
     "seastar_gym/envs": "tests/envs", "seastar_gym/controllers": "tests/controllers",
@@ -344,7 +344,7 @@ class Options:
     """Which are drawn."""
     rooms: tuple[str, ...] = tuple(ROOMS)
     """Rooms."""
-    seconds: float = 600.0
+    seconds: float = SECONDS
     """Time limit of a mutant."""
 
     def __post_init__(self) -> None:

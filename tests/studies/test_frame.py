@@ -122,6 +122,7 @@ def test_a_cell_that_is_not_done_is_computed_again(tmp_path):
 
 def test_unknown_studies_and_names_are_refused(capsys):
     assert main(["luck"]) == 2 and "Unknown study 'luck': choose of " in capsys.readouterr().err
+    assert main(["--out", "anywhere"]) == 2 and "name it" in capsys.readouterr().err
     with assert_refused("Unknown number '99'"):
         Options(seeds=(99,))
     assert main(["contracts"]) == 2 and "nothing to run" in capsys.readouterr().err
