@@ -25,8 +25,9 @@ def test_classes_are_drawn_for_any_number_of_limbs(n_limbs):
     classes = dict(zip(commands.CLASSES, np.split(drawn, len(commands.CLASSES), axis=1), strict=True))
     assert np.isin(classes["random ternary"], (-1, 0, 1)).all()
     assert classes["random ternary"].any(axis=-1).all()
-    assert (classes["repeated continuous"] == classes["repeated continuous"][0]).all()
-    assert (classes["alternating ternary"] == classes["alternating ternary"][[0, 1] * 5]).all()
+    for kind in ("ternary", "continuous"):
+        assert (classes[f"repeated {kind}"] == classes[f"repeated {kind}"][0]).all()
+        assert (classes[f"alternating {kind}"] == classes[f"alternating {kind}"][[0, 1] * 5]).all()
     assert (np.count_nonzero(classes["opposed neighbours"], axis=-1) == min(2, n_limbs)).all()
     assert np.abs(classes["small"]).max() <= 0.1
 

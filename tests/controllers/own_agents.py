@@ -9,6 +9,7 @@ class Towards:
     actions = "pairs"
 
     def __init__(self, env):
+        self.scene = env.scene
         self.action = 8 if env.scene.robot.n_limbs == 5 else 1  # {2+, 5-}
 
     def predict(self, observation, state=None, episode_start=None, deterministic=False):

@@ -194,7 +194,7 @@ def own(monkeypatch):
 
 def test_a_function_gets_the_environment_and_its_policy_swims_in_every_evaluation(own, short_trials, tmp_path):
     (policy,) = load_agents([own], fidelity="fast").values()
-    assert policy.actions == "pairs"
+    assert policy.actions == "pairs" and policy.scene == Scene.preset("fast")
     (done,) = evaluate.evaluate({"own": policy}, [[0.05, 0.0]], fidelity="fast", max_strokes=3)
     assert done.strokes == 3 and (done.limbs_heated == 2).all()
     assert rows_of_trials(own, tmp_path / "trials.csv") == [own]
