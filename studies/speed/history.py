@@ -1,8 +1,9 @@
 """History of the speed: ten fixed things, timed now and kept beside what they took before.
 
 Each is a processor time, as a multiple of that of one fixed loop, which is timed just before and just after it: runs on
-machines of one kind, as busy as they please, can be compared; another processor has other ratios. A run adds a row with its date to `speed_history.json`. Caches
-and memory are shared with other work of a machine, however, so what differs by less than 20 % is the same.
+machines of one kind, as busy as they please, can be compared; another processor has other ratios. A run adds a row with
+its date to `speed_history.json`. Caches and memory are shared with other work of a machine, however, so what differs by
+less than 20 % is the same.
 """
 
 import os
