@@ -96,7 +96,7 @@ def compare(options: Options, folder: Path, remarks: Remarks, film: Callable[[],
     evaluate(
         {"learned": load_policy(folder / "policy.safetensors"), **script(decision_period, robot.scene)},
         "pentagon",
-        max_strokes=options.limit,
+        max_strokes=options.limit(robot.scene),
         decision_period=decision_period,
         scene=robot.scene,
         fidelity=robot.fidelity(options),

@@ -2,7 +2,7 @@
 
     python -m studies                   lists the studies
     python -m studies NAME [options]    runs one; `python -m studies.NAME` is the same
-    python -m studies NAME --out OUT    writes into the folder OUT, or the numbers into the file OUT
+    python -m studies NAME --out OUT    writes into OUT: a folder, or a file as its help says
     python -m studies [NAME] --check    names pictures and pages in docs/ that are not what the numbers beside them say
     python -m studies [NAME] --draw     draws and fills them again, in seconds and without running a study
 """
@@ -54,7 +54,9 @@ def all_studies() -> Iterator[Study]:
 def options_of(study: Study, given: Sequence[str], prog: str, doc: str) -> tuple[Any, ...]:
     """The options as a command line has them, if the study has any; ends with the help if that is asked for."""
     if {"-h", "--help"} & set(given):
-        text = f"{doc}\n\n--out OUT: folder of the files, or file of the numbers; by default {study.default_out}."
+        what = "folder of the files, or file of the numbers" if study.file else "folder of the files"
+        what = "the file" if study.default_out.suffix else what
+        text = f"{doc}\n\n--out OUT: {what}; by default {study.default_out}."
         print(command_parser(prog, text).description, end="\n\n")
     if study.options is None:
         argparse.ArgumentParser(prog).parse_args(given)

@@ -76,7 +76,7 @@ def keep(done: Round, options: Options, seconds: float) -> None:
     pentagon = SeastarSwimEnv(
         "pentagon", actions=ppo.actions, fidelity=options.fidelity, decision_period=ppo.decision_period
     )
-    swum = swim("learned", policy, pentagon, max_strokes=options.limit)
+    swum = swim("learned", policy, pentagon, max_strokes=options.limit(pentagon.scene))
     save_checkpoint(done.algorithm, folder, done.strokes)
     save(policy, folder / "policy.safetensors", strokes=done.strokes, seed=options.seed)
     rows = [row for row in recorded(folder) if row[0] < done.strokes]

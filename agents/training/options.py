@@ -15,6 +15,7 @@ from seastar_gym.controllers.learned import reason_of
 from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
 from seastar_gym.files import read_json
+from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, require_count, require_flag, shown
 from seastar_gym.scene.numerics import Fidelity
 
@@ -42,10 +43,12 @@ class Lengths:
             return self.strokes
         return ENOUGH if self.ppo.decision_period is None else ENOUGH_IN_TIME
 
-    @property
-    def limit(self) -> int:
-        """Time limit of an evaluated swim [decisions]; the scripted gait takes 241 s round the pentagon."""
-        return decisions_in(TIME_LIMIT, self.ppo.decision_period)
+    def limit(self, scene: Scene | None = None) -> int:
+        """Time limit of an evaluated swim [decisions]; the scripted gait takes 241 s round the pentagon.
+
+        scene: Of the robot. None means the chapter's.
+        """
+        return decisions_in(TIME_LIMIT, self.ppo.decision_period, scene)
 
 
 @dataclass(frozen=True)

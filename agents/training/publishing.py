@@ -48,7 +48,7 @@ def held_out_decisions(policy: LearnedPolicy, options: Options) -> float:
     """Mean decisions to the last waypoint of held-out random paths; a swim that does not arrive counts as the limit."""
     scene = make_scene(None, options.fidelity, options.ppo.decision_period)
     swims = swim_many(
-        "learned", policy, "random", HELD_OUT_PATHS, scene, max_strokes=options.limit, seed=HELD_OUT_SEED,
+        "learned", policy, "random", HELD_OUT_PATHS, scene, max_strokes=options.limit(scene), seed=HELD_OUT_SEED,
         threads=options.num_threads, decision_period=options.ppo.decision_period,
     )  # fmt: skip
     return float(np.mean([done.strokes for done in swims]))

@@ -105,7 +105,8 @@ class Watch(BaseCallback):
     def measure(self) -> Swim:
         """Log how the policy swims round the pentagon now; returns that swim."""
         strokes = self.learner.num_timesteps
-        done = swim("learned", policy_of(self.learner), self.pentagon, max_strokes=self.options.limit)
+        limit = self.options.limit(self.pentagon.scene)
+        done = swim("learned", policy_of(self.learner), self.pentagon, max_strokes=limit)
         self.learner.logger.record("eval/pentagon_strokes", done.strokes)
         self.learner.logger.record("eval/pentagon_waypoints", done.waypoints_reached)
         earlier = [row for row in recorded(self.folder) if row[0] < strokes]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from seastar_gym.controllers.contract import Policy, actions_of
 from seastar_gym.controllers.learned import LearnedPolicy
-from seastar_gym.envs.options import make_scene
+from seastar_gym.envs.options import make_scene, read
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.films import film
@@ -21,7 +21,7 @@ from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, decisions_in, swim
 from seastar_gym.extras import require_extra
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import shown
+from seastar_gym.scene.checks import require_kind, shown
 
 if TYPE_CHECKING:
     from seastar_gym.evaluation.report.page import Remarks
@@ -63,6 +63,9 @@ def evaluate(
     """
     if not agents:
         raise ValueError("There is nothing to evaluate: name at least one agent.")
+    if scene is not None:
+        scene = read(scene, Scene)
+        require_kind("scene", scene, Scene, "a Scene")
     max_strokes = decisions_in(TIME_LIMIT, decision_period, scene) if max_strokes is None else max_strokes
     if max_strokes < 1:
         raise ValueError(f"max_strokes must be at least 1, not {shown(max_strokes)}.")

@@ -37,7 +37,7 @@ def swim_many(
 ) -> list[Swim]:
     """Swims of `n_swims` robots side by side, each to its last waypoint or for `max_strokes` strokes, or decisions.
 
-    The path "random" has random headings. max_strokes: None means 400, or the decisions of 400 s. waypoint_radius:
+    The path "random" has random headings. max_strokes: None means the decisions of 400 s. waypoint_radius:
     Radius of the waypoints [m]. decision_period: Time between decisions [s]. None means a stroke. sight,
     action_delay: As of the environments.
     """

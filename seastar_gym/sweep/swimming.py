@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import actions_of, require_fit
-from seastar_gym.envs.headings import wrapped
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.task import SwimTask
@@ -165,5 +164,5 @@ def ways(scene: Scene, speed: Floats, way: NDArray[np.complex128], turn: Floats)
         strokes = 1.0 / (speed * scene.actuator.period)
     return {
         "speed": speed, "strokes_per_metre": strokes, "ahead": way.real, "aside": way.imag,
-        "turn": wrapped(turn),
+        "turn": turn - 2.0 * np.pi * np.rint(turn / (2.0 * np.pi)),
     }  # fmt: skip

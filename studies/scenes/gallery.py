@@ -211,9 +211,9 @@ def measured(rounds: int = ROUNDS, n_robots: int = ROBOTS) -> dict[str, Any]:
     return {"scenes": scenes}
 
 
-def run(results: Results, pictures: Path = Path("docs/gallery")) -> None:
-    """Draw the pictures into a folder, and measure the costs."""
-    draw_all(pictures)
+def run(results: Results) -> None:
+    """Draw the pictures into docs/gallery, or where --out says, and measure the costs."""
+    draw_all(Path("docs/gallery") if results.out == STUDY.default_out else results.out)
     results.update(measured())
 
 

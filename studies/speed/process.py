@@ -108,6 +108,26 @@ def process_seconds(code: str, cache: str) -> float:
     return float(output.stdout)
 
 
+FIRST_SCENES = {
+    "balanced": "s.Scene.preset('balanced')",
+    "wires": "s.Scene(actuator=s.SmaWires()).at('balanced')",
+    "all terms": "list(scenes().values())[-1]",
+}
+"""Scenes whose first strokes are timed, in Python."""
+
+
+def first_stroke(name: str, cache: str) -> float:
+    """Processor time [s] of making a simulator in a fresh interpreter, and of its first stroke."""
+    return process_seconds(
+        "import time, seastar_gym as s; from studies.speed.terms import scenes; "
+        f"scene = {FIRST_SCENES[name]}; start = time.process_time(); "
+        "s.Simulator(scene, scene.n_robots or 1).stroke([[0, 1, 0, 0, -1]] * (scene.n_robots or 1)); "
+        "print(time.process_time() - start)",
+        cache,
+    )
+
+
+IMPORT = "import time, gymnasium; start = time.process_time(); import seastar_gym; print(time.process_time() - start)"
 TIMED = "import time; start = time.process_time(); {}; print(time.process_time() - start)"
 FIRST_STROKE = (
     "import seastar_gym as s; "

@@ -24,9 +24,10 @@ from studies.speed.operations import count_operations, flops
 from studies.speed.parts import part_seconds
 from studies.speed.peak import peak_gigaflops, peak_speedup
 from studies.speed.process import (
-    FIRST_STROKE,
-    TIMED,
+    FIRST_SCENES,
+    IMPORT,
     environment_share,
+    first_stroke,
     memory_per_robot,
     process_seconds,
     step_of_one,
@@ -57,15 +58,18 @@ def median(what: str, unit: str, values: list[float]) -> Figure:
 
 
 def start_up_figures() -> list[Figure]:
-    """Durations of the import, of the first stroke ever, and of the first stroke of a later process."""
-    with tempfile.TemporaryDirectory() as cache:
-        imports = [process_seconds(TIMED.format("import seastar_gym"), cache) for _ in range(5)]
-        first = process_seconds(TIMED.format(FIRST_STROKE), cache)
-        later = [process_seconds(TIMED.format(FIRST_STROKE), cache) for _ in range(5)]
+    """Processor times of the import, of the first strokes ever, and of the first stroke of a later process."""
+    first = dict[str, float]()
+    for name in FIRST_SCENES:
+        with tempfile.TemporaryDirectory() as cache:
+            first[name] = first_stroke(name, cache)
+            if name == "balanced":
+                imports = [process_seconds(IMPORT, cache) for _ in range(5)]
+                later = [first_stroke(name, cache) for _ in range(5)]
     return [
-        median("import of seastar_gym", "s", imports),
-        Figure("first stroke ever, with import and compilation", first, "s"),
-        median("first stroke of a process, with import, warm cache", "s", later),
+        median("import of seastar_gym, beyond Gymnasium's", "s", imports),
+        *(Figure(f"first stroke ever, {name}", seconds, "s") for name, seconds in first.items()),
+        median("first stroke of a process, balanced, warm cache", "s", later),
     ]
 
 
@@ -79,7 +83,8 @@ def measure(seconds: float = 1.0, progress: bool = True) -> tuple[list[Figure], 
             median("two cores over one, fused products alone", "x", peak_speedup(seconds)),
         ],
         "alone": lambda: [
-            median("one robot alone, one core", "x real time", real_time_factors(chapter, 1, 1, seconds))
+            median(f"one robot alone, one core{what}", "x real time", real_time_factors(scene, 1, 1, seconds))
+            for what, scene in {"": chapter, ", fast": Scene.preset("fast")}.items()
         ],
         "peak": lambda: peak_figures(chapter, seconds),
         "environment": lambda: environment_figures(seconds),

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.greedy import Displacements, displacement_map, turned, waypoints_of
 from seastar_gym.controllers.planner import Branching, state_of
 from seastar_gym.envs.commands import unless_strokes
-from seastar_gym.envs.headings import wrapped
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.simulator import State
 
@@ -72,7 +71,8 @@ class Odometer:
         self._hub, self._heading = hub, heading
         if before is None:
             return None
-        return turned(hub - before, -was), wrapped(heading - was)
+        turn = heading - was
+        return turned(hub - before, -was), turn - 2.0 * np.pi * np.rint(turn / (2.0 * np.pi))
 
 
 def few_commands(n_limbs: int) -> Floats:

@@ -13,7 +13,6 @@ Floats32 = NDArray[np.float32]
 Actions = NDArray[np.int64]
 
 
-
 def length(vectors: Floats) -> Floats:
     """Length over the last axis."""
     return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))

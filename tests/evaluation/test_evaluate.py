@@ -288,6 +288,7 @@ def test_frames_per_stroke_that_cannot_be_drawn_are_refused(frames_per_stroke):
     [
         ({}, {}, "at least one agent"),
         ({"a": scripted("rest")}, {"max_strokes": 0}, "max_strokes must be at least 1"),
+        ({"a": scripted("rest")}, {"scene": 5}, "scene must be a Scene"),
         ({"a b": scripted("rest"), "a/b": scripted("rest")}, {"out": "x"}, "same file name"),
     ],
 )

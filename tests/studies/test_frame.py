@@ -148,6 +148,7 @@ def test_help_names_the_command_and_shows_the_docstring_in_the_width_of_the_term
     assert f"usage: python -m studies.{name} [" in shown
     assert " ".join(module.__doc__.split()) in " ".join(shown.split())
     assert all(len(line) <= 80 for line in shown.partition("usage: ")[0].splitlines())
+    assert f"by default {module.STUDY.default_out}." in " ".join(shown.split())
     assert module.STUDY.name == name
 
 
