@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 
 from fuzz import hour, swims
-from fuzz.promises import PROMISES, TAME_PROMISES
+from fuzz.promises import PROMISES, TAME_PROMISES, check_bits_alone
 from fuzz.scenes import (
     BENT,
     COMPILED,
@@ -106,6 +106,11 @@ def test_promises_are_kept(trial):
             (PROMISES | TAME_PROMISES)[name](case)
 
     kept()
+
+
+def test_an_overlap_that_the_last_newton_step_makes_is_told_alone_too():
+    """Slopes are computed once more for a robot that is done, while others are not: its report must not know."""
+    check_bits_alone(draw_case(Random(892_955_996), CONTACT | {OWN}, wild=True))
 
 
 def test_every_promise_is_tried():

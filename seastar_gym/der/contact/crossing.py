@@ -166,9 +166,7 @@ def deepest_overlap(rods, work, q):
 
     1 where a node is on the centre line of another limb, or on the outline of a body; 0 where nobody touches.
     """
-    deepest, touching = splat(0.0), load(work.contact.touching, 0) > 0.0
-    if not any_lane(touching):
-        return deepest
+    deepest = splat(0.0)
     for slot in range(n_listed(work)):
         i, j, k = members(rods, work, slot)
         ex, ey = edge_vector(q, j, k)
@@ -180,7 +178,7 @@ def deepest_overlap(rods, work, q):
         nearest = subtract_product(thickness, deepest, own_thickness(rods, i, k, thickness))
         squared = add_product(dx * dx, dy, dy)
         # Others have the pair on the list, too.
-        listed = touching & (load(work.contact.slots, SLOT_ROWS * slot + THICKNESS) > 0.0)
+        listed = load(work.contact.slots, SLOT_ROWS * slot + THICKNESS) > 0.0
         deeper = listed & (nearest > 0.0) & (squared < nearest * nearest)
         if any_lane(deeper):
             depth = thickness - sqrt(squared)
