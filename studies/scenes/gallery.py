@@ -213,7 +213,8 @@ def measured(rounds: int = ROUNDS, n_robots: int = ROBOTS) -> dict[str, Any]:
 
 def run(results: Results) -> None:
     """Draw the pictures into docs/gallery, or where --out says, and measure the costs."""
-    draw_all(Path("docs/gallery") if results.out == STUDY.default_out else results.out)
+    folder = results.out.parent if results.out.suffix else results.out
+    draw_all(Path("docs/gallery") if results.out == STUDY.default_out else folder)
     results.update(measured())
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 
 from fuzz import hour, swims
-from fuzz.promises import PROMISES, TAME_PROMISES, check_bits_alone
+from fuzz.promises import PROMISES, TAME_PROMISES
 from fuzz.scenes import (
     BENT,
     COMPILED,
@@ -108,11 +108,6 @@ def test_promises_are_kept(trial):
     kept()
 
 
-def test_an_overlap_that_the_last_newton_step_makes_is_told_alone_too():
-    """Slopes are computed once more for a robot that is done, while others are not: its report must not know."""
-    check_bits_alone(draw_case(Random(892_955_996), CONTACT | {OWN}, wild=True))
-
-
 def test_every_promise_is_tried():
     assert {name for trial in TRIALS.values() for name in trial.promises} == {*PROMISES, *TAME_PROMISES}
 
@@ -138,9 +133,12 @@ def test_info_has_the_same_keys_on_reset_and_on_every_step(seed):
     swims.check_info_keys(seed)
 
 
-def test_overlaps_are_of_a_robot_s_own_pairs():
-    """Pairs that only others have on the list were counted, too, where one of them touched."""
-    hour.attempt(hour.Trial.named("bits alone/contact/26110000015"))
+@pytest.mark.parametrize("terms, seed", [(CONTACT, 26_110_000_015), (CONTACT | {OWN}, 892_955_996)])
+def test_overlaps_are_a_robot_s_own(terms, seed):
+    """Pairs that only others have on the list were counted, too, where one of them touched; and slopes are computed
+    once more for a robot that is done, while others are not.
+    """
+    PROMISES["bits alone"](draw_case(Random(seed), terms, wild=True))
 
 
 # The long run: `pytest tests/fuzz --fuzz-minutes 60 -s`, and its failures one by one, by `--fuzz-case`.
