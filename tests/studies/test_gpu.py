@@ -18,10 +18,13 @@ ptxas info    : Used 255 registers, used 0 barriers, 600 bytes cumulative stack 
 """
 
 
-def test_all_scenes_had_the_bits_of_the_processor_on_the_gpu():
-    bits = numbers(DOCS, gpu.STUDY)["bits"]
+def test_all_scenes_and_environments_had_the_bits_of_the_processor_on_the_gpu():
+    results = numbers(DOCS, gpu.STUDY)
+    bits, observations = results["bits"], results["observations"]
     assert set(bits) == set(gpu.scenes()) and len(bits) >= 40
-    assert all(found["same"] and not found["failed"] for found in bits.values())
+    assert set(observations) == set(gpu.environments())
+    assert all(found["same"] for found in (*bits.values(), *observations.values()))
+    assert not any(found["failed"] for found in bits.values())
 
 
 def test_the_share_of_bandwidth_is_that_of_the_numbers_that_kernels_move():
