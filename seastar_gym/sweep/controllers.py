@@ -10,8 +10,8 @@ import numpy as np
 
 from seastar_gym import renamed
 from seastar_gym.controllers.contract import Policy, require_fit
-from seastar_gym.controllers.learned import bundled_file, load
-from seastar_gym.controllers.registry import AGENTS, files_of, load_agent
+from seastar_gym.controllers.learned import load
+from seastar_gym.controllers.registry import AGENTS, files_of, learned_file, load_agent
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.commands import checked_decision_period, unless_strokes
 from seastar_gym.envs.options import Path as SwimPath
@@ -79,9 +79,9 @@ def controller_of(name: Any, route: Route, scene: Scene) -> Controller:
         raise ValueError(f"A controller is the name of an agent, such as learned, not {shown(name)}.")
     seconds = checked_decision_period(route.decision_period, scene)
     period = unless_strokes(seconds, scene)
-    files = files_of(name, period)
-    if name == "learned" or name.endswith(".safetensors"):
-        policy = load(bundled_file(period) if name == "learned" else name)
+    files, file = files_of(name, period), learned_file(name, period)
+    if file is not None:
+        policy = load(file)
         require_fit(policy, scene, policy.actions, period)
     elif name not in AGENTS and not files:
         scripted(name, n_limbs=scene.robot.n_limbs, decision_period=period)

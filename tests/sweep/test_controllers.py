@@ -126,6 +126,8 @@ def test_a_part_says_controller_time_and_waypoints(tmp_path):
         (lambda: sweep_of("learned", axes=(Choices("robot.n_limbs", (4,)),)), ("robot of 5 limbs",)),
         (lambda: sweep_of("learned", axes=(Choices("gait", ("straight",)),)), ("gait or a controller",)),
         (lambda: sweep_of("learned", route=Route(decision_period=0.5)), ("SmaWires",)),
+        (lambda: sweep_of("prey"), ("trained for the task prey",)),
+        (lambda: sweep_of("timed-0.2s"), ("196 numbers",)),
         (lambda: Route(seconds=0.0), ("seconds",)),
         (lambda: Route(path="zigzag"), ("zigzag",)),
     ],
