@@ -24,7 +24,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import (
     require_choice,
     require_kind,
-    require_number,
+    require_period,
     require_seed,
     require_texts,
     shown,
@@ -111,8 +111,7 @@ def _known(seed: int, fidelity: Fidelity, decision_period: float | None, scene: 
     require_choice("fidelity", fidelity, get_args(Fidelity))
     known = make_scene(None, fidelity) if scene is None else scene
     require_kind("scene", known, Scene, "a Scene, or None")
-    if decision_period is not None:
-        require_number("decision_period", decision_period, "s")
+    require_period(decision_period)
     return make_scene(None, fidelity, decision_period) if scene is None else scene
 
 

@@ -21,7 +21,7 @@ from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, save
 from seastar_gym.controllers.registry import load_agents
 from seastar_gym.controllers.scripted import scripted
-from seastar_gym.envs.commands import Actions, action_space, to_commands
+from seastar_gym.envs.commands import Actions, action_space, decisions_in, to_commands
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.paths import PENTAGON_SIDE, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -33,7 +33,7 @@ from seastar_gym.evaluation.films import CLOSING_SECONDS
 from seastar_gym.evaluation.measures import MEASURES, SECONDS, measure_of, measure_of_challenge
 from seastar_gym.evaluation.pictures import COLOURS, FPS, FRAMES_PER_STROKE
 from seastar_gym.evaluation.rollout import Episodes, TaskBatch, rollout
-from seastar_gym.evaluation.swim import RECORDED, Swim, decisions_in, swim, swims_of
+from seastar_gym.evaluation.swim import RECORDED, Swim, swim, swims_of
 from seastar_gym.evaluation.tasks import make_batch
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -358,7 +358,7 @@ def test_bad_input_is_answered_with_one_sentence(tmp_path, capsys, arguments, co
 @pytest.mark.parametrize(
     "arguments, complaint",
     [
-        (["--max-strokes", "0"], "--max-strokes must be at least 1"),
+        (["--max-strokes", "0"], "--max-strokes must be a whole number from 1"),
         (["--waypoint-radius", "-1"], "--waypoint-radius must be"),
         (["--fidelity", "fast", "balanced"], "Several fidelities are for --sets"),
         (["--sets", "nominal"], "needs a folder, --out, and a path, no --sets"),
