@@ -27,6 +27,7 @@ from seastar_gym.simulator.drive import Drive, checked_commands
 from seastar_gym.simulator.error_bars import ErrorBars, twin_scene
 from seastar_gym.simulator.growth import EnergyGrowth, is_watched
 from seastar_gym.simulator.lock import BROKEN_OFF, StrokeLock
+from seastar_gym.simulator.pauses import completed
 from seastar_gym.simulator.report import StrokeReport, make_report, warn_of_overlap
 from seastar_gym.simulator.schedule import ends_at, ends_of_parts, require_duration
 from seastar_gym.simulator.state import State, checked_state
@@ -384,12 +385,7 @@ class Simulator:
         which is another discretisation: limbs that ring faster than steps resolve then ring otherwise, by 4 % of the
         largest speed at fidelity "fast" and 11 % at "balanced", and the hub is 4e-6 and 4e-5 limb lengths away.
         """
-        try:
-            next(self._advance_pausing(duration, commands))
-        except StopIteration as over:
-            report: StrokeReport = over.value
-            return report
-        raise AssertionError("It does not pause.")
+        return completed(self._advance_pausing(duration, commands))
 
     def advance_in_parts(
         self, duration: float, commands: ArrayLike | None, parts: int
