@@ -17,11 +17,11 @@ from seastar_gym.gradients.unknowns import Rotations, Start, slopes_of_start, st
 from seastar_gym.model.rods import make_limits, make_rods
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_finite, require_kind, require_texts
+from seastar_gym.scene.numerics import require_duration
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import aligned_rows, side_by_side
 from seastar_gym.simulator.drive import checked_commands
 from seastar_gym.simulator.report import SolverStatus
-from seastar_gym.simulator.schedule import require_duration
 from seastar_gym.simulator.state import State
 
 Floats = NDArray[np.float64]

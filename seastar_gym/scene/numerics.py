@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, fields, replace
 from typing import Annotated, Literal, NamedTuple, get_args
 
-from seastar_gym.scene.checks import require_choice, require_flag, shown
+from seastar_gym.scene.checks import require_choice, require_flag, require_number, shown
 from seastar_gym.scene.number import check_numbers, positive, whole, within
 from seastar_gym.scene.robot import NODES, Discretisation
 from seastar_gym.scene.serial import register_part
@@ -120,3 +120,13 @@ DEFAULT = PRESETS[DEFAULT_FIDELITY].numerics
 """Numerics of a `Scene` that is given none."""
 OLD_DEFAULTS = Numerics(), replace(DEFAULT, damping=0.0)
 """Numerics that a `Scene` was given by default once, in files of that time."""
+
+
+def require_duration(duration: float, step: float, name: str = "duration") -> None:
+    """Refuse the length of an interval [s] if it is no time, or too short or too long for steps of this length [s]."""
+    require_number(name, duration, "s")
+    if not SHORTEST * step <= duration <= MAX_STEPS * step:
+        raise ValueError(
+            f"{name} must be from {SHORTEST * step:.4g} to {MAX_STEPS * step:.4g} s, with steps of {step:.4g} s, not "
+            f"{duration:.4g} s."
+        )

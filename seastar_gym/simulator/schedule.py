@@ -5,24 +5,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from seastar_gym.scene.checks import require_number
-from seastar_gym.scene.numerics import MAX_STEPS, SHORTEST
-
 SAME_TIME = 1e-9
 """Fraction of a step. A shorter remainder before a corner is rounding of the division, not a step."""
 
 ROUNDING = 1e-12
 """Fraction of a time. An end of a step that is no nearer to it is the next one."""
-
-
-def require_duration(duration: float, step: float, name: str = "duration") -> None:
-    """Refuse the length of an interval [s] if it is no time, or too short or too long for steps of this length [s]."""
-    require_number(name, duration, "s")
-    if not SHORTEST * step <= duration <= MAX_STEPS * step:
-        raise ValueError(
-            f"{name} must be from {SHORTEST * step:.4g} to {MAX_STEPS * step:.4g} s, with steps of {step:.4g} s, not "
-            f"{duration:.4g} s."
-        )
 
 
 def step_times(corners: Sequence[float], step: float) -> np.ndarray:

@@ -17,7 +17,7 @@ from seastar_gym.processors import processors
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_array, as_finite, as_floats, require_choice, require_count, require_flag, shown
 from seastar_gym.scene.contact import LARGEST_OVERLAP
-from seastar_gym.scene.numerics import MAX_STEPS
+from seastar_gym.scene.numerics import MAX_STEPS, require_duration
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator.batch import Batch
 from seastar_gym.simulator.body_frame import best_fit_heading, root_places
@@ -29,7 +29,7 @@ from seastar_gym.simulator.growth import EnergyGrowth, is_watched
 from seastar_gym.simulator.lock import BROKEN_OFF, StrokeLock
 from seastar_gym.simulator.pauses import completed
 from seastar_gym.simulator.report import StrokeReport, make_report, warn_of_overlap
-from seastar_gym.simulator.schedule import ends_at, ends_of_parts, require_duration
+from seastar_gym.simulator.schedule import ends_at, ends_of_parts
 from seastar_gym.simulator.state import State, checked_state
 
 Floats = NDArray[np.float64]
