@@ -10,8 +10,6 @@ import pytest
 from own_actuators import Remembering, Triangle
 from refusals import assert_refused
 from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires, ThermalSma
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry import SymmetryReduction
 from seastar_gym.scene.actuators.actuator import Actuator, complete
 
 NUMERICS = Numerics("implicit-midpoint", 0.01)
@@ -167,15 +165,6 @@ def test_a_slow_limb_goes_on_from_where_the_last_stroke_left_it():
     assert not np.any([turn[1:] for turn in turns])
 
 
-def test_a_stroke_left_half_way_is_forgotten():
-    simulator = Simulator(Scene(actuator=SLOW, numerics=NUMERICS), 2)
-    stroke = simulator.stroke_in_parts(np.ones((2, 5)), 4)
-    next(stroke)
-    assert simulator.actuators.all()
-    stroke.close()
-    assert not simulator.actuators.any() and simulator.elastic_energy()[0] < 1e-20
-
-
 def test_what_has_a_memory_is_not_limited():
     with pytest.raises(ValueError, match="without memory"):
         Limited(SLOW)
@@ -266,33 +255,6 @@ def test_a_turning_hub_has_no_room_for_a_stroke_that_begins_turned():
     robot = Seastar(hub_hinge="turning", discretisation="chapter")
     with pytest.raises(ValueError, match="above zero"):
         Scene(robot, actuator=Limited(SmaPulse(), largest_rate=1.0))
-
-
-# --- the environment -------------------------------------------------------------------------------------------------
-
-
-def test_what_actuators_remember_is_seen_before_the_waypoints():
-    env = SeastarSwimEnv(scene=Scene(actuator=SLOW, numerics=NUMERICS))
-    plain = SeastarSwimEnv(scene=Scene(numerics=NUMERICS))
-    first, _ = env.reset(seed=0)
-    assert first.shape == env.observation_space.shape == (plain.reset(seed=0)[0].size + 5,)
-    np.testing.assert_array_equal(first[-9:-4], 0.0)
-    observation, *_ = env.step([0, 1, 0, 0, 2])
-    np.testing.assert_allclose(observation[-9:-4], env.simulator.actuators[0, :, 0] / (np.pi / 5), rtol=1e-6)
-    assert observation[-8] > 0.0 > observation[-5]
-
-
-@pytest.mark.parametrize(
-    "scene, words",
-    [
-        (Scene(actuator=Remembering()), "remember"),
-        (Scene(limb_strengths=(1.0, 1.0, 0.5, 1.0, 1.0)), "equally strong"),
-        (Scene(loads=((3, 1e-5, 0.0),)), "loaded"),
-    ],
-)
-def test_symmetry_is_refused_where_the_scene_has_none(scene, words):
-    with pytest.raises(ValueError, match=words):
-        SymmetryReduction(SeastarSwimEnv(scene=scene))
 
 
 def test_a_missing_file_of_a_curve_is_said_in_one_sentence(tmp_path):

@@ -13,7 +13,6 @@ from scipy.integrate import solve_ivp
 import oracle
 from refusals import assert_refused
 from seastar_gym import AlongLimb, Limited, Numerics, Scene, Seastar, Simulator, SmaLimb, SmaPulse, SmaWires, ThermalSma
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.scene.actuators.actuator import check_actuator
 from seastar_gym.scene.actuators.pulse import pulse
 from seastar_gym.scene.actuators.sma_limb import MEASURED
@@ -247,15 +246,6 @@ def test_it_swims_about_as_far_as_the_pulse():
             simulator.stroke([[0, 1, 0, 0, -1]])
         hubs.append(simulator.hub_position()[0, 0])
     assert hubs[0] == pytest.approx(hubs[1], rel=0.2)
-
-
-def test_temperatures_are_observed():
-    env = SeastarSwimEnv(scene=SCENE)
-    first, _ = env.reset(seed=0)
-    assert first.size == 186 + 20 == env.observation_space.shape[0]
-    observation, *_ = env.step([1, 0, 0, 0, 0])
-    seen = observation[-24:-4].reshape(5, 4)
-    assert 0.0 < seen[0, 0] < 1.0 and 0.0 < seen[0, 2] < 1.0 and not seen[1:].any()
 
 
 # --- a largest temperature -------------------------------------------------------------------------------------------
