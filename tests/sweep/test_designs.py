@@ -251,6 +251,12 @@ def test_a_range_has_both_ends_and_its_shares_in_between():
             Range(name, 0.0, 1.0)
 
 
+def test_a_straight_swim_goes_ahead_and_turns_nothing():
+    (batch,) = Sweep(FAST, (), settling=1, measured=2).batches()
+    found = swim(batch)
+    assert found["ahead"][0] > 0.0 and abs(found["aside"][0]) < 1e-12 and abs(found["turn"][0]) < 1e-9
+
+
 def test_a_swim_is_measured_after_it_has_settled():
     """Columns of repeated strokes are those of a simulator, robot by robot."""
     lengths = np.array([0.08, 0.1])
@@ -271,7 +277,7 @@ def test_a_swim_is_measured_after_it_has_settled():
             "newton_iterations": sum(report.newton_iterations.item() for report in reports + measured),
             "smallest_opening_angle": min(report.smallest_opening_angle.item() for report in reports + measured),
         }  # fmt: skip
-        assert {name: values[k] for name, values in found.items()} == pytest.approx(expected, rel=1e-9)
+        assert {name: values[k] for name, values in found.items()} == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_design_that_a_scene_refuses_costs_itself_alone():
@@ -279,5 +285,7 @@ def test_a_design_that_a_scene_refuses_costs_itself_alone():
     found = swim(Batch(frame, {"robot.limb_length": np.array([0.1, -1.0])}, 2))
     assert found["status"].tolist() == [0, REFUSED] and found["status"].dtype == np.int64
     assert np.isnan([found[name][1] for name in UNITS if name != "status"]).all() and found["speed"][0] > 0.0
+    alone = swim(Batch(frame, {"robot.limb_length": np.array([0.1])}, 1))
+    assert all(found[name][0] == alone[name][0] for name in UNITS)
     none = swim(Batch(frame, {"robot.limb_length": np.array([-1.0])}, 1))
     assert none["status"].tolist() == [REFUSED] and np.isnan(none["speed"]).all()
