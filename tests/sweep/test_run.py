@@ -12,6 +12,7 @@ import pyarrow.parquet
 import pytest
 
 import works
+from losing import Interrupted
 from refusals import assert_refused
 from seastar_gym.executors import Outcome
 from seastar_gym.executors.here import Here
@@ -62,17 +63,6 @@ def path_of_workers(monkeypatch):
 
 def bits(folder):
     return {name: ResultFiles(folder).file(name).read_bytes() for name in ResultFiles(folder).names()}
-
-
-class Interrupted:
-    """An executor that is interrupted after some batches."""
-
-    def __init__(self, after):
-        self.after = after
-
-    def run(self, work, batches):
-        yield from itertools.islice(Here().run(work, batches), self.after)
-        raise KeyboardInterrupt
 
 
 def test_only_cells_without_parts_are_run(tmp_path, sweep):
