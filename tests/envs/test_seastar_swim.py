@@ -465,7 +465,7 @@ def test_what_is_no_action_is_refused_and_changes_nothing(action):
         ({"random_heading": np.array([True])}, "random_heading"),
         ({"randomization": {}}, "DomainRandomization"),
         ({"render_mode": "ansi"}, "render_mode"),
-        ({"frames_per_stroke": 0}, "frames_per_stroke"),
+        *(({"frames_per_stroke": n}, "frames_per_stroke must be a whole number") for n in (0, -1, 2.5, True)),
         ({"scene": Scene(Seastar(hub_hinge="turning", discretisation="chapter"))}, "turning"),
     ],
     ids=str,
