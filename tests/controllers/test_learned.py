@@ -221,6 +221,18 @@ NO_LIMBS = Scene().to_dict() | {"robot": Scene().to_dict()["robot"] | {"n_limbs"
         ({"training": {"progress": {"a": 1}}}, "the progress of its training must be rows of three numbers"),
         ({"training": {"commands": [3]}}, "the commands of its training must be texts"),
         ({"sha256": 3}, "the weights are not those"),
+        ({"task": "chess"}, "its task must be one of"),
+        ({"task": [1]}, "its task must be one of"),
+        *(({"past": past}, "its past must be a whole number") for past in (-1, 10**9, True, False)),
+        ({"past": 8, "symmetry": False}, "a policy without symmetry has no past"),
+        ({"limb_mirror": 3}, "its limb_mirror must be a list of pairs"),
+        ({"limb_mirror": [[0, 2]]}, "not an index and a sign"),
+        ({"limb_mirror": [[5, 1]]}, "an index of its limb_mirror must be a whole number"),
+        ({"limb_mirror": [[1, 1], [1, 1]]}, "its limb_mirror is no mirror, which undoes itself"),
+        ({"limb_mirror": [[1, 1], [0, -1]]}, "its limb_mirror is no mirror, which undoes itself"),
+        ({"own": {"kinds": []}}, "its own must be an object with kinds and with_stations"),
+        ({"own": {"kinds": ["spin"], "with_stations": True}}, "the kinds of its own numbers must be of"),
+        ({"own": {"kinds": [["scalar"]], "with_stations": True}}, "the kinds of its own numbers must be of"),
     ],
 )
 def test_what_does_not_fit_is_said_in_one_sentence(file, change, sentence):
