@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from losing import LOST, Interrupted, Losing, first
-from refusals import assert_refused
+from refusals import assert_refused, assert_told
 from seastar_gym import Scene, __version__
 from seastar_gym.benchmark import page
 from seastar_gym.benchmark.command import main
@@ -190,8 +190,7 @@ def test_results_of_another_version_or_measure_are_not_merged(tmp_path, capsys):
     ):
         write([entry(**{"measure": SECONDS.name} | wrong)], file)
         assert main([*arguments, str(file)]) == 2
-        said = capsys.readouterr().err
-        assert sentence in said and said.count("\n") == 1, said
+        assert_told(capsys, sentence)
         assert not (tmp_path / "out").exists()
 
 
@@ -340,8 +339,7 @@ def test_an_agent_that_does_not_fit_is_left_out_with_a_sentence(tasks, tmp_path,
 def test_what_cannot_be_measured_is_said_in_a_sentence(arguments, words, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
-    printed = capsys.readouterr()
-    assert words in printed.err and printed.err.count("\n") == 1
+    assert_told(capsys, words)
     assert not list(tmp_path.iterdir())
 
 

@@ -16,6 +16,7 @@ from matplotlib.colors import to_rgb
 
 from agents.evaluate import main
 from declared import assert_declared_as_recorded
+from refusals import assert_told
 from seastar_gym import TASKS, Scene, Seastar, SmaPulse, UniformCurrent
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, save
@@ -374,9 +375,7 @@ def test_models_go_by_the_names_of_their_files(monkeypatch, tmp_path):
 
 def test_an_unknown_agent_is_told_every_name(capsys):
     assert main(["--agents", "nobody"]) == 2
-    error = capsys.readouterr().err
-    assert "pentagon" in error and "planner, gait-planner, files" in error and "module:function" in error
-    assert error.count("\n") == 1
+    assert_told(capsys, "pentagon", "planner, gait-planner, files", "module:function")
 
 
 # The one loop in which policies swim: what they are asked, when episodes end, and what is kept of them.

@@ -121,6 +121,7 @@ def test_no_state_leaks_across_a_reset():
 def test_heading_turns_the_robot_at_rest():
     simulator, headings = Simulator(Scene(TEN), n_robots=3), np.array([0.0, 0.7, -3.0])
     simulator.reset(heading=headings)
+    np.testing.assert_allclose(simulator.heading(), headings, rtol=0.0, atol=1e-12)
     for nodes, heading in zip(simulator.positions, headings, strict=True):
         c, s = np.cos(heading), np.sin(heading)
         np.testing.assert_allclose(nodes, TEN.nodes() @ [[c, s], [-s, c]], rtol=0.0, atol=1e-16)
