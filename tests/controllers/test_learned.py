@@ -241,14 +241,6 @@ def test_what_does_not_fit_is_said_in_one_sentence(file, change, sentence):
     assert_refused(file, sentence)
 
 
-def test_bytes_that_are_no_safetensors_are_refused_even_if_described(file):
-    file.write_bytes(b"\x80\x04}\x94.")  # a pickle
-    facts = json.loads(file.with_suffix(".json").read_text())
-    facts["sha256"] = hashlib.sha256(file.read_bytes()).hexdigest()
-    file.with_suffix(".json").write_text(json.dumps(facts))
-    assert_refused(file, "is damaged")
-
-
 @pytest.mark.parametrize("weight", [np.nan, np.inf, -np.inf])
 def test_weights_that_are_not_finite_are_refused(policy, file, weight):
     policy.weights["1.bias"][3] = weight
