@@ -161,11 +161,6 @@ def test_a_slow_limb_goes_on_from_where_the_last_stroke_left_it():
     assert not np.any([turn[1:] for turn in turns])
 
 
-def test_what_has_a_memory_is_not_limited():
-    with pytest.raises(ValueError, match="without memory"):
-        Limited(SLOW)
-
-
 # --- weak limbs ------------------------------------------------------------------------------------------------------
 
 
@@ -188,20 +183,6 @@ def test_every_robot_may_have_weak_limbs_of_its_own():
                 batch.stroke(COMMANDS[0])
                 copy.stroke(COMMANDS[0])
             assert batch.positions[robot].tobytes() == alone.positions[0].tobytes() == copy.positions[robot].tobytes()
-
-
-@pytest.mark.parametrize(
-    "strengths", [(1.0,) * 4, (1.0, 1.0, 1.0, 1.0, 1.1), (-0.1, 1.0, 1.0, 1.0, 1.0), [1.0] * 5, "a"]
-)
-def test_strengths_are_shares_one_per_limb(strengths):
-    with pytest.raises(ValueError, match="limb_strengths"):
-        Scene(limb_strengths=strengths)
-
-
-@pytest.mark.parametrize("strengths", [np.ones(4), np.full((2, 5), 1.5), np.full(5, np.nan), np.ones((3, 5))])
-def test_strengths_of_a_batch_are_shares_too(strengths):
-    with pytest.raises(ValueError, match="limb_strengths"):
-        Simulator(Scene(), 2).set_limb_strengths(strengths)
 
 
 # --- any actuator ----------------------------------------------------------------------------------------------------
@@ -232,25 +213,32 @@ def test_what_an_actuator_of_ones_own_says_is_heeded():
     np.testing.assert_allclose(simulator.stroke(np.ones((2, 5))).energy, 2.0 * 5 * 0.6)
 
 
-@pytest.mark.parametrize(
-    "changes, words",
-    [
-        ({"corners": (0.0, 0.2, 0.5)}, "from 0 to its period"),
-        ({"corners": (0.0, 0.7, 0.6)}, "increasing"),
-        ({"peak_angle": 0.2}, "largest angle"),
-        ({"delta_psi": lambda self, t: 0.1 + 0.0 * t}, "jump"),
-        ({"delta_psi": lambda self, t: 0.1}, "per time"),
-    ],
-)
-def test_an_actuator_that_contradicts_itself_is_refused(changes, words):
-    with pytest.raises(ValueError, match=words):
-        Scene(actuator=type("Wrong", (Triangle,), changes)())
+def wrong(**changes):
+    """A scene of an actuator that contradicts itself."""
+    return Scene(actuator=type("Wrong", (Triangle,), changes)())
 
 
-def test_a_turning_hub_has_no_room_for_a_stroke_that_begins_turned():
-    robot = Seastar(hub_hinge="turning", discretisation="chapter")
-    with pytest.raises(ValueError, match="above zero"):
-        Scene(robot, actuator=Limited(SmaPulse(), largest_rate=1.0))
+TURNING = Seastar(hub_hinge="turning", discretisation="chapter")
+NO_STRENGTHS = (1.0,) * 4, (1.0, 1.0, 1.0, 1.0, 1.1), (-0.1, 1.0, 1.0, 1.0, 1.0), [1.0] * 5, "a"
+NO_STRENGTHS_OF_TWO = np.ones(4), np.full((2, 5), 1.5), np.full(5, np.nan), np.ones((3, 5))
+REFUSED = [
+    (lambda: wrong(corners=(0.0, 0.2, 0.5)), "from 0 to its period"),
+    (lambda: wrong(corners=(0.0, 0.7, 0.6)), "increasing"),
+    (lambda: wrong(peak_angle=0.2), "largest angle"),
+    (lambda: wrong(delta_psi=lambda self, t: 0.1 + 0.0 * t), "jump"),
+    (lambda: wrong(delta_psi=lambda self, t: 0.1), "per time"),
+    (lambda: Limited(SLOW), "without memory"),
+    (lambda: Scene(TURNING, actuator=Limited(SmaPulse(), largest_rate=1.0)), "above zero"),  # a stroke begins turned
+    *((partial(Scene, limb_strengths=strengths), "limb_strengths") for strengths in NO_STRENGTHS),
+    *((partial(Simulator(Scene(), 2).set_limb_strengths, shares), "limb_strengths") for shares in NO_STRENGTHS_OF_TWO),
+]
+"""Actuators and strengths of limbs that cannot be."""
+
+
+@pytest.mark.parametrize("make, words", REFUSED)
+def test_what_contradicts_itself_or_its_robot_is_refused(make, words):
+    with assert_refused(words):
+        make()
 
 
 def test_a_missing_file_of_a_curve_is_said_in_one_sentence(tmp_path):
