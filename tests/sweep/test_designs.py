@@ -191,15 +191,7 @@ def test_bad_sweeps_are_refused(arguments, words):
         Sweep(FAST, *arguments)
 
 
-def test_a_scene_of_several_robots_is_refused():
-    with assert_refused("one robot"):
-        Sweep(Scene(Seastar(limb_length=np.array([0.1, 0.2]))), ())
-
-
-def test_a_number_that_not_all_choices_have_is_refused():
-    axes = Choices("fluid", (FAST.fluid, None), ("water", "vacuum")), Range("fluid.density", 900.0, 1100.0)
-    with assert_refused("vacuum", "fluid.density"):
-        Sweep(FAST, axes, samples=2)
+WATER_OR_NOT = Choices("fluid", (FAST.fluid, None), ("water", "vacuum"))
 
 
 @pytest.mark.parametrize(
@@ -213,8 +205,11 @@ def test_a_number_that_not_all_choices_have_is_refused():
         (lambda: Choices("x", [1]), ("tuple of values",)),
         (lambda: Choices("x", (1, 2), ("a",)), ("labels",)),
         (lambda: Choices("x", (SmaPulse(0.1), SmaPulse(0.2))), ("labels that differ",)),
+        (lambda: Sweep(FAST, (WATER_OR_NOT, Range("fluid.density", 900.0, 1100.0)), samples=2),
+         ("vacuum", "fluid.density")),
+        (lambda: Sweep(Scene(Seastar(limb_length=np.array([0.1, 0.2]))), ()), ("one robot",)),
     ],
-)
+)  # fmt: skip
 def test_bad_axes_are_refused(make, words):
     with assert_refused(*words):
         make()
