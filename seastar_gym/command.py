@@ -9,6 +9,8 @@ from typing import NoReturn
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
+DEFAULT = "(default: %(default)s)"
+"""End of the help of an option that has a default."""
 
 
 def command_parser(prog: str, doc: str | None) -> argparse.ArgumentParser:

@@ -90,12 +90,18 @@ def read_json(path: str | os.PathLike[str]) -> Any:
     if not path.is_file():
         raise FileNotFoundError(f"There is no file {path}.")
     try:
-        return json.loads(path.read_text(encoding="utf-8-sig"), parse_constant=_finite, parse_float=_finite)
-    except RecursionError:
-        raise ValueError(f"{path} is no JSON that can be read: it is nested too deeply.") from None
+        return parse_json(path.read_text(encoding="utf-8-sig"))
     except ValueError as damaged:
         reason = re.split("[;\n]", str(damaged))[0].rstrip(".")
         raise ValueError(f"{path} is no JSON that can be read: {reason}.") from damaged
+
+
+def parse_json(text: str) -> Any:
+    """What a text in JSON says, whose numbers are all finite. ValueError, with the reason alone, for any other."""
+    try:
+        return json.loads(text, parse_constant=_finite, parse_float=_finite)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
 
 
 def _finite(text: str) -> float:

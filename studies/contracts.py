@@ -20,8 +20,8 @@ IDS = re.compile(r"\| id .*?\n\n", re.DOTALL)
 """Tables of ids in docstrings, which the page has at its top."""
 FEW = 100
 """Words of arguments that are not folded."""
-SAID = re.compile(r" \[([\d.]+), \1\]|, (?:less|more) is better")
-"""Intervals of length zero, and which numbers are better, in the table of the benchmark."""
+CERTAIN = re.compile(r" \[([\d.]+), \1\]")
+"""Intervals of length zero."""
 TERMS = re.compile(r"^\| `reward_\w+` +\| float.*\n", re.MULTILINE)
 """Rows of `info` that repeat the table of the reward."""
 
@@ -90,13 +90,14 @@ def contract(documented: type[Any]) -> str:
 
 def leaderboard() -> str:
     """Means, intervals and shares of success of agents that do more than rest, from the committed benchmark."""
-    entries = results.read(DOCS / "leaderboard" / "results.json")
-    lines = [SAID.sub("", line) for line in page.table(entries).splitlines()]
-    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    chosen = [cells[0].index(name) for name in ("task", "measure", "learned", "greedy")]
-    shown = [[row[k] for k in chosen] for row in cells if set(row[chosen[2]]) != {"–"}]
-    table = "\n".join(f"| {' | '.join(row)} |" for row in shown)
-    return table.replace(", `fast`", "").replace("time until done", "time").replace("Seastar", "").replace("-v0", "")
+    rows = []
+    for (task, _), of_agent in page.by_task(results.read(DOCS / "leaderboard" / "results.json")).items():
+        learned, greedy = of_agent.get("learned"), of_agent.get("greedy")
+        if learned:
+            measure = f"{learned.measure.replace('time until done', 'time')} [{learned.unit}]"
+            cells = [CERTAIN.sub("", page.cell(entry)) for entry in (learned, greedy)]
+            rows.append([task.removeprefix("Seastar").removesuffix("-v0"), measure, *cells])
+    return markdown(["task", "measure", "learned", "greedy"], rows, (0, 1))
 
 
 STUDY = Study(

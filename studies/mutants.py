@@ -52,7 +52,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
      "for k, (each, space, in_time) in enumerate(zip(settings, swum.space, swum.time, strict=False), start=1):"):
         "There are as many swims as settings.",
     ("seastar_gym/envs/rendering.py", "PLANNED: Colour = (190, 199, 208)"): SHADE,
-    ("seastar_gym/envs/rendering.py", "WATER: Colour = (250, 253, 254)"): SHADE,
+    ("seastar_gym/envs/canvas.py", "WATER: Colour = (250, 253, 254)"): SHADE,
     ("seastar_gym/envs/waypoint_labels.py",
      "together = np.flatnonzero(np.hypot(*(path - path[waypoint]).T) < same_place)"): EXACTLY,
     ("seastar_gym/envs/tasks/discs.py",

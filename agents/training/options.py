@@ -12,8 +12,9 @@ import tyro
 from agents.hyperparameters import Hyperparameters
 from seastar_gym import RewardWeights, renamed
 from seastar_gym.controllers.learned import reason_of
+from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.paths import PATHS, make_path
-from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
+from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.files import read_json
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, require_count, require_flag, shown

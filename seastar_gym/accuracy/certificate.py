@@ -20,7 +20,7 @@ from seastar_gym.scene.checks import (
     require_count,
     require_error,
     require_kind,
-    require_number,
+    require_period,
     require_texts,
     shown,
 )
@@ -85,8 +85,7 @@ class Certificate:
                 raise ValueError(f"{name} must be some of {', '.join(sorted(known))}, not {shown(some)}.")
         require_count("samples", self.samples, 2, MOST_SAMPLES)
         require_measured("limit_error", self.limit_error)
-        if self.decision_period is not None:
-            require_number("decision_period", self.decision_period, "s")
+        require_period(self.decision_period)
         if not is_whole_number(self.classes) or not isinstance(self.version, str) or not isinstance(self.machine, str):
             raise ValueError("classes must be a whole number, and version and machine must be words.")
 

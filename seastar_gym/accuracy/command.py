@@ -17,7 +17,7 @@ from pathlib import Path
 
 from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.accuracy.measure import SAMPLES, Progress, certify
-from seastar_gym.command import answered, command_parser
+from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.extras import require_extra
 from seastar_gym.files import save_figure, write_json
 from seastar_gym.scene.checks import require_error
@@ -120,12 +120,11 @@ def certify_as_asked(options: argparse.Namespace) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = command_parser("seastar certify", __doc__)
-    default = "(default: %(default)s)"
     parser.add_argument("scene", nargs="?", type=Path, help="file of the scene, .py or .json (default: the chapter's)")
     parser.add_argument("--error", type=float, help="print the fastest setting that keeps this error, such as 0.01")
-    parser.add_argument("--samples", type=int, default=SAMPLES, help=f"sequences per class {default}")
-    parser.add_argument("--seed", type=int, default=0, help=f"seed of the sequences {default}")
-    parser.add_argument("--out", type=Path, default=Path("certificate.json"), help=f"file to write {default}")
+    parser.add_argument("--samples", type=int, default=SAMPLES, help=f"sequences per class {DEFAULT}")
+    parser.add_argument("--seed", type=int, default=0, help=f"seed of the sequences {DEFAULT}")
+    parser.add_argument("--out", type=Path, default=Path("certificate.json"), help=f"file to write {DEFAULT}")
     file = "JSON file for the scene at the setting that --error chooses, which train.py --scene takes"
     parser.add_argument("--chosen", type=Path, help=file)
     options = parser.parse_args(arguments)

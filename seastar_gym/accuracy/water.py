@@ -9,23 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.der.terms.current import current_velocity
-from seastar_gym.model.currents import current_rows
+from seastar_gym.model.currents import velocities_at
 from seastar_gym.scene import Scene
-from seastar_gym.simd.numpy_lanes import Lanes
 from seastar_gym.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
 
 def velocity(scene: Scene, places: Floats) -> Floats:
-    """Velocity of the water [m/s] at places [m], shape (..., 2). The first call in a process loads the plain kernels,
-    so it is no call for a thread."""
+    """Velocity of the water [m/s] at places [m], shape (..., 2), as `velocities_at`; zero without a current."""
     current = _current(scene)
-    if current is None:
-        return np.zeros_like(places)
-    found = current_velocity.plain(current_rows(current), Lanes(places[..., 0]), Lanes(places[..., 1]))
-    return np.stack([np.broadcast_to(each.numbers, places.shape[:-1]) for each in found], axis=-1)
+    return np.zeros_like(places) if current is None else velocities_at(current, places)
 
 
 def with_the_water(

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, get_args
 from seastar_gym.benchmark import page
 from seastar_gym.benchmark.jobs import Answer, Job, answers
 from seastar_gym.benchmark.results import Entry, merged, read, write
-from seastar_gym.command import INTERRUPTED, answered, command_parser
+from seastar_gym.command import DEFAULT, INTERRUPTED, answered, command_parser
 from seastar_gym.controllers.registry import HELP
 from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.measures import measure_of
@@ -34,14 +34,13 @@ from seastar_gym.scene.numerics import Fidelity
 
 def parser() -> argparse.ArgumentParser:
     """Parser of the options."""
-    default = "(default: %(default)s)"
     found = command_parser("seastar benchmark", __doc__)
-    found.add_argument("--agents", nargs="*", default=["learned", "greedy", "random"], help=f"{HELP} {default}")
+    found.add_argument("--agents", nargs="*", default=["learned", "greedy", "random"], help=f"{HELP} {DEFAULT}")
     found.add_argument("--tasks", nargs="+", help=f"ids of tasks (default: all, {', '.join(task_ids())})")
-    found.add_argument("--seeds", type=int, default=10, help=f"number of seeds {default}")
+    found.add_argument("--seeds", type=int, default=10, help=f"number of seeds {DEFAULT}")
     found.add_argument("--fidelity", choices=get_args(Fidelity), help="accuracy (default: that of the task)")
     found.add_argument("--decisions", type=int, help="time limit [decisions] (default: that of the task)")
-    found.add_argument("--out", type=Path, default=Path("runs/benchmark"), help=f"folder of the results {default}")
+    found.add_argument("--out", type=Path, default=Path("runs/benchmark"), help=f"folder of the results {DEFAULT}")
     found.add_argument("--seeds-per-job", type=int, help="seeds of a job (default: all of a policy)")
     add_options(found, "jobs", "here")
     found.add_argument("--merge", nargs="+", type=Path, default=[], help="files of other results, for the same page")

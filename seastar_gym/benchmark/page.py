@@ -36,18 +36,26 @@ def table(entries: Sequence[Entry]) -> str:
     """Table in Markdown: means with intervals, and successes, of all agents on all tasks."""
     agents = names(entries, "agent")
     lines = [f"| task | measure | {' | '.join(map(plain, agents))} |", "|---|---|" + "---:|" * len(agents)]
-    for task, fidelity in dict.fromkeys((entry.task, entry.fidelity) for entry in entries):
-        row = {one.agent: one for one in entries if (one.task, one.fidelity) == (task, fidelity)}
+    for (task, fidelity), row in by_task(entries).items():
         first = next(iter(row.values()))
         at = f", {code(fidelity)}" if fidelity else ""
         measure = f"{plain(first.measure)} [{plain(first.unit)}], {first.better} is better"
-        cells = [_cell(row[agent]) if agent in row else "\u2013" for agent in agents]
+        cells = [cell(row.get(agent)) for agent in agents]
         lines.append(f"| {plain(task)}{at} | {measure} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
-def _cell(entry: Entry) -> str:
-    return f"{entry.estimate()}; {entry.success_rate:.0%}"
+def by_task(entries: Sequence[Entry]) -> dict[tuple[str, str], dict[str, Entry]]:
+    """Entries by their agents, by task and fidelity."""
+    found: dict[tuple[str, str], dict[str, Entry]] = {}
+    for entry in entries:
+        found.setdefault((entry.task, entry.fidelity), {})[entry.agent] = entry
+    return found
+
+
+def cell(entry: Entry | None) -> str:
+    """Mean with its interval, and share of successes; a dash for no entry."""
+    return "\u2013" if entry is None else f"{entry.estimate()}; {entry.success_rate:.0%}"
 
 
 def common(entries: Sequence[Entry]) -> tuple[list[str], dict[str, Floats]]:

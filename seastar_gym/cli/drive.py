@@ -15,13 +15,14 @@ from typing import Any, get_args
 import numpy as np
 
 from seastar_gym.cli.swim import sight
-from seastar_gym.command import answered, command_parser
-from seastar_gym.controllers.contract import Policy, actions_in
+from seastar_gym.command import DEFAULT, answered, command_parser
+from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.registry import HELP, load_agent
+from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import SwimOptions, make_scene, scene_at
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.pictures import draw_traces
-from seastar_gym.evaluation.swim import Swim, decisions_in, swim
+from seastar_gym.evaluation.swim import Swim, swim
 from seastar_gym.evaluation.tasks import require_seen
 from seastar_gym.files import write_atomically
 from seastar_gym.plant.guard import Limits
@@ -42,22 +43,21 @@ STOPPED = 1
 
 def parser() -> argparse.ArgumentParser:
     """Parser of the options."""
-    default = "(default: %(default)s)"
     found = command_parser("seastar drive", __doc__)
     found.add_argument("policy", help=HELP.replace("%", "%%"))
-    found.add_argument("--plant", default="sim", help=f"sim, or {SERIAL}/dev/... of who heats the wires {default}")
+    found.add_argument("--plant", default="sim", help=f"sim, or {SERIAL}/dev/... of who heats the wires {DEFAULT}")
     found.add_argument("--tracker", help=f"{SERIAL}/dev/... of who sends sightings (default: the plant's line)")
-    found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {default}")
-    found.add_argument("--sight", default="pose", help=f"what is seen: pose, 1, 3, 9, or a file of a Sight {default}")
-    found.add_argument("--decision-period", type=float, default=0.5, help=f"time between decisions [s] {default}")
+    found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {DEFAULT}")
+    found.add_argument("--sight", default="pose", help=f"what is seen: pose, 1, 3, 9, or a file of a Sight {DEFAULT}")
+    found.add_argument("--decision-period", type=float, default=0.5, help=f"time between decisions [s] {DEFAULT}")
     found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
-    found.add_argument("--fidelity", choices=get_args(Fidelity), default="fast", help=f"of the simulation {default}")
-    found.add_argument("--seconds", type=float, default=200.0, help=f"time after which the swim ends {default}")
-    found.add_argument("--out", type=Path, default=Path("runs/drive"), help=f"folder of all files {default}")
+    found.add_argument("--fidelity", choices=get_args(Fidelity), default="fast", help=f"of the simulation {DEFAULT}")
+    found.add_argument("--seconds", type=float, default=200.0, help=f"time after which the swim ends {DEFAULT}")
+    found.add_argument("--out", type=Path, default=Path("runs/drive"), help=f"folder of all files {DEFAULT}")
     found.add_argument("--no-window", action="store_true", help="show no picture while the robot swims")
     found.add_argument("--dry", action="store_true", help="end after the dry run")
     found.add_argument("--yes", action="store_true", help="do not ask before wires are heated")
-    found.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn at random {default}")
+    found.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn at random {DEFAULT}")
     return found
 
 
@@ -100,8 +100,7 @@ def plan(options: argparse.Namespace) -> tuple[Policy, Swim, dict[str, Any]]:
     arguments = arguments_of(options)
     env = PlantSwim(simulated(options, arguments, paced=False), **arguments)
     policy = load_agent(options.policy, env, options.seed)
-    require_seen(policy, env)
-    arguments["actions"] = actions_in(policy, env.actions, env.scene.robot.n_limbs)
+    arguments["actions"] = require_seen(policy, env)
     env = PlantSwim(simulated(options, arguments, paced=False), **arguments)
     swum = _swim("plan", policy, env, options)
     if env.stopped:

@@ -13,20 +13,22 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from seastar_gym.command import answered, command_parser
+from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.controllers.registry import DEFAULTS, HELP, fitting_agents, load_agents
+from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import scene_at
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.results import Row, write_csv
-from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
+from seastar_gym.evaluation.rollout import MOST_DECISIONS
+from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.evaluation.trials import SETS, as_text, trials
 from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_count, require_number
+from seastar_gym.scene.checks import require_count, require_number, require_period
 from seastar_gym.scene.numerics import Fidelity
 
 if TYPE_CHECKING:
@@ -38,10 +40,10 @@ OF_TRIALS = ("learned", "greedy", "pentagon")
 
 def parser() -> argparse.ArgumentParser:
     """Parser of the options."""
-    default, flag = "(default: %(default)s)", argparse.BooleanOptionalAction
+    flag = argparse.BooleanOptionalAction
     found = command_parser("seastar evaluate", __doc__)
     found.add_argument("--agents", nargs="+", help=f"{HELP} {DEFAULTS}; with --sets: {' '.join(OF_TRIALS)}")
-    found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {default}")
+    found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {DEFAULT}")
     found.add_argument(
         "--fidelity", nargs="+", choices=get_args(Fidelity), default=["balanced"],
         help="accuracy, several with --sets (default: balanced)",
@@ -49,12 +51,12 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
     found.add_argument("--decision-period", type=float, help="time between decisions [s] (default: a stroke of 1 s)")
     limit = found.add_mutually_exclusive_group()
-    limit.add_argument("--seconds", type=float, default=TIME_LIMIT, help=f"time limit [s] {default}")
+    limit.add_argument("--seconds", type=float, default=TIME_LIMIT, help=f"time limit [s] {DEFAULT}")
     limit.add_argument("--max-strokes", type=int, help="time limit [decisions]")
-    radius = f"radius of the waypoints [m] {default}"
+    radius = f"radius of the waypoints [m] {DEFAULT}"
     found.add_argument("--waypoint-radius", type=float, default=WAYPOINT_RADIUS, help=radius)
     found.add_argument("--random-heading", action=flag, default=False, help="turn the robot at random at the start")
-    found.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn at random {default}")
+    found.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn at random {DEFAULT}")
     found.add_argument("--out", type=Path, help="folder for evaluation.csv and traces.png; with --sets a CSV file")
     found.add_argument("--video", action=flag, default=False, help="write a video of every agent")
     found.add_argument("--report", action=flag, default=False, help="write report.html, one page with all of it")
@@ -65,10 +67,10 @@ def parser() -> argparse.ArgumentParser:
     report.add_argument("--runs", nargs="+", type=Path, default=[], help="trainings (default: those of learned agents)")
     report.add_argument("--trials", type=Path, help="CSV file that --sets wrote")
     bound = Path("docs/results/learning/bound.json")
-    report.add_argument("--bound", type=Path, default=bound, help=f"results of studies.learning.bound {default}")
+    report.add_argument("--bound", type=Path, default=bound, help=f"results of studies.learning.bound {DEFAULT}")
     many = found.add_argument_group("many swims")
     many.add_argument("--sets", nargs="+", choices=SETS, help="named paths; random paths or the pentagon, disturbed")
-    many.add_argument("--swims", type=int, default=1000, help=f"number of random paths of every set {default}")
+    many.add_argument("--swims", type=int, default=1000, help=f"number of random paths of every set {DEFAULT}")
     many.add_argument("--num-threads", type=int, help="threads of the simulator (default: one for every processor)")
     return found
 
@@ -78,10 +80,9 @@ def require_sound(options: argparse.Namespace) -> None:
     require_number("--seconds", options.seconds, "s")
     require_number("--waypoint-radius", options.waypoint_radius, "m")
     require_count("--swims", options.swims, 1, 1_000_000)
-    if options.decision_period is not None:
-        require_number("--decision-period", options.decision_period, "s")
-    if options.max_strokes is not None and options.max_strokes < 1:
-        raise ValueError(f"--max-strokes must be at least 1, not {options.max_strokes}.")
+    require_period(options.decision_period, "--decision-period")
+    if options.max_strokes is not None:
+        require_count("--max-strokes", options.max_strokes, 1, MOST_DECISIONS)
     if options.sets is None and len(options.fidelity) > 1:
         raise ValueError("Several fidelities are for --sets: name one.")
     if (options.video or options.report or options.trajectory) and (options.out is None or options.sets is not None):

@@ -17,6 +17,7 @@ from seastar_gym.controllers import checkpoint, learned
 from seastar_gym.controllers.export.c_code import to_c
 from seastar_gym.controllers.export.onnx_graph import to_onnx
 from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy
+from seastar_gym.controllers.registry import learned_file
 from seastar_gym.files import write_atomically
 
 FORMATS = ("c", "onnx")
@@ -35,17 +36,15 @@ def parser() -> argparse.ArgumentParser:
 
 def load_policy(name: str) -> LearnedPolicy:
     """Policy of a name or a file."""
-    bundled = BUNDLED if name == "learned" else learned.file_of(name)
-    if bundled is not None:
-        return learned.load(bundled)
     if name.endswith(".zip"):
         return checkpoint.load(name)
-    if not name.endswith(BUNDLED.suffix):
+    file = learned_file(name)
+    if file is None:
         raise ValueError(
             f"{name} is no learned policy: name a file, .safetensors or the model.zip of train.py, or one of "
             f"{', '.join(['learned', *learned.by_name()])}."
         )
-    return learned.load(name)
+    return learned.load(file)
 
 
 def export(options: argparse.Namespace) -> str:

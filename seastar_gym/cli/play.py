@@ -15,7 +15,7 @@ import numpy as np
 
 from seastar_gym.cli.keys import Steering, known_keys, typed
 from seastar_gym.cli.screen import Show, outcome, rate, screen, show_all, wait
-from seastar_gym.command import answered, command_parser
+from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.envs.canvas import import_pygame
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.scene.checks import require_number
@@ -35,14 +35,13 @@ Held = Callable[[], set[str] | None]
 
 def parser() -> argparse.ArgumentParser:
     """Parser of the options."""
-    default = "(default: %(default)s)"
     found = command_parser("seastar play", __doc__)
-    found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {default}")
-    found.add_argument("--decision-period", type=float, default=0.2, help=f"time between decisions [s] {default}")
-    found.add_argument("--speed", type=float, default=1.0, help=f"multiple of real time {default}")
+    found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {DEFAULT}")
+    found.add_argument("--decision-period", type=float, default=0.2, help=f"time between decisions [s] {DEFAULT}")
+    found.add_argument("--speed", type=float, default=1.0, help=f"multiple of real time {DEFAULT}")
     found.add_argument("--keys", help="keys that are pressed, a word per decision, instead of the keyboard")
     found.add_argument("--film", type=Path, help="file of a film, .mp4 or .gif, instead of a window; needs --keys")
-    found.add_argument("--seed", type=int, default=0, help=f"seed of a random path {default}")
+    found.add_argument("--seed", type=int, default=0, help=f"seed of a random path {DEFAULT}")
     return found
 
 

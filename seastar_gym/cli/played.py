@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.cli.keys import ALONG, MINUS, PLUS
-from seastar_gym.envs.canvas import Colour, import_pygame
-from seastar_gym.envs.rendering import FAINT_INK, INK, WATER, limb_nodes
+from seastar_gym.envs.canvas import INK, WATER, Colour, import_pygame
+from seastar_gym.envs.rendering import FAINT_INK, limb_nodes
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
 TEXT, LINE = 17, 22

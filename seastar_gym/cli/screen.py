@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from seastar_gym.envs.canvas import Canvas, import_pygame
+from seastar_gym.envs.canvas import INK, WATER, Canvas, import_pygame
 from seastar_gym.envs.window import Window
 from seastar_gym.evaluation.films import Picture, film, film_format
 
@@ -70,9 +70,9 @@ def _window(fps: float) -> Iterator[Show]:
 def wait(show: Show) -> None:
     """Show that something begins: machine code of the simulator takes a while to load, and longer to be made."""
     canvas = Canvas(SIZE, 24)
-    canvas.begin((250, 252, 254))
+    canvas.begin(WATER)
     for line, text in enumerate(("Starting ...", "The first start on a machine compiles the simulator.")):
-        canvas.write(text, (SIZE[0] / 2, SIZE[1] / 2 + 40 * line), (58, 64, 74), (0.5, 0.5))
+        canvas.write(text, (SIZE[0] / 2, SIZE[1] / 2 + 40 * line), INK, (0.5, 0.5))
     canvas.finish()
     show(canvas.pixels())
 

@@ -13,14 +13,15 @@ from typing import Any, get_args
 import gymnasium as gym
 
 from seastar_gym.cli.screen import Show, outcome, rate, screen, show_all
-from seastar_gym.command import answered, command_parser
-from seastar_gym.controllers.contract import Policy, actions_in
+from seastar_gym.command import DEFAULT, answered, command_parser
+from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.registry import HELP, load_agent
+from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import read
 from seastar_gym.envs.sight import Sight
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.rollout import rollout
-from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
+from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.evaluation.tasks import make_task, require_seen
 from seastar_gym.files import read_json
 from seastar_gym.scene.checks import require_number
@@ -33,12 +34,11 @@ LEARNED_PERIOD = 0.2
 
 def parser() -> argparse.ArgumentParser:
     """Parser of the options."""
-    default = "(default: %(default)s)"
     found = command_parser("seastar swim", __doc__)
-    found.add_argument("--agent", default="learned", help=f"{HELP} {default}")
+    found.add_argument("--agent", default="learned", help=f"{HELP} {DEFAULT}")
     found.add_argument("--path", help=f"{PATH_HELP} (default: pentagon)")
     found.add_argument("--task", help="id of a registered environment (default: SeastarSwim-v0)")
-    found.add_argument("--speed", type=float, default=4.0, help=f"multiple of real time {default}")
+    found.add_argument("--speed", type=float, default=4.0, help=f"multiple of real time {DEFAULT}")
     found.add_argument("--film", type=Path, help="file of a film, .mp4 or .gif, instead of a window")
     found.add_argument("--fidelity", choices=get_args(Fidelity), help="accuracy of the simulation")
     found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the task's)")
@@ -52,7 +52,7 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--action-delay", type=float, help="time from a decision to the heat of wires [s]")
     found.add_argument("--seconds", type=float, help="simulated time after which the swim ends")
     found.add_argument("--random-heading", action="store_true", help="turn the robot at random at the start")
-    found.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn at random {default}")
+    found.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn at random {DEFAULT}")
     return found
 
 
@@ -100,8 +100,7 @@ def watch(options: argparse.Namespace) -> str:
     """Let the agent swim and show it; returns a sentence on how it went."""
     plain: Any = make(options).unwrapped
     policy = load_agent(options.agent, plain, options.seed)
-    require_seen(policy, plain)
-    actions = actions_in(policy, plain.actions, plain.scene.robot.n_limbs)
+    actions = require_seen(policy, plain)
     period = plain.decision_period
     number, fps = rate(options.film, period, options.speed)
     env = make(options, actions=actions, render_mode="rgb_array_list", frames_per_stroke=number)

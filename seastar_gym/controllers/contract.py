@@ -30,6 +30,18 @@ def require_policy(policy: object) -> None:
         raise ValueError(f"A policy must have predict(observation, ...), which {shown(policy)} has not.")
 
 
+def memory_of(state: object, shape: tuple[int, ...], kinds: str, what: str) -> NDArray[Any] | None:
+    """The array in a state, None before the first decision; ValueError for what the last call cannot have given.
+
+    shape, kinds: Of the array, and kinds of its numbers as numpy has them. what: What it holds, for the sentence.
+    """
+    memory = state[0] if isinstance(state, tuple) and len(state) == 1 else None
+    fits = isinstance(memory, np.ndarray) and memory.dtype.kind in kinds and memory.shape == shape
+    if state is not None and not fits:
+        raise ValueError(f"state must be None or what the last call gave, {what} of shape {shape}.")
+    return memory
+
+
 def actions_of(policy: Policy, n_limbs: int) -> Actions:
     """The action mode that a policy is for: its attribute `actions`, or the mode that has its `action_space`, as models
     of Stable-Baselines3 say it; "limbs" if it says neither."""

@@ -11,6 +11,7 @@ from seastar_gym.envs.commands import Actions, Discrete, checked_decision_period
 from seastar_gym.envs.layout import N_STATIONS, OBSERVATION_LAYOUT, Entry, Layout, memory_size
 from seastar_gym.envs.symmetry import FrameStack, Symmetry, memory_mirror, symmetry_of
 from seastar_gym.envs.symmetry.symmetry import MOST_PAST
+from seastar_gym.files import parse_json
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror
 from seastar_gym.scene.checks import is_whole_number, require_count, require_kind, shown
@@ -220,18 +221,9 @@ def read_facts(text: str | bytes) -> dict[str, Any]:
     """Entries of a description in JSON. ValueError for anything but an object with finite numbers."""
     require_kind("A description", text, str | bytes, "text")
     try:
-        text = text if isinstance(text, str) else text.decode()
-        facts = json.loads(text, parse_constant=_finite, parse_float=_finite)
-    except (json.JSONDecodeError, UnicodeDecodeError) as unfit:
+        facts = parse_json(text if isinstance(text, str) else text.decode())
+    except ValueError as unfit:
         raise ValueError(f"Its description is no JSON: {unfit}.") from None
-    except RecursionError:
-        raise ValueError("Its description is nested too deeply.") from None
     if not isinstance(facts, dict):
         raise ValueError(f"Its description is a {type(facts).__name__}, not an object with names.")
     return facts
-
-
-def _finite(text: str) -> float:
-    if not math.isfinite(float(text)):
-        raise ValueError(f"Its description says {text}, which is no finite number.")
-    return float(text)

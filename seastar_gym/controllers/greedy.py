@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import observed
-from seastar_gym.envs.commands import Actions, checked_decision_period, command_table
+from seastar_gym.envs.commands import Actions, checked_decision_period, command_table, decisions_in
 from seastar_gym.envs.layout import OBSERVATION_LAYOUT, Layout
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.reward import RewardWeights
@@ -72,7 +72,9 @@ def displacement_map(scene: Scene, actions: Actions = "joint", decision_period: 
     asked: tuple[Any, ...] = scene, actions, SETTLING_STROKES, MEASURED_STROKES, OBSERVATION_LAYOUT
     if decision_period is not None:
         asked = *asked, decision_period
-    settling, measured_strokes = (_decisions(n, scene, decision_period) for n in (SETTLING_STROKES, MEASURED_STROKES))
+    settling, measured_strokes = (
+        decisions_in(n * scene.actuator.period, decision_period, scene) for n in (SETTLING_STROKES, MEASURED_STROKES)
+    )
     key = hashlib.sha256(repr(asked).encode()).hexdigest()[:24]
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "seastar-gym"
     file = cache / f"displacements-{key}.npz"
@@ -83,12 +85,6 @@ def displacement_map(scene: Scene, actions: Actions = "joint", decision_period: 
     with beside(file) as part, part.open("wb") as stream:
         np.savez(stream, hub=measured.hub, turn=measured.turn)
     return measured
-
-
-def _decisions(strokes: int, scene: Scene, decision_period: float | None) -> int:
-    """Decisions in so many strokes, one at least."""
-    seconds = strokes * scene.actuator.period
-    return strokes if decision_period is None else max(1, round(seconds / decision_period))
 
 
 def waypoints_of(

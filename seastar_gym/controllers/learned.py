@@ -24,13 +24,13 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 from seastar_gym import renamed
-from seastar_gym.controllers.contract import as_floating, starts
+from seastar_gym.controllers.contract import as_floating, memory_of, starts
 from seastar_gym.controllers.description import Description, read_facts
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.symmetry import FrameStack
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import is_finite_number, require_file, require_flag, require_kind, require_number, shown
+from seastar_gym.scene.checks import is_finite_number, require_file, require_flag, require_kind, require_period, shown
 
 if TYPE_CHECKING:
     from seastar_gym.envs.tasks.challenge import Challenge
@@ -128,7 +128,7 @@ class LearnedPolicy:
     ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...]]:
         """`predict` of a policy that sees past observations."""
         present = np.atleast_2d(observation).astype(np.float32)
-        _require_past(state, (len(present), frame_stack.past, present.shape[1]))
+        memory_of(state, (len(present), frame_stack.past, present.shape[1]), "f", "past observations")
         at_first = np.repeat(present[:, None], frame_stack.past, axis=1)
         begun = starts(episode_start, len(present))
         past = at_first if state is None else np.where(begun[:, None, None], at_first, state[0])
@@ -214,13 +214,6 @@ def _require_weights(weights: object) -> None:
         raise ValueError(f"weights must be arrays by name, not {shown(weights)}.")
 
 
-def _require_past(state: object, shape: tuple[int, ...]) -> None:
-    """ValueError unless a state is None or past observations of this shape."""
-    past = state[0] if isinstance(state, tuple) and len(state) == 1 else None
-    if state is not None and (not isinstance(past, np.ndarray) or past.dtype.kind != "f" or past.shape != shape):
-        raise ValueError(f"state must be None or what the last call gave, past observations of shape {shape}.")
-
-
 def _flat(facts: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Nested entries with dotted names: {"robot": {"n_limbs": 5}} -> {"robot.n_limbs": 5}."""
     flat: dict[str, Any] = {}
@@ -247,8 +240,7 @@ def bundled_file(decision_period: float | None, bundled: Path = BUNDLED, task: s
 
     A task without a policy of its own has that of waypoints.
     """
-    if decision_period is not None:
-        require_number("decision_period", decision_period, "s")
+    require_period(decision_period)
     require_kind("task", task, str | None, "the name of a task, or None")
     if task is not None and (file := of_task(task, decision_period)).is_file():
         return file

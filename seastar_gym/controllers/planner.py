@@ -27,7 +27,7 @@ from seastar_gym.envs.stations import body_heading, node_weights, of_beginning
 from seastar_gym.gaits import evolved_gaits
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import complete
-from seastar_gym.scene.checks import as_finite, require_count, require_kind, require_number
+from seastar_gym.scene.checks import as_finite, require_count, require_kind, require_number, require_period
 from seastar_gym.simulator import Simulator, State
 from seastar_gym.simulator.simulator import MAX_THREADS
 
@@ -67,8 +67,7 @@ TIMED_BUDGETS = {0.5: Budget(3, 8, 0.5), 0.2: Budget(3, 4, 0.8), 0.1: Budget(2, 
 
 def budget_for(decision_period: float | None) -> Budget:
     """Budget for a time between decisions [s]. None means strokes."""
-    if decision_period is not None:
-        require_number("decision_period", decision_period, "s")
+    require_period(decision_period)
     shorter = [seconds for seconds in TIMED_BUDGETS if decision_period is not None and seconds >= decision_period]
     return TIMED_BUDGETS[min(shorter)] if shorter else Budget()
 

@@ -24,7 +24,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import (
     require_choice,
     require_kind,
-    require_number,
+    require_period,
     require_seed,
     require_texts,
     shown,
@@ -111,8 +111,7 @@ def _known(seed: int, fidelity: Fidelity, decision_period: float | None, scene: 
     require_choice("fidelity", fidelity, get_args(Fidelity))
     known = make_scene(None, fidelity) if scene is None else scene
     require_kind("scene", known, Scene, "a Scene, or None")
-    if decision_period is not None:
-        require_number("decision_period", decision_period, "s")
+    require_period(decision_period)
     return make_scene(None, fidelity, decision_period) if scene is None else scene
 
 
@@ -156,11 +155,19 @@ def files_of(name: str, decision_period: float | None = None) -> list[Path]:
     """
     if third_party.is_function(name):
         return [third_party.module_file(name)]
+    file = learned_file(name, decision_period)
+    if file is not None:
+        return [file, file.with_suffix(".json")]
+    return [Path(name)] if _is_file(name) else []
+
+
+def learned_file(name: str, decision_period: float | None = None) -> Path | None:
+    """File with the weights of a learned policy, bundled or not; None for the name of another agent.
+
+    decision_period: As of `files_of`.
+    """
     bundled = learned.bundled_file(decision_period) if name == "learned" else learned.file_of(name)
-    if bundled is None and not _is_file(name):
-        return []
-    file = bundled or Path(name)
-    return [file, file.with_suffix(".json")] if file.suffix == ".safetensors" else [file]
+    return bundled or (Path(name) if name.endswith(".safetensors") else None)
 
 
 def _is_file(name: str) -> bool:

@@ -19,7 +19,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.controllers.contract import observed, starts
+from seastar_gym.controllers.contract import memory_of, observed, starts
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, action_space, command_table
 from seastar_gym.gaits import (
     PERIOD,
@@ -32,7 +32,7 @@ from seastar_gym.gaits import (
     timed,
     turning_wave,
 )
-from seastar_gym.scene.checks import as_finite, require_choice, require_kind, require_limbs, require_number, shown
+from seastar_gym.scene.checks import as_finite, require_choice, require_kind, require_limbs, require_period, shown
 
 Floats = NDArray[np.float64]
 PolicyState = tuple[NDArray[np.int64], ...] | None
@@ -65,7 +65,7 @@ class OpenLoopPolicy:
     def __init__(self, commands: ArrayLike, actions: Actions = "limbs", decision_period: float | None = None):
         commands = as_finite("commands", commands, ())
         require_choice("actions", actions, get_args(Actions))
-        _require_period(decision_period)
+        require_period(decision_period)
         if commands.ndim != 2 or commands.size == 0:
             raise ValueError(f"A gait needs commands of shape (n_strokes, n_limbs), not {commands.shape}.")
         self.actions: Actions = actions
@@ -88,22 +88,10 @@ class OpenLoopPolicy:
         observation = observed(observation, 0)
         alone = observation.ndim == 1
         n = 1 if alone else len(observation)
-        swum = np.where(starts(episode_start, n), 0, _decisions(state, n))
+        made = memory_of(state, (n,), "iu", "decisions made")
+        swum = np.where(starts(episode_start, n), 0, 0 if made is None else made)
         action = self._gait[swum % len(self._gait)]
         return action[0] if alone else action, (swum + 1,)
-
-
-def _decisions(state: object, n: int) -> NDArray[np.int64]:
-    """Decisions made, shape (n,), of a state."""
-    made = state[0] if isinstance(state, tuple) and len(state) == 1 else None
-    if state is not None and (not isinstance(made, np.ndarray) or made.dtype.kind not in "iu" or made.shape != (n,)):
-        raise ValueError(f"state must be None or what the last call gave, decisions made of shape ({n},).")
-    return np.zeros(n, np.int64) if made is None else made
-
-
-def _require_period(decision_period: float | None) -> None:
-    if decision_period is not None:
-        require_number("decision_period", decision_period, "s")
 
 
 class RandomPolicy:
@@ -168,7 +156,7 @@ def scripted(
     """
     require_kind("name", name, str, "the name of a gait")
     require_limbs(n_limbs)
-    _require_period(decision_period)
+    require_period(decision_period)
     require_kind("rng", rng, np.random.Generator | None, "a numpy Generator, or None")
     if actions is not None:
         require_choice("actions", actions, get_args(Actions))

@@ -15,8 +15,8 @@ from typing import Any, get_args
 
 import numpy as np
 
-from seastar_gym.command import answered, command_parser
-from seastar_gym.controllers.contract import Policy, actions_in
+from seastar_gym.command import DEFAULT, answered, command_parser
+from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.registry import HELP, load_agent
 from seastar_gym.controllers.scripted import RandomPolicy
 from seastar_gym.data.dataset import record, require_new, summary, write
@@ -28,12 +28,11 @@ from seastar_gym.scene.numerics import Fidelity
 
 def parser() -> argparse.ArgumentParser:
     """Parser of the options."""
-    default = "(default: %(default)s)"
     found = command_parser("seastar data", __doc__)
-    found.add_argument("--tasks", nargs="+", default=["SeastarSwim-v0"], help=f"ids of tasks {default}")
-    found.add_argument("--agents", nargs="+", default=["random", "greedy", "learned"], help=f"{HELP} {default}")
-    found.add_argument("--episodes", type=int, default=100, help=f"number of episodes of each {default}")
-    found.add_argument("--seed", type=int, default=0, help=f"seed of the first episode {default}")
+    found.add_argument("--tasks", nargs="+", default=["SeastarSwim-v0"], help=f"ids of tasks {DEFAULT}")
+    found.add_argument("--agents", nargs="+", default=["random", "greedy", "learned"], help=f"{HELP} {DEFAULT}")
+    found.add_argument("--episodes", type=int, default=100, help=f"number of episodes of each {DEFAULT}")
+    found.add_argument("--seed", type=int, default=0, help=f"seed of the first episode {DEFAULT}")
     found.add_argument("--fidelity", choices=get_args(Fidelity), help="accuracy (default: that of the task)")
     found.add_argument("--random-paths", action="store_true", help="random paths and headings, not the pentagon")
     found.add_argument("--out", type=Path, help="folder of the datasets (default: Minari's own)")
@@ -65,8 +64,7 @@ def recorded(task: str, agent: str, options: argparse.Namespace, command: str) -
         arguments |= _random_paths(task)
     env = env_of(task, **arguments)
     policy = _load(name, env, options.seed)
-    require_seen(policy, env)
-    arguments["actions"] = actions_in(policy, env.actions, env.scene.robot.n_limbs)
+    arguments["actions"] = require_seen(policy, env)
     episodes = record(task, policy, options.episodes, options.seed, **arguments)
     write(episodes, dataset_id, task, agent, f"Written by: {command}", **arguments)
     return f"{dataset_id}: {summary(episodes)}"

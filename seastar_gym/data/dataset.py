@@ -13,12 +13,12 @@ import warnings
 from collections.abc import Sequence
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.data.recorder import Episode, Recorder
 from seastar_gym.evaluation.rollout import rollout
+from seastar_gym.evaluation.tasks import make_batch, make_task
 from seastar_gym.version import __version__
 
 AT_ONCE = 128
@@ -33,9 +33,7 @@ def record(task: str, policy: Policy, n_episodes: int, seed: int = 0, **argument
     found: list[Episode] = []
     for first in range(seed, seed + n_episodes, AT_ONCE):
         seeds = list(range(first, min(first + AT_ONCE, seed + n_episodes)))
-        recorder = Recorder(
-            gym.make_vec(task, num_envs=len(seeds), vectorization_mode="vector_entry_point", **arguments)
-        )
+        recorder = Recorder(make_batch(task, len(seeds), **arguments))
         rollout(recorder, policy, seeds=seeds)
         found += recorder.episodes(only_first=True)
         recorder.close()
@@ -64,7 +62,7 @@ def write(
     require_new(dataset_id)
     if not episodes:
         raise ValueError(f"There are no episodes for {dataset_id}.")
-    env = gym.make(task, disable_env_checker=True, **arguments)
+    env = make_task(task, **arguments)
     buffers = [
         EpisodeBuffer(
             id=number,

@@ -6,6 +6,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.envs.vector import checked_seeds
 from seastar_gym.evaluation.rollout import require_next_step
 from seastar_gym.scene.checks import require_kind
 
@@ -60,10 +61,7 @@ class Recorder(_VectorWrapper):
         if isinstance(options, dict) and "reset_mask" in options:
             raise ValueError("A recorder begins episodes of all robots: leave reset_mask out.")
         observations, info = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
-        if isinstance(seed, list):
-            self._seeds = list(seed)
-        else:
-            self._seeds = [None if seed is None else seed + robot for robot in range(self.num_envs)]
+        self._seeds = checked_seeds(seed, self.num_envs)
         self._begin[:] = len(self._rows)
         self._begins_next[:] = False
         self._keep((observations, None, None, None, None), info)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 Colour = tuple[int, int, int]
 
+WATER: Colour = (250, 252, 254)
+INK: Colour = (58, 64, 74)
 SUPERSAMPLING = 3
 """Pictures are painted this many times larger and smoothed down."""
 KEPT_TEXTS = 64

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import JUMP, ActuatorBase, complete
-from seastar_gym.scene.checks import require_choice, require_number, require_unmasked
-from seastar_gym.scene.numerics import MAX_STEPS, SHORTEST
+from seastar_gym.scene.checks import require_choice, require_unmasked
 from seastar_gym.scene.per_robot import batch_size
+from seastar_gym.simulator.schedule import require_duration
 
 Discrete: TypeAlias = Literal["limbs", "joint", "pairs"]
 """Action modes with a finite number of actions."""
@@ -114,17 +114,21 @@ def _checked_shares(array: NDArray[Any], shape: tuple[int, int]) -> NDArray[np.f
     return array.astype(np.float64)
 
 
+def decisions_in(seconds: float, decision_period: float | None, scene: Scene | None = None) -> int:
+    """Number of decisions in a time [s], one at least.
+
+    decision_period: Time between them [s]. None means a stroke, of the scene's actuator or without a scene of 1 s.
+    """
+    stroke = 1.0 if scene is None else scene.actuator.period
+    return max(1, round(seconds / (stroke if decision_period is None else decision_period)))
+
+
 def checked_decision_period(seconds: float | None, scene: Scene) -> float:
     """Time between decisions [s], a stroke if None; ValueError if the scene's actuator cannot be commanded so often."""
-    actuator, step = scene.actuator, scene.numerics.step
+    actuator = scene.actuator
     if seconds is None:
         return float(actuator.period)
-    require_number("decision_period", seconds, "s")
-    if not SHORTEST * step <= seconds <= MAX_STEPS * step:
-        raise ValueError(
-            f"decision_period must be from {SHORTEST * step:.4g} to {MAX_STEPS * step:.4g} s, with steps of "
-            f"{step:.4g} s, not {seconds:.4g} s."
-        )
+    require_duration(seconds, scene.numerics.step, "decision_period")
     if not _can_begin_anew(complete(actuator), float(seconds)):
         raise ValueError(
             f"decision_period must be at least {actuator.period:.4g} s, the period of this {type(actuator).__name__}: "

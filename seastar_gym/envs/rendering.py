@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.camera import Camera
-from seastar_gym.envs.canvas import Canvas, Colour, mixed
+from seastar_gym.envs.canvas import INK, WATER, Canvas, Colour, mixed
 from seastar_gym.envs.frame import Frame
 from seastar_gym.envs.scenery import NOTHING, Flow, Scenery, flow_of
 from seastar_gym.envs.waypoint_labels import waypoint_labels
@@ -19,8 +19,6 @@ from seastar_gym.scene.currents import AnyCurrent
 
 FloatArray = NDArray[np.float64]
 
-WATER: Colour = (250, 252, 254)
-INK: Colour = (58, 64, 74)
 FAINT_INK: Colour = (128, 136, 148)
 LIMB: Colour = (70, 77, 88)
 BODY: Colour = (205, 210, 217)

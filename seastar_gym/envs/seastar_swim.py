@@ -227,7 +227,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     certificate: Measured errors of the scene for `info`: a `Certificate`, or a file of `seastar certify`. Refused if it
         belongs to another scene or version, or if decisions are not strokes.
     error_bars: Whether `info` has `error_estimate`, from a finer copy of the robot that is simulated alongside. The
-        trajectory stays bit-identical; a step takes four to five times as long.
+        trajectory stays bit-identical; a step takes three to five times as long.
     decision_period: Time between decisions [s]. None means a stroke, the period of the actuator. If no `scene` is given
         and the time is not 1 s, the robot has `SmaWires`. Actuators without memory refuse a time in which limbs would
         not come to rest.

@@ -127,7 +127,7 @@ def at_stations(positions: Floats, robot: Seastar, orientation: Floats | None = 
 def body_heading(
     positions: Floats, robot: Seastar, orientation: Floats | None = None, rest: Floats | None = None
 ) -> Floats:
-    """Direction of the body frame's x axis [rad], shape (n_robots,), see `observation.py`.
+    """Direction of the body frame's x axis [rad], shape (n_robots,), see `layout.py`.
 
     positions: Node positions [m], shape (n_robots, n_nodes, 2). orientation: As in `roots_from_hub`.
     rest: Node positions at rest [m], shape (n_nodes, 2) or (n_robots, n_nodes, 2). None means those of `robot`.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from seastar_gym.controllers.contract import Policy, actions_of
 from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import make_scene, read
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -17,7 +18,7 @@ from seastar_gym.evaluation.films import film
 from seastar_gym.evaluation.pictures import FPS, FRAMES_PER_STROKE, draw_traces
 from seastar_gym.evaluation.playback import Playback, RecordingEnv
 from seastar_gym.evaluation.results import as_text, results, time_series, write_csv
-from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, decisions_in, swim
+from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, swim
 from seastar_gym.extras import require_extra
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene

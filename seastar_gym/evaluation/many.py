@@ -3,13 +3,14 @@
 import numpy as np
 
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit, require_policy
+from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import Path as SwimPath
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.sight import Drawn, Sight
 from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
 from seastar_gym.evaluation.rollout import MOST_DECISIONS, TaskBatch, rollout
-from seastar_gym.evaluation.swim import RECORDED, TIME_LIMIT, Swim, decisions_in, swims_of
+from seastar_gym.evaluation.swim import RECORDED, TIME_LIMIT, Swim, swims_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_kind
 

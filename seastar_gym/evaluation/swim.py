@@ -13,7 +13,6 @@ from seastar_gym.controllers.contract import Policy, require_fit, require_policy
 from seastar_gym.envs.paths import cross_track_error, path_length
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.rollout import MOST_DECISIONS, Episodes, Info, rollout
-from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_callable, require_count, require_kind
 
 Floats = NDArray[np.float64]
@@ -119,15 +118,6 @@ class Swim:
     def _per_metre(self, of_strokes: NDArray[Any]) -> float | None:
         length = self.hub_path_length
         return float(of_strokes.sum() / length) if length > 0.0 else None
-
-
-def decisions_in(seconds: float, decision_period: float | None, scene: Scene | None = None) -> int:
-    """Number of decisions in a time [s], one at least.
-
-    decision_period: Time between them [s]. None means a stroke, of the scene's actuator or without a scene of 1 s.
-    """
-    stroke = 1.0 if scene is None else scene.actuator.period
-    return max(1, round(seconds / (stroke if decision_period is None else decision_period)))
 
 
 def swim(

@@ -8,6 +8,7 @@ from gymnasium.envs.registration import load_env_creator
 
 from seastar_gym.controllers.contract import Policy, actions_in, require_fit
 from seastar_gym.controllers.greedy import Searcher
+from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.tasks.numbered import Split
 from seastar_gym.evaluation.rollout import Batch, Episodes, rollout
@@ -51,7 +52,7 @@ def held_out(task: str, fidelity: Fidelity | None = None, split: Split = "test")
 
 def env_of(task: str, **arguments: Any) -> Any:
     """Environment of a task, of one robot, without wrappers."""
-    return gym.make(task, disable_env_checker=True, **arguments).unwrapped
+    return make_task(task, **arguments).unwrapped
 
 
 def make_batch(task: str, n: int, /, threads: int | None = None, **arguments: Any) -> Batch:
@@ -61,13 +62,14 @@ def make_batch(task: str, n: int, /, threads: int | None = None, **arguments: An
     return gym.make_vec(task, n, vectorization_mode="vector_entry_point", threads=threads, **arguments)
 
 
-def require_seen(policy: Policy, env: Any) -> None:
-    """ValueError where an agent cannot know what a task shows, or cannot drive its robot."""
+def require_seen(policy: Policy, env: Any) -> Actions:
+    """Action mode in which an agent swims a task; ValueError where it cannot know what the task shows, or drive it."""
     n_seen, n_known = env.observation_space.shape[0], Layout.of(env.scene).size
     if isinstance(policy, Searcher) and n_seen != n_known:
         raise ValueError(f"It reads observations of {n_known} numbers, the task shows {n_seen}.")
     actions = actions_in(policy, env.actions, env.scene.robot.n_limbs)
     require_fit(policy, env.scene, actions, env.decision_period, n_seen, getattr(env, "challenge", None))
+    return actions
 
 
 def swim_episodes(
@@ -87,8 +89,7 @@ def swim_episodes(
     """
     arguments = held_out(task, fidelity, split)
     plain = env_of(task, **arguments)
-    require_seen(policy, plain)
-    mode = actions_in(policy, plain.actions, plain.scene.robot.n_limbs)
+    mode = require_seen(policy, plain)
     limit = max_decisions or gym.spec(task).max_episode_steps
     if limit is None:
         raise ValueError(f"The task {task!r} has no time limit.")

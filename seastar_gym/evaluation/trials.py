@@ -15,7 +15,7 @@ from seastar_gym.evaluation.disturbances import CURRENT_DIRECTIONS, DISTURBANCES
 from seastar_gym.evaluation.many import swim_many
 from seastar_gym.evaluation.results import MEANS, Row, number, statistics, text_table
 from seastar_gym.scene.csv_rows import Row as CsvRow
-from seastar_gym.scene.csv_rows import read_rows
+from seastar_gym.scene.csv_rows import read_table
 from seastar_gym.scene.numerics import Fidelity
 
 NOMINAL: tuple[str, ...] = ("pentagon", "square", "triangle", "figure-eight")
@@ -106,26 +106,15 @@ def as_shown(row: Row) -> Row:
 
 def read_trials(file: Path) -> list[Row]:
     """The CSV of trials. ValueError: it is none."""
-    names, *lines = read_rows(file) or [CsvRow(str(file), ())]
-    if not lines or not set(COLUMNS) <= set(names.fields):
+    names, lines = read_table(file)
+    if not lines or not set(COLUMNS) <= set(names):
         raise ValueError(f"{file} is not what trials write.")
     return [_read(names, line) for line in lines]
 
 
-def _read(names: CsvRow, line: CsvRow) -> Row:
-    if len(line.fields) != len(names.fields):
-        raise line.refused(f"the line must have {len(names.fields)} fields, as the first one, not {len(line.fields)}")
-    row: dict[str, Any] = dict(zip(names.fields, line.fields, strict=True))
+def _read(names: tuple[str, ...], line: CsvRow) -> Row:
+    line.require_fields(len(names))
+    row: dict[str, Any] = dict(zip(names, line.fields, strict=True))
     measured = [name + end for name in MEASURED for end in ("", "_low", "_high")]
-    return {**{name: row[name] for name in COLUMNS}, **{name: _float(row[name], line) for name in measured}}
-
-
-def _float(text: str, line: CsvRow) -> float:
-    """A measured number, NaN where no swim arrived."""
-    try:
-        value = float(text)
-    except ValueError:
-        raise line.refused(f"{text!r} is no number") from None
-    if np.isinf(value):
-        raise line.refused(f"{text!r} is no finite number")
-    return value
+    numbers = line._replace(fields=tuple(row[name] for name in measured)).numbers(missing=("nan",))
+    return {name: row[name] for name in COLUMNS} | dict(zip(measured, numbers, strict=True))

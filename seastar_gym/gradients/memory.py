@@ -23,12 +23,17 @@ WorkOfGradient = namedtuple("WorkOfGradient", (*Work._fields, "kept", "replayed"
 
 def as_rows_of_tape(bundle: Any) -> Any:
     """A bundle whose rows of robots are rows of a tape: values, and factors and place, which are 0."""
+    return widened(bundle, ROW)
+
+
+def widened(bundle: Any, width: int) -> Any:
+    """A bundle whose rows of robots, shape (n, N_LANES), have zeros behind them, shape (n, width)."""
     if isinstance(bundle, np.ndarray) and bundle.ndim == 2:
-        rows = aligned_rows(len(bundle), ROW)
+        rows = aligned_rows(len(bundle), width)
         rows[:, :N_LANES] = bundle
         return rows
     if hasattr(bundle, "_fields"):
-        return bundle._replace(**{name: as_rows_of_tape(getattr(bundle, name)) for name in bundle._fields})
+        return bundle._replace(**{name: widened(getattr(bundle, name), width) for name in bundle._fields})
     return bundle
 
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.der import potential
-from seastar_gym.der.body.body import move_roots, place_roots
-from seastar_gym.der.energy import fill_moments
+from seastar_gym.der.body.body import place_roots
 from seastar_gym.der.linear.star_matrix import load_pair, store_pair
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.stepping import steps
@@ -98,18 +97,6 @@ def replay_steps(rods, work, scheme, actuation, q, v, a, limits, report):
     )
     _, accepted, _ = try_step(rods, work, scheme, actuation, q, v, a, again, everybody, limits, report)
     return not any_lane(~accepted)
-
-
-@kernel
-def moments_on_tape(rods, work, actuation, q, moments):
-    """What resists the actuators [N m], see energy.py."""
-    fill_moments(rods, work, actuation, q, moments)
-
-
-@kernel
-def roots_on_tape(rods, q, v):
-    """Put roots of limbs on a body where hub and angle say."""
-    move_roots(rods, q, v)
 
 
 @kernel

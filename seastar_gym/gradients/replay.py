@@ -16,7 +16,9 @@ import numpy as np
 from numba.core.compiler_lock import global_compiler_lock
 from numpy.typing import NDArray
 
+from seastar_gym.der.body.body import move_roots
 from seastar_gym.der.contact.coupled import solve_again_coupled
+from seastar_gym.der.energy import fill_moments
 from seastar_gym.der.linear.star_solution import solve_again
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import Rods, Work
@@ -24,7 +26,7 @@ from seastar_gym.der.stepping.schemes import Scheme
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.gradients.history import FALLBACK, INTERVAL, OF_STEP, SIZE
-from seastar_gym.gradients.on_tape import TapeKernels, moments_on_tape, replay_steps, roots_on_tape
+from seastar_gym.gradients.on_tape import TapeKernels, replay_steps
 from seastar_gym.simd.compilation import entry_point, kernel
 from seastar_gym.simd.lanes import N_LANES, borrow, load, load_number, store
 from seastar_gym.simd.tape_lanes import ENTRY, FACTOR, PLACE, begin_tape, end_of_tape, tape_is_full
@@ -345,6 +347,6 @@ def pulling_back() -> Callable[..., int]:
     """The entry point."""
     kernels = TapeKernels()
     globals()["replay_steps_on_tape"] = kernels(replay_steps)
-    globals()["fill_moments_on_tape"] = kernels(moments_on_tape)
-    globals()["move_roots_on_tape"] = kernels(roots_on_tape)
+    globals()["fill_moments_on_tape"] = kernels(fill_moments)
+    globals()["move_roots_on_tape"] = kernels(move_roots)
     return _pull_back

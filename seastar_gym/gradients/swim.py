@@ -1,7 +1,7 @@
 """`differentiate`: a swim of one robot, and its derivatives in numbers of the scene, commands and the start."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +11,7 @@ from seastar_gym.der.stepping.report import MOMENTS, REPORT_ROWS, SMALLEST_HUB_T
 from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.gradients.kernels import advance_slopes
+from seastar_gym.gradients.memory import widened
 from seastar_gym.gradients.stencils import arrays_of
 from seastar_gym.gradients.unknowns import Rotations, Start, slopes_of_start, strengths_of, unknowns_of
 from seastar_gym.model.rods import make_limits, make_rods
@@ -148,13 +149,13 @@ class _Group:
     def __init__(self, scene: Scene, start: Start, slopes: Start, columns: slice):
         self._columns, self._scheme = columns, scheme_of(scene.numerics.scheme, scene.numerics.damping)
         one, n_limbs = make_rods(scene), scene.robot.n_limbs
-        self._rods = _dual(side_by_side([one] * N_LANES))
+        self._rods = widened(side_by_side([one] * N_LANES), 2 * N_LANES)
         for rows, rise in zip(arrays_of(self._rods), slopes.coefficients, strict=True):
             if rows.ndim == 2:
                 rows[:, N_LANES : N_LANES + self._n] = rise[:, columns]
             elif rise[:, columns].any():
                 raise ValueError("There are no derivatives in numbers on a grid.")
-        self._work, self._limits = _dual(make_work(one, self._scheme.n_stages)), make_limits(scene)
+        self._work, self._limits = widened(make_work(one, self._scheme.n_stages), 2 * N_LANES), make_limits(scene)
         self._actuation = Actuation(*(np.zeros((n_limbs, 2 * N_LANES)) for _ in range(2)))
         self._q, self._v = (self._rows(value, rise) for value, rise in zip(start[1:3], slopes[1:3], strict=True))
         stages, n_free = self._scheme.n_stages, 2 * one.n_free
@@ -200,17 +201,6 @@ class _Group:
 
     def counts(self, name: str) -> NDArray[np.int64]:
         return np.array([report[name] for report in self._reports]).astype(np.int64)
-
-
-def _dual(bundle: Any) -> Any:
-    """A bundle whose rows (n, N_LANES) have zero slopes behind them."""
-    if isinstance(bundle, np.ndarray) and bundle.ndim == 2:
-        rows = aligned_rows(len(bundle), 2 * N_LANES)
-        rows[:, :N_LANES] = bundle
-        return rows
-    if hasattr(bundle, "_fields"):
-        return bundle._replace(**{name: _dual(getattr(bundle, name)) for name in bundle._fields})
-    return bundle
 
 
 def _groups(scene: Scene, start: Start, slopes: Start) -> list[_Group]:

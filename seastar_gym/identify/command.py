@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from seastar_gym.command import answered
+from seastar_gym.command import answered, command_parser
 from seastar_gym.extras import require_extra
 from seastar_gym.files import save_figure, write_json
 from seastar_gym.identify.fit import Estimate, identify
@@ -85,9 +85,7 @@ def fit(options: argparse.Namespace) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        "seastar identify", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_parser("seastar identify", __doc__)
     parser.add_argument("trajectory", nargs="?", type=Path, help="CSV file with a first line time,x0,y0,..")
     parser.add_argument("commands", nargs="?", type=Path, help="CSV file with one line of commands per stroke")
     delay = "fit how late the trajectory's clock is, too, up to this many seconds either way (default: not at all)"

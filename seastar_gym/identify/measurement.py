@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.files import beside, write_atomically
 from seastar_gym.scene.checks import is_whole_number, require_file, require_unmasked, shown
-from seastar_gym.scene.csv_rows import Row, read_numbers, read_rows
+from seastar_gym.scene.csv_rows import read_numbers, read_table
 
 Floats = NDArray[np.float64]
 
@@ -111,19 +111,18 @@ def write_trajectory(file: str | Path, time: Floats, positions: Floats, nodes: t
 
 def _read_trajectory(file: str | Path) -> tuple[Floats, Floats, tuple[int, ...]]:
     """Times [s], positions [m] and nodes of a trajectory, see `Measurement`."""
-    names, *rows = read_rows(file) or [Row(str(file), ())]
-    turns = names.fields[-1:] == ("theta",)
-    columns = names.fields[1 : len(names.fields) - turns]
+    names, rows = read_table(file)
+    turns = names[-1:] == ("theta",)
+    columns = names[1 : len(names) - turns]
     nodes = tuple(int(name[1:]) for name in columns[::2] if NODE.fullmatch(name[1:]))
     expected = ("time", *(f"{axis}{node}" for node in nodes for axis in "xy"), *(["theta"] if turns else []))
-    if not ((nodes or turns) and rows) or names.fields != expected:
+    if not ((nodes or turns) and rows) or names != expected:
         raise ValueError(f"{file}: the first line must be time,x0,y0,.. and there must be others below it.")
     for row in rows:
-        if len(row.fields) != len(expected):
-            raise row.refused(f"the line must have {len(expected)} fields, as the first one, not {len(row.fields)}")
+        row.require_fields(len(expected))
         if not row.fields[0]:
             raise row.refused("there is no time")
-    numbers = np.array([row.numbers(empty_allowed=True) for row in rows])
+    numbers = np.array([row.numbers(missing=("",)) for row in rows])
     positions = numbers[:, 1 : 1 + len(columns)].reshape(len(numbers), len(nodes), 2)
     if turns:
         positions = np.concatenate([positions, pointer(numbers[:, -1])[:, None]], axis=1)
@@ -138,13 +137,12 @@ def pointer(theta: Floats) -> Floats:
 
 def _read_commands(file: str | Path) -> tuple[Floats | None, Floats]:
     """Times [s] and commands of a file whose first line begins with "time"; None and commands of any other."""
-    names, *rows = read_rows(file) or [Row(str(file), ())]
-    if names.fields[:1] != ("time",):
+    names, rows = read_table(file)
+    if names[:1] != ("time",):
         return None, np.array(read_numbers(file, "one number per limb, every line as many"))
     for row in rows:
-        if len(row.fields) != len(names.fields):
-            raise row.refused(f"the line must have {len(names.fields)} fields, as the first one, not {len(row.fields)}")
-    if len(names.fields) < 2 or not rows:
+        row.require_fields(len(names))
+    if len(names) < 2 or not rows:
         raise ValueError(f"{file}: after time there must be one column per limb, and lines below the first.")
     numbers = np.array([row.numbers() for row in rows])
     return numbers[:, 0], numbers[:, 1:]

@@ -11,6 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from seastar_gym.identify.measurement import ORIENTATION, Measurement, pointer, require_command_times
 from seastar_gym.identify.parameters import get_parameter, with_parameters
+from seastar_gym.processors import processors
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import (
     as_finite,
@@ -178,7 +179,7 @@ def trajectories(
             *asked, [scenes[k] for k in batch], measurement.command_times, late[batch]
         )
 
-    with ThreadPoolExecutor() as pool:
+    with ThreadPoolExecutor(processors()) as pool:
         list(pool.map(simulate, batches.values()))
     return found
 

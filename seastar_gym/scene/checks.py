@@ -72,6 +72,12 @@ def require_number(name: str, value: float, unit: str, *, zero_allowed: bool = F
         raise ValueError(f"{name} must be {kind} [{unit}], not {shown(value)}.")
 
 
+def require_period(value: float | None, name: str = "decision_period") -> None:
+    """Refuse what is no time between decisions [s], and not None either, which means a stroke."""
+    if value is not None:
+        require_number(name, value, "s")
+
+
 def require_finite(name: str, value: float, unit: str) -> None:
     """Refuse what is no finite number. unit: Unit in the sentence."""
     if not is_finite_number(value):

@@ -9,7 +9,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,13 +30,18 @@ class Row(NamedTuple):
         """Error that names the line and the reason."""
         return ValueError(f"{self.where}: {reason}.")
 
+    def require_fields(self, n_fields: int, like: str = "the first one") -> None:
+        """Refuse a line that has not so many fields. like: Lines that have, for the sentence."""
+        if len(self.fields) != n_fields:
+            raise self.refused(f"the line must have {n_fields} fields, as {like}, not {len(self.fields)}")
+
     def has_names(self) -> bool:
         """Whether every field is a name: it begins with a letter, has no digit and is neither nan nor inf."""
         return all(NAME.fullmatch(field) and not NOT_FINITE.fullmatch(field) for field in self.fields)
 
-    def numbers(self, *, empty_allowed: bool = False) -> list[float]:
-        """Numbers of the line, all finite. Empty fields are NaN if they are allowed."""
-        return [math.nan if empty_allowed and not field else self._number(field) for field in self.fields]
+    def numbers(self, missing: Collection[str] = ()) -> list[float]:
+        """Numbers of the line, all finite, but NaN for fields that are one of the words `missing`, in any case."""
+        return [math.nan if field.lower() in missing else self._number(field) for field in self.fields]
 
     def integers(self) -> list[int]:
         """Numbers of the line, all whole."""
@@ -59,6 +64,12 @@ def read_rows(file: str | Path) -> list[Row]:
     if not Path(file).is_file():
         raise FileNotFoundError(f"There is no file {file}.")
     return [row for row in _rows(file) if row.fields not in ((), ("",))]
+
+
+def read_table(file: str | Path) -> tuple[tuple[str, ...], list[Row]]:
+    """Names in the first line of a file, none if it is empty, and the lines below; otherwise as `read_rows`."""
+    rows = read_rows(file)
+    return (rows[0].fields if rows else ()), rows[1:]
 
 
 def read_numbers(file: str | Path, columns: str, n_columns: int | None = None) -> list[list[float]]:

@@ -61,7 +61,7 @@ class Seastar:
         for drag and Gregory's weights for bending. With ten nodes, the chapter's robot is within a per cent of
         infinitely many.
         "chapter" joins neighbouring limbs by hinges at the hub, and lumps mass and drag at the nodes, as the chapter
-        does: with ten nodes that robot is 12 to 26 % off. With infinitely many nodes the two are the same robot.
+        does: with ten nodes that robot is 26 % off. With infinitely many nodes the two are the same robot.
         None means that a fidelity chooses it; without one it is "continuum".
     along: How an actuator's rotation is spread along its limb. None means that it turns the limb at the hub.
     stiffening: How much stiffer a limb is while its actuator is hot. None means that heat does not stiffen it.

@@ -15,12 +15,12 @@ ROUNDING = 1e-12
 """Fraction of a time. An end of a step that is no nearer to it is the next one."""
 
 
-def require_duration(duration: float, step: float) -> None:
+def require_duration(duration: float, step: float, name: str = "duration") -> None:
     """Refuse the length of an interval [s] if it is no time, or too short or too long for steps of this length [s]."""
-    require_number("duration", duration, "s")
+    require_number(name, duration, "s")
     if not SHORTEST * step <= duration <= MAX_STEPS * step:
         raise ValueError(
-            f"duration must be from {SHORTEST * step:.4g} to {MAX_STEPS * step:.4g} s, with steps of {step:.4g} s, not "
+            f"{name} must be from {SHORTEST * step:.4g} to {MAX_STEPS * step:.4g} s, with steps of {step:.4g} s, not "
             f"{duration:.4g} s."
         )
 

@@ -27,6 +27,7 @@ from seastar_gym.simulator.drive import Drive, checked_commands
 from seastar_gym.simulator.error_bars import ErrorBars, twin_scene
 from seastar_gym.simulator.growth import EnergyGrowth, is_watched
 from seastar_gym.simulator.lock import BROKEN_OFF, StrokeLock
+from seastar_gym.simulator.pauses import completed
 from seastar_gym.simulator.report import StrokeReport, make_report, warn_of_overlap
 from seastar_gym.simulator.schedule import ends_at, ends_of_parts, require_duration
 from seastar_gym.simulator.state import State, checked_state
@@ -54,7 +55,7 @@ class Simulator:
     threads: Number of threads that share the lane groups; all processors if None. A robot's trajectory is the same to
         the last bit whatever the batch, the lane and the number of threads.
     error_bars: Whether to estimate the hub's error by a twin of shorter edges and steps, see error_bars.py. It changes
-        no bit of a trajectory, and a stroke takes four to five times as long.
+        no bit of a trajectory, and a stroke takes three to five times as long.
     effort: Whether to measure the work and the largest moment of the actuators. It changes no bit of a trajectory.
     device: "cpu", "cuda" for an NVIDIA GPU with one robot per thread, or "scalar" for its twin on the processor, which
         is slow and for tests. The device changes no bit of a trajectory either, see device_batch.py.
@@ -384,12 +385,7 @@ class Simulator:
         which is another discretisation: limbs that ring faster than steps resolve then ring otherwise, by 4 % of the
         largest speed at fidelity "fast" and 11 % at "balanced", and the hub is 4e-6 and 4e-5 limb lengths away.
         """
-        try:
-            next(self._advance_pausing(duration, commands))
-        except StopIteration as over:
-            report: StrokeReport = over.value
-            return report
-        raise AssertionError("It does not pause.")
+        return completed(self._advance_pausing(duration, commands))
 
     def advance_in_parts(
         self, duration: float, commands: ArrayLike | None, parts: int

@@ -25,7 +25,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from seastar_gym.command import INTERRUPTED
+from seastar_gym.command import DEFAULT, INTERRUPTED, answered
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.executors.options import add_options, executor_of
@@ -49,30 +49,29 @@ def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         "seastar sweep", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    default = "(default: %(default)s)"
     parser.add_argument("axes", nargs="*", metavar="NAME=VALUES", help="what differs from design to design")
-    parser.add_argument("--out", type=Path, default=Path("runs/sweep"), help=f"folder of the results {default}")
+    parser.add_argument("--out", type=Path, default=Path("runs/sweep"), help=f"folder of the results {DEFAULT}")
     parser.add_argument("--scene", type=Path, help="file of the scene, .py or .json (default: the chapter's at `fast`)")
-    parser.add_argument("--gait", default="straight", help=f"what robots do, unless an axis says it {default}")
-    parser.add_argument("--settling", type=int, default=2, help=f"strokes before the measurement {default}")
-    parser.add_argument("--measured", type=int, default=8, help=f"strokes of the measurement {default}")
-    parser.add_argument("--path", default="pentagon", help=f"controllers: {PATH_HELP} {default}")
-    parser.add_argument("--seconds", type=float, default=TIME_LIMIT, help=f"controllers: time limit [s] {default}")
+    parser.add_argument("--gait", default="straight", help=f"what robots do, unless an axis says it {DEFAULT}")
+    parser.add_argument("--settling", type=int, default=2, help=f"strokes before the measurement {DEFAULT}")
+    parser.add_argument("--measured", type=int, default=8, help=f"strokes of the measurement {DEFAULT}")
+    parser.add_argument("--path", default="pentagon", help=f"controllers: {PATH_HELP} {DEFAULT}")
+    parser.add_argument("--seconds", type=float, default=TIME_LIMIT, help=f"controllers: time limit [s] {DEFAULT}")
     parser.add_argument("--decision-period", type=float, help="controllers: time between decisions [s] (default: 1)")
     parser.add_argument("--latin", type=int, default=0, metavar="N", help="designs of every combination of choices")
     parser.add_argument("--optuna", type=int, default=0, metavar="N", help="search with Optuna, N designs in all")
-    parser.add_argument("--objective", default="speed", help=f"column of results that is searched for {default}")
+    parser.add_argument("--objective", default="speed", help=f"column of results that is searched for {DEFAULT}")
     parser.add_argument("--minimize", action="store_true", help="search for the smallest, not the largest")
     parser.add_argument("--storage", help="Optuna: database (default: sqlite:///OUT/study.db)")
     parser.add_argument(
         "--stale-after", type=float, default=600.0, metavar="SECONDS",
-        help=f"Optuna: proposals without result for so long are put back {default}",
+        help=f"Optuna: proposals without result for so long are put back {DEFAULT}",
     )  # fmt: skip
-    parser.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn {default}")
-    parser.add_argument("--robots", type=int, default=256, help=f"designs of a batch at most {default}")
+    parser.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn {DEFAULT}")
+    parser.add_argument("--robots", type=int, default=256, help=f"designs of a batch at most {DEFAULT}")
     parser.add_argument(
         "--device", choices=("cpu", *DEVICES), default="cpu",
-        help=f"where robots swim, to the same bits: cuda is a GPU, with --robots 16384 --workers 1 {default}",
+        help=f"where robots swim, to the same bits: cuda is a GPU, with --robots 16384 --workers 1 {DEFAULT}",
     )  # fmt: skip
     add_options(parser, "batches", "processes")
     parser.add_argument("--count", action="store_true", help="say how many designs and batches there are, and stop")
@@ -162,12 +161,13 @@ def search(sweep: Sweep, options: argparse.Namespace) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     options = make_parser().parse_args(arguments)
-    try:
+
+    def work() -> int:
         sweep = sweep_of(options, tuple(map(axis_of, options.axes)))
         return search(sweep, options) if options.optuna else run_sweep(sweep, options)
-    except (ValueError, ModuleNotFoundError) as bad_input:
-        print(bad_input, file=sys.stderr)
-        return 2
+
+    try:
+        return answered(work)
     except KeyboardInterrupt:
         print(f"Interrupted: all finished batches are in {shown(str(options.out))}, and the same command goes on.",
               file=sys.stderr)  # fmt: skip

@@ -10,17 +10,17 @@ import numpy as np
 
 from seastar_gym import renamed
 from seastar_gym.controllers.contract import Policy, require_fit
-from seastar_gym.controllers.learned import bundled_file, load
-from seastar_gym.controllers.registry import AGENTS, files_of, load_agent
+from seastar_gym.controllers.learned import load
+from seastar_gym.controllers.registry import AGENTS, files_of, learned_file, load_agent
 from seastar_gym.controllers.scripted import scripted
-from seastar_gym.envs.commands import checked_decision_period, unless_strokes
+from seastar_gym.envs.commands import checked_decision_period, decisions_in, unless_strokes
 from seastar_gym.envs.options import Path as SwimPath
 from seastar_gym.envs.paths import make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.many import HELD_OUT_SEED
-from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
+from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_number, shown
+from seastar_gym.scene.checks import require_number, require_period, shown
 
 __getattr__ = renamed.names_of(__name__)
 
@@ -41,8 +41,7 @@ class Route:
     def __post_init__(self) -> None:
         require_number("seconds", self.seconds, "s")
         make_path(self.path, np.random.default_rng(HELD_OUT_SEED))
-        if self.decision_period is not None:
-            require_number("decision_period", self.decision_period, "s")
+        require_period(self.decision_period)
 
 
 @dataclass(frozen=True)
@@ -79,9 +78,9 @@ def controller_of(name: Any, route: Route, scene: Scene) -> Controller:
         raise ValueError(f"A controller is the name of an agent, such as learned, not {shown(name)}.")
     seconds = checked_decision_period(route.decision_period, scene)
     period = unless_strokes(seconds, scene)
-    files = files_of(name, period)
-    if name == "learned" or name.endswith(".safetensors"):
-        policy = load(bundled_file(period) if name == "learned" else name)
+    files, file = files_of(name, period), learned_file(name, period)
+    if file is not None:
+        policy = load(file)
         require_fit(policy, scene, policy.actions, period)
     elif name not in AGENTS and not files:
         scripted(name, n_limbs=scene.robot.n_limbs, decision_period=period)

@@ -22,7 +22,7 @@ from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, save
 from seastar_gym.controllers.registry import load_agents
 from seastar_gym.controllers.scripted import scripted
-from seastar_gym.envs.commands import Actions, action_space, to_commands
+from seastar_gym.envs.commands import Actions, action_space, decisions_in, to_commands
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.paths import PENTAGON_SIDE, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -34,7 +34,7 @@ from seastar_gym.evaluation.films import CLOSING_SECONDS
 from seastar_gym.evaluation.measures import MEASURES, SECONDS, measure_of, measure_of_challenge
 from seastar_gym.evaluation.pictures import COLOURS, FPS, FRAMES_PER_STROKE
 from seastar_gym.evaluation.rollout import Episodes, TaskBatch, rollout
-from seastar_gym.evaluation.swim import RECORDED, Swim, decisions_in, swim, swims_of
+from seastar_gym.evaluation.swim import RECORDED, Swim, swim, swims_of
 from seastar_gym.evaluation.tasks import make_batch
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -339,7 +339,7 @@ def ragged_path(folder):
         (lambda folder: ["--agents", "rest", "rest"], "'rest' is named twice"),
         (lambda folder: ["--path", "hexagon"], "Unknown path 'hexagon'"),
         (lambda folder: ["--path", ragged_path(folder)], "ragged.csv, line 2: every line must have x and y"),
-        (lambda folder: ["--max-strokes", "0"], "--max-strokes must be at least 1"),
+        (lambda folder: ["--max-strokes", "0"], "--max-strokes must be a whole number from 1"),
         (lambda folder: ["--waypoint-radius", "-1"], "--waypoint-radius must be"),
         (lambda folder: ["--fidelity", "fast", "balanced"], "Several fidelities are for --sets"),
         (lambda folder: ["--sets", "nominal"], "needs a folder, --out, and a path, no --sets"),

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from seastar_gym.command import answered, command_parser
+from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.identify.measurement import Measurement, write_trajectory
 from seastar_gym.identify.tracks.deeplabcut import LIKELIHOOD, read_deeplabcut
 from seastar_gym.identify.tracks.motive import read_motive
@@ -43,7 +43,6 @@ ASSIGNED = re.compile(r"(.+)=(hub|tip([1-9][0-9]{0,2})|[0-9]{1,5})")
 
 def parser() -> argparse.ArgumentParser:
     """Parser of the options."""
-    default = "(default: %(default)s)"
     found = command_parser("seastar track2csv", __doc__)
     found.add_argument("file", type=Path, help="file of the tracker")
     found.add_argument("--from", dest="format", choices=READERS, required=True, help="format of the file")
@@ -55,10 +54,10 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--metres-per-pixel", type=float, help="size of a pixel; y of pictures points down")
     found.add_argument("--homography", type=Path, help="CSV file with u,v,x,y of four points or more")
     found.add_argument("--individual", help="one of several animals of deeplabcut or tracks of sleap")
-    sure = f"points of deeplabcut below this likelihood were not seen {default}"
+    sure = f"points of deeplabcut below this likelihood were not seen {DEFAULT}"
     found.add_argument("--likelihood", type=float, default=LIKELIHOOD, help=sure)
-    found.add_argument("--up", choices=("y", "z"), default="y", help=f"axis of motive that points up {default}")
-    rest = f"time for which the robot is at rest at the beginning [s]; 0 is the first picture {default}"
+    found.add_argument("--up", choices=("y", "z"), default="y", help=f"axis of motive that points up {DEFAULT}")
+    rest = f"time for which the robot is at rest at the beginning [s]; 0 is the first picture {DEFAULT}"
     found.add_argument("--rest", type=float, default=0.0, help=rest)
     found.add_argument("--aligned", action="store_true", help="the robot begins at the origin, limb 1 along +x")
     return found

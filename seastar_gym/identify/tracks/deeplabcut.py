@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from seastar_gym.identify.tracks.track import Track, chosen_individual, seen_numbers
+from seastar_gym.identify.tracks.track import NOT_SEEN, Track, chosen_individual
 from seastar_gym.scene.checks import require_file, require_number, require_within
 from seastar_gym.scene.csv_rows import Row, read_rows
 
@@ -63,6 +63,5 @@ def _columns(
 
 def _frame(row: Row, n_fields: int) -> list[float]:
     """Number of a picture and its coordinates."""
-    if len(row.fields) != n_fields:
-        raise row.refused(f"the line must have {n_fields} fields, as the headers, not {len(row.fields)}")
-    return seen_numbers(row)
+    row.require_fields(n_fields, "the headers")
+    return row.numbers(NOT_SEEN)

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.identify.tracks.track import Track, seen_numbers
+from seastar_gym.identify.tracks.track import NOT_SEEN, Track
 from seastar_gym.scene.checks import require_choice, require_file
 from seastar_gym.scene.csv_rows import Row, read_rows
 
@@ -78,7 +78,7 @@ def _columns(headers: Sequence[Row]) -> dict[tuple[str, str], dict[tuple[str, st
 def _numbers(rows: Sequence[Row], columns: Sequence[int]) -> Floats:
     """Numbers of some columns, shape (n_rows, n_columns); NaN where a line is shorter."""
     padded = ((row, dict(enumerate(row.fields))) for row in rows)
-    return np.array([seen_numbers(Row(row.where, tuple(of.get(k, "") for k in columns))) for row, of in padded])
+    return np.array([Row(row.where, tuple(of.get(k, "") for k in columns)).numbers(NOT_SEEN) for row, of in padded])
 
 
 def _from_above(places: Floats, up: Up) -> Floats:

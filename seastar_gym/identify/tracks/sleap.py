@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.extras import require_extra
-from seastar_gym.identify.tracks.track import Track, chosen_individual, seen_numbers
+from seastar_gym.identify.tracks.track import NOT_SEEN, Track, chosen_individual
 from seastar_gym.scene.checks import require_file, require_number
-from seastar_gym.scene.csv_rows import Row, read_rows
+from seastar_gym.scene.csv_rows import read_table
 
 FIRST = ("track", "frame_idx", "instance.score")
 """First columns of a CSV file."""
@@ -32,17 +32,16 @@ def read_sleap(file: str | Path, rate: float, individual: str | None = None) -> 
 
 
 def _read_csv(file: str | Path, rate: float, individual: str | None) -> Track:
-    names, *rows = read_rows(file) or [Row(str(file), ())]
-    columns = {name: column for column, name in enumerate(names.fields)}
-    parts = [name[:-2] for name in names.fields if name.endswith(".x") and f"{name[:-2]}.y" in columns]
-    if names.fields[:3] != FIRST or not parts or not rows:
+    names, rows = read_table(file)
+    columns = {name: column for column, name in enumerate(names)}
+    parts = [name[:-2] for name in names if name.endswith(".x") and f"{name[:-2]}.y" in columns]
+    if names[:3] != FIRST or not parts or not rows:
         raise ValueError(f"{file}: the first line must be {','.join(FIRST)}, then nodes, as SLEAP writes it.")
     chosen = chosen_individual(file, list(dict.fromkeys(row.fields[0] for row in rows)), individual)
     rows = [row for row in rows if row.fields[0] == chosen]
     for row in rows:
-        if len(row.fields) != len(names.fields):
-            raise row.refused(f"the line must have {len(names.fields)} fields, as the first one, not {len(row.fields)}")
-    numbers = np.array([seen_numbers(row._replace(fields=("0", *row.fields[1:]))) for row in rows])
+        row.require_fields(len(names))
+    numbers = np.array([row._replace(fields=("0", *row.fields[1:])).numbers(NOT_SEEN) for row in rows])
     numbers = numbers[np.argsort(numbers[:, 1], kind="stable")]
     points = {part: numbers[:, [columns[f"{part}.x"], columns[f"{part}.y"]]] for part in parts}
     return Track(numbers[:, 1] / rate, points, {})

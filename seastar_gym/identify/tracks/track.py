@@ -1,6 +1,5 @@
 """`Track`: points and orientations over time, as a tracker saw them, and as they are from a robot at rest."""
 
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -11,12 +10,11 @@ from numpy.typing import NDArray
 from seastar_gym.identify.measurement import ORIENTATION, pointer
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_kind
-from seastar_gym.scene.csv_rows import Row
 
 Floats = NDArray[np.float64]
 
-NAN = re.compile("nan|none|", re.IGNORECASE)
-"""Fields of a file that are no number, of what was not seen."""
+NOT_SEEN = ("", "nan", "none")
+"""Fields of a file of what was not seen."""
 
 
 class Track(NamedTuple):
@@ -37,12 +35,6 @@ class Seen(NamedTuple):
 
     positions: Floats
     nodes: tuple[int, ...]
-
-
-def seen_numbers(row: Row) -> list[float]:
-    """Numbers of a line; NaN for an empty field and for the words nan and none."""
-    empty = (field if NAN.fullmatch(field) is None else "" for field in row.fields)
-    return row._replace(fields=tuple(empty)).numbers(empty_allowed=True)
 
 
 def chosen_individual(file: str | Path, known: Sequence[str | None], individual: str | None) -> str | None:
