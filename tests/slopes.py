@@ -11,6 +11,8 @@ from seastar_gym.simd.numpy_lanes import Lanes, Mask
 
 NO_RODS, NO_WORK = (bundle(*[None] * len(bundle._fields)) for bundle in (Rods, Work))
 """Bundles of scenes that name nothing."""
+NOTHING = (Lanes(0.0), (Lanes(0.0), Lanes(0.0)), (Lanes(0.0), Lanes(0.0), Lanes(0.0)))
+"""Energy, force and Hessian of a node on which nothing acts."""
 
 
 def slope(f: Callable[[Any], Any], x: Any, step: float) -> np.ndarray:

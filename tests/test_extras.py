@@ -88,13 +88,27 @@ def test_a_command_keeps_its_exit_code():
         assert ended.value.code == code
 
 
-@pytest.mark.parametrize("command", STUDIES)
-def test_a_study_without_its_extra_says_how_to_get_it(command, tmp_path):
-    assert_says(python(tmp_path, OF_STUDIES, "-m", command, "--help"), "studies", OF_STUDIES)
+PICTURE = (
+    "import gymnasium, seastar_gym\n"
+    "try: env = gymnasium.make('SeastarSwim-v0', render_mode='rgb_array'); env.reset(seed=0); env.render()\n"
+    "except ImportError as missing: raise SystemExit(str(missing))"
+)
+WITHOUT = [
+    *(("studies", OF_STUDIES, ("-m", command, "--help")) for command in STUDIES),
+    *(("train", OF_TRAIN, ("-m", command, "--help")) for command in AGENTS),
+    *(("train", missing, ("train.py", "--help"))
+      for missing in (("tyro",), ("tensorboard",), ("torch", "stable_baselines3"), ("plotly",))),
+    ("train", ("torch", "stable_baselines3"), ("-m", "studies.learning.robustness", "--help")),
+    ("sweep", ("pyarrow",), ("-m", "seastar_gym.sweep", "--help")),
+    ("studies", ("matplotlib",), ("-m", "seastar_gym.identify", "--synthetic", "--picture", "fit.png")),
+    ("render", ("pygame",), ("-c", PICTURE)),
+]  # fmt: skip
+"""Extra, modules that are missing without it, and a command that needs them."""
 
 
-def test_a_sweep_without_its_extra_says_how_to_get_it(tmp_path):
-    assert_says(python(tmp_path, ("pyarrow",), "-m", "seastar_gym.sweep", "--help"), "sweep", ("pyarrow",))
+@pytest.mark.parametrize("extra, missing, command", WITHOUT)
+def test_a_command_without_its_extra_says_how_to_get_it(extra, missing, command, tmp_path):
+    assert_says(python(tmp_path, missing, *command), extra, missing)
 
 
 def test_sweeps_need_no_optuna_and_searches_say_how_to_get_it(tmp_path):
@@ -125,37 +139,6 @@ def test_an_executor_without_its_extra_says_how_to_get_it(extra, module, tmp_pat
     done = python(tmp_path, (module,), *words)
     assert done.returncode == 2
     assert done.stderr.splitlines()[-1].endswith(f'need {module}: pip install "seastar-gym[{extra}]".')
-
-
-@pytest.mark.parametrize("command", AGENTS)
-def test_an_agent_s_command_without_its_extra_says_how_to_get_it(command, tmp_path):
-    assert_says(python(tmp_path, OF_TRAIN, "-m", command, "--help"), "train", OF_TRAIN)
-
-
-@pytest.mark.parametrize(
-    "missing", [("tyro",), ("tensorboard",), ("torch", "stable_baselines3"), ("plotly",)]
-)
-def test_train_without_a_part_of_its_extra_says_how_to_get_it(missing, tmp_path):
-    assert_says(python(tmp_path, missing, "train.py", "--help"), "train", missing)
-
-
-def test_trainings_side_by_side_need_torch(tmp_path):
-    missing = ("torch", "stable_baselines3")
-    assert_says(python(tmp_path, missing, "-m", "studies.learning.robustness", "--help"), "train", missing)
-
-
-def test_a_picture_of_a_fit_says_what_it_needs_before_it_fits(tmp_path):
-    command = "-m", "seastar_gym.identify", "--synthetic", "--picture", "fit.png"
-    assert_says(python(tmp_path, ("matplotlib",), *command), "studies", ("matplotlib",))
-
-
-def test_rendering_without_pygame_says_how_to_get_it(tmp_path):
-    code = (
-        "import gymnasium, seastar_gym\n"
-        "try: env = gymnasium.make('SeastarSwim-v0', render_mode='rgb_array'); env.reset(seed=0); env.render()\n"
-        "except ImportError as missing: raise SystemExit(str(missing))"
-    )
-    assert_says(python(tmp_path, ("pygame",), "-c", code), "render", ("pygame",))
 
 
 def test_importing_a_study_without_its_extra_is_a_missing_module(tmp_path):

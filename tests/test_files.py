@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
+from seastar_gym.accuracy import timed_certificate
+from seastar_gym.accuracy.command import draw
 from seastar_gym.benchmark.command import publish
 from seastar_gym.benchmark.results import Entry
 from seastar_gym.controllers.learned import load, save
@@ -107,6 +109,18 @@ def test_whatever_goes_wrong_leaves_the_file_as_it_was(failure, tmp_path):
     assert (tmp_path / "file").read_text() == "before" and names(tmp_path) == {"file"}
 
 
+def test_a_file_that_a_full_disk_does_not_take_is_as_it_was(tmp_path, monkeypatch):
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
+
+    (tmp_path / "file").write_text("before")
+    monkeypatch.setattr("os.fsync", full)
+    for name in ("file", "new"):
+        with pytest.raises(OSError, match="No space left"):
+            write_atomically(tmp_path / name, b"after")
+    assert (tmp_path / "file").read_text() == "before" and names(tmp_path) == {"file"}
+
+
 def swims():
     hub, ends, one = np.array([[0.0, 0.0], [0.01, 0.0]]), np.array([0, 1]), np.zeros(1)
     return [Swim("a$b", hub[1:], hub, ends, ends.astype(float), one, one, one, None)]
@@ -137,6 +151,8 @@ WRITERS = {
     "benchmark.md": lambda file: publish([ENTRY], file.parent, "command"),
     "profiles.png": lambda file: publish([ENTRY, replace(ENTRY, agent="b")], file.parent, "command"),
     "config.json": lambda file: write_json(file, {"a": 1}),
+    "certificate.json": lambda file: timed_certificate(0.2).save(file),
+    "certificate.png": lambda file: draw(timed_certificate(0.2), file),
 }
 
 

@@ -31,6 +31,7 @@ from agents.training.efficiency import Efficiency
 from agents.training.folder import held, recorded
 from agents.training.options import Options, read_options, saved_options
 from agents.training.robot import robot_of
+from refusals import assert_told
 from seastar_gym import DomainRandomization, Numerics, Scene, Seastar, Uniform
 from seastar_gym.controllers import learned as policies
 from seastar_gym.controllers.checkpoint import load
@@ -276,8 +277,7 @@ def test_ctrl_c_leaves_a_usable_model_and_says_how_to_go_on(tmp_path, stopped, s
 def test_a_folder_without_a_run_cannot_be_resumed(tmp_path, capsys, make, sentence):
     make(tmp_path)
     assert train.main(["--resume", str(tmp_path)]) == 2
-    error = capsys.readouterr().err
-    assert sentence in error and error.count("\n") == 1
+    assert_told(capsys, sentence)
 
 
 def test_a_run_without_its_model_cannot_be_resumed(finished, tmp_path, capsys):
@@ -308,10 +308,10 @@ def test_two_never_train_in_one_folder(finished, tmp_path, capsys):
     before = (finished / "progress.csv").read_text()
     with held(finished, new=False):
         assert train.main(["--resume", str(finished), "--strokes", "1024"]) == 2
-        assert_one_sentence(capsys, "Another process trains in", str(finished))
+        assert_told(capsys, "Another process trains in", str(finished))
     with held(tmp_path / "new", new=True):
         assert train.main([*TINY, "--strokes", "128", "--out", str(tmp_path / "new")]) == 2
-        assert_one_sentence(capsys, "Another process trains in")
+        assert_told(capsys, "Another process trains in")
     assert (finished / "progress.csv").read_text() == before and not list((tmp_path / "new").iterdir())
     with held(finished, new=False):
         pass
@@ -335,7 +335,7 @@ def test_a_folder_with_links_is_not_continued(name, kind, finished, tmp_path, ca
     else:
         place.symlink_to(somebodys / {"link": "file", "dangling": "new", "folder of somebody": ""}[kind])
     assert train.main(["--resume", str(folder), "--strokes", "1024"]) == 2
-    assert_one_sentence(capsys)
+    assert_told(capsys)
     assert [file.name for file in somebodys.iterdir()] == ["file"] and (somebodys / "file").read_text() == "work"
 
 
@@ -404,7 +404,7 @@ def test_a_damaged_folder_is_refused_in_a_sentence(damage, finished, tmp_path, c
     shutil.copytree(finished, folder)
     damage(folder)
     assert train.main(["--resume", str(folder), "--strokes", "1024"]) == 2
-    assert_one_sentence(capsys)
+    assert_told(capsys)
 
 
 def test_a_checkpoint_that_a_kill_cut_short_is_completed(finished, tmp_path):
@@ -421,19 +421,12 @@ def test_a_checkpoint_that_a_kill_cut_short_is_completed(finished, tmp_path):
 # What cannot be
 
 
-def assert_one_sentence(capsys, *words):
-    printed = capsys.readouterr().err
-    assert printed.count("\n") == 1 and printed.endswith(".\n"), printed
-    for word in words:
-        assert word in printed, printed
-
-
 @pytest.mark.parametrize("out", ["taken/run", "taken", "\0", "x" * 300, "/proc/none/run", "/dev/full/run", ""])
 def test_a_folder_that_cannot_be_is_refused_in_a_sentence(out, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "taken").write_text("a file")
     assert train.main([*TINY, "--strokes", "128", "--out", out]) in (1, 2)
-    assert_one_sentence(capsys)
+    assert_told(capsys)
 
 
 @pytest.mark.parametrize(
@@ -455,7 +448,7 @@ def test_a_disk_that_refuses_is_said_in_a_sentence(call, at, code, tmp_path, cap
     with monkeypatch.context() as broken:
         broken.setattr(os, call, refuse)
         assert train.main([*TINY, "--strokes", "256", "--out", str(tmp_path / "run")]) == 1
-    assert_one_sentence(capsys, "Cannot write", os.strerror(code).lower())
+    assert_told(capsys, "Cannot write", os.strerror(code).lower())
     assert not list(tmp_path.rglob("*.part"))
     again = ["--resume", str(tmp_path / "run")]
     if not (tmp_path / "run" / "config.json").exists():
@@ -467,7 +460,7 @@ def test_a_disk_that_refuses_is_said_in_a_sentence(call, at, code, tmp_path, cap
 def test_a_device_that_is_not_there_is_refused_before_anything_is_written(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(train.torch.cuda, "is_available", lambda: False)
     assert train.main([*TINY, "--device", "cuda", "--out", str(tmp_path / "run")]) == 2
-    assert_one_sentence(capsys, "There is no CUDA device")
+    assert_told(capsys, "There is no CUDA device")
     assert not (tmp_path / "run").exists()
     with pytest.raises(SystemExit) as refused:
         train.main([*TINY, "--device", "toaster", "--out", str(tmp_path / "run")])
@@ -517,9 +510,9 @@ def test_a_box_that_cannot_be_read_is_not_overwritten_at_once(finished, box):
 
 def test_a_quick_run_is_asked_twice_before_it_begins(tmp_path, capsys):
     assert train.main(["--quick", "--publish", "--out", str(tmp_path / "run")]) == 2
-    assert_one_sentence(capsys, "only with --publish-anyway")
+    assert_told(capsys, "only with --publish-anyway")
     assert train.main(["--publish-anyway", "--out", str(tmp_path / "run")]) == 2
-    assert_one_sentence(capsys, "give both")
+    assert_told(capsys, "give both")
     assert not (tmp_path / "run").exists()
 
 

@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 import subprocess
 import sys
 import warnings
@@ -242,22 +241,6 @@ def test_a_file_of_anything_else_is_no_certificate(tmp_path, text):
         Certificate.load("no\0file.json")
 
 
-def test_a_certificate_is_written_all_at_once(certificate, tmp_path, monkeypatch):
-    """A write that breaks off leaves the file that was there."""
-    certificate.save(tmp_path / "mine.json")
-
-    def full_disk(*_):
-        raise OSError("no space left")
-
-    monkeypatch.setattr(os, "fsync", full_disk)
-    with pytest.raises(OSError, match="no space left"):
-        replace(certificate, machine="another").save(tmp_path / "mine.json")
-    with pytest.raises(OSError, match="no space left"):
-        command.draw(certificate, tmp_path / "mine.png")
-    assert Certificate.load(tmp_path / "mine.json") == certificate
-    assert [each.name for each in tmp_path.iterdir()] == ["mine.json"]
-
-
 def test_the_environment_tells_the_errors_of_a_certified_scene(certificate, tmp_path):
     setting = certificate.settings[2]
     certificate.save(tmp_path / "mine.json")
@@ -286,21 +269,15 @@ def test_a_setting_that_a_certificate_has_not_is_promised_nothing_and_a_warning_
 
 
 @pytest.mark.parametrize("other", [Scene(), replace(SCENE, contact=Contact()), replace(SCENE, actuator=SmaPulse(0.5))])
-def test_a_certificate_lapses_for_another_scene(certificate, other):
-    with assert_refused("of another scene"):
-        gym.make("SeastarSwim-v0", scene=other, certificate=certificate)
-
-
-def test_a_certificate_lapses_with_the_version(certificate):
-    with assert_refused("of version 0.0.1"):
-        gym.make("SeastarSwim-v0", scene=SCENE, certificate=replace(certificate, version="0.0.1"))
-
-
-def test_a_certificate_is_one_or_a_file_of_one():
-    with assert_refused("certificate must be a Certificate"):
-        gym.make("SeastarSwim-v0", certificate=3)
-    with assert_refused("cannot be read"):
-        gym.make("SeastarSwim-v0", certificate="not there.json")
+def test_a_certificate_lapses_for_another_scene_and_with_the_version_and_is_one(certificate, other):
+    for scene, given, words in (
+        (other, certificate, "of another scene"),
+        (SCENE, replace(certificate, version="0.0.1"), "of version 0.0.1"),
+        (None, 3, "certificate must be a Certificate"),
+        (None, "not there.json", "cannot be read"),
+    ):
+        with assert_refused(words):
+            gym.make("SeastarSwim-v0", scene=scene, certificate=given)
 
 
 def test_a_fidelity_for_an_uncertified_scene_warns_with_the_command_that_measures_it():
@@ -342,27 +319,6 @@ def test_wires_of_the_chapters_robot_need_no_certificate_in_time_and_others_are_
         gym.make("SeastarSwim-v0", scene=scene, fidelity="fast", decision_period=0.2)
     with pytest.warns(UserWarning, match=r"info has no errors: error_bars=True"):
         gym.make("SeastarSwim-v0", scene=replace(SCENE, actuator=SmaWires()), fidelity="fast", decision_period=0.2)
-
-
-def test_scenes_without_one_answer_are_refused():
-    for scene, word in (
-        (Scene(Seastar(limb_length=np.array([0.1, 0.2]))), "of_robot"),
-        (Scene(held_nodes=(0,)), "Held and loaded nodes"),
-        (Scene(actuator=SmaPulse(0.0)), "Nothing moves"),
-        (Scene(limb_strengths=(0.0,) * 5), "Nothing moves"),
-        (3, "needs a Scene"),
-    ):
-        with assert_refused(word):
-            seastar_gym.certify(scene)
-    with assert_refused("samples"):
-        seastar_gym.certify(Scene(), samples=1)
-
-
-def test_confidence_is_that_of_the_largest_of_so_many_samples(certificate):
-    assert replace(certificate, samples=100_000).samples == 100_000
-    with assert_refused("samples"):
-        replace(certificate, samples=100_001)
-    assert replace(certificate, samples=60).confidence() == pytest.approx(0.954, abs=1e-3)
 
 
 def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monkeypatch, capsys):
@@ -437,7 +393,8 @@ def test_what_no_certificate_can_hold_is_refused(certificate, change, words):
     with assert_refused("settings must have errors of the same classes"):
         fewer = {name: getattr(first, name) | {"own": 0.1} for name in ("errors", "typical")}
         replace(certificate, settings=(replace(first, **fewer), *others))
-    assert replace(certificate, samples=2, limit_error=0.0, decision_period=0.1).samples == 2
+    for samples in (2, 100_000):
+        assert replace(certificate, samples=samples, limit_error=0.0, decision_period=0.1).samples == samples
 
 
 @pytest.mark.parametrize(
@@ -481,6 +438,8 @@ def test_what_no_setting_can_have_is_refused(certificate, change, words):
 def test_a_scene_that_has_no_certificate_is_refused(scene, words):
     with assert_refused(words):
         seastar_gym.certify(scene)
+    with assert_refused("samples"):
+        seastar_gym.certify(Scene(), samples=1)
 
 
 def test_the_confidence_is_that_of_so_many_sequences(certificate):

@@ -223,25 +223,25 @@ def test_for_error_of_a_robot_keeps_its_resolution(robot):
     assert path_error(scene) <= 0.02
 
 
-def test_for_error_refuses_ten_of_the_chapters_nodes_what_none_of_their_steps_can_keep():
-    with pytest.raises(ValueError, match=r"^No measured setting keeps the path error below 1 %"):
-        Scene.for_error(0.01, robot=Seastar(nodes_per_limb=10, discretisation="chapter"))
+TEN, NINE = (Seastar(nodes_per_limb=n, discretisation=kind) for n, kind in ((10, "chapter"), (9, "continuum")))
 
 
-@pytest.mark.parametrize("robot", [Seastar(youngs_modulus=2e6), Seastar(n_limbs=3), "seastar", 10])
-def test_for_error_refuses_another_robot(robot):
-    with pytest.raises(ValueError, match=r"^(The certificate is of the chapter's|robot must be a Seastar).*\.$"):
-        Scene.for_error(0.01, robot=robot)
-
-
-def test_for_error_refuses_hub_hinges_that_were_not_measured():
-    with assert_refused('hub_hinge="opening"'):
-        Scene.for_error(0.9, robot=Seastar(discretisation="chapter", hub_hinge="turning"))
-
-
-def test_for_error_refuses_numbers_of_nodes_that_were_not_measured():
-    with pytest.raises(ValueError, match=r"^Errors were measured with 6, 7, .* not with 9\.$"):
-        Scene.for_error(0.01, robot=Seastar(nodes_per_limb=9, discretisation="continuum"))
+@pytest.mark.parametrize(
+    "error, robot, sentence",
+    [
+        (0.01, TEN, "No measured setting keeps the path error below 1 %"),  # with none of their steps
+        (0.01, NINE, r"Errors were measured with 6, 7, .* not with 9\.$"),
+        (0.01, Seastar(youngs_modulus=2e6), "The certificate is of the chapter's"),
+        (0.01, Seastar(n_limbs=3), "The certificate is of the chapter's"),
+        (0.9, Seastar(discretisation="chapter", hub_hinge="turning"), '.*hub_hinge="opening"'),
+        (0.01, "seastar", "robot must be a Seastar"),
+        (0.01, 10, "robot must be a Seastar"),
+    ],
+)
+def test_for_error_refuses_another_robot_and_what_was_not_measured(error, robot, sentence):
+    with pytest.raises(ValueError, match=rf"^{sentence}") as refusal:
+        Scene.for_error(error, robot=robot)
+    assert str(refusal.value).endswith(".")
 
 
 @pytest.mark.parametrize("any_gait", [False, True])

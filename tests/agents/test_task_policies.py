@@ -1,7 +1,6 @@
 """Policies of tasks: they remember on disk as their learners do, and the box has one for every task that is kept."""
 
 import hashlib
-import json
 
 import gymnasium as gym
 import numpy as np
@@ -21,7 +20,6 @@ from seastar_gym.envs.symmetry import VectorFrameStack
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.evaluation.tasks import make_batch, require_seen, swim_episodes
-from seastar_gym.scene.checks import shown
 
 IDS = list(RECIPES)
 
@@ -75,55 +73,19 @@ def test_one_robot_is_told_what_a_batch_is():
     assert not np.array_equal(one[0][0, 0], one[0][0, 1])
 
 
-def test_a_policy_of_another_task_is_refused():
-    _, policy = small_policy("SeastarFailBlind-v0", "PPO")
-    with assert_refused("The policy was trained for the task fail-blind, the environment's is station."):
-        require_seen(policy, gym.make("SeastarStation-v0").unwrapped)
-
-
-def test_a_policy_of_another_task_with_observations_as_long_is_refused():
+def test_a_policy_of_another_task_is_refused_with_observations_as_long_too():
     """Miswired and Station show as many numbers, and Prey as many as waypoints; numbers of a task may differ."""
     miswired, prey = (load(file_of(f"Seastar{task}-v0", TASKS)) for task in ("Miswired", "Prey"))
     station, swim_env = gym.make("SeastarStation-v0").unwrapped, gym.make("SeastarSwim-v0", actions="pairs").unwrapped
     assert miswired.description.observation_size == station.observation_space.shape[0]
-    with assert_refused("The policy was trained for the task miswired, the environment's is station."):
-        require_seen(miswired, station)
+    for name, policy in (("miswired", miswired), ("fail-blind", small_policy("SeastarFailBlind-v0", "PPO")[1])):
+        with assert_refused(f"The policy was trained for the task {name}, the environment's is station."):
+            require_seen(policy, station)
     for ask in (lambda: require_seen(prey, swim_env), lambda: swim("prey", prey, swim_env, max_strokes=1)):
         with assert_refused("The policy was trained for the task prey, the environment's is waypoints."):
             ask()
     require_seen(prey, gym.make("SeastarPrey-v0", task=Prey(speed=(0.001, 0.002)), fidelity="fast").unwrapped)
     require_seen(load(), gym.make("SeastarPrey-v0").unwrapped)
-
-
-@pytest.mark.parametrize(
-    ("change", "sentence"),
-    [
-        ({"task": "chess"}, "its task must be one of"),
-        ({"task": [1]}, "its task must be one of"),
-        ({"past": -1}, "its past must be a whole number"),
-        ({"past": 10**9}, "its past must be a whole number"),
-        ({"past": True}, "its past must be a whole number"),
-        ({"past": False}, "its past must be a whole number"),
-        ({"symmetry": False}, "a policy without symmetry has no past"),
-        ({"limb_mirror": 3}, "its limb_mirror must be a list of pairs"),
-        ({"limb_mirror": [[0, 2]]}, "not an index and a sign"),
-        ({"limb_mirror": [[5, 1]]}, "an index of its limb_mirror must be a whole number"),
-        ({"limb_mirror": [[1, 1], [1, 1]]}, "its limb_mirror is no mirror, which undoes itself"),
-        ({"limb_mirror": [[1, 1], [0, -1]]}, "its limb_mirror is no mirror, which undoes itself"),
-        ({"own": {"kinds": ["spin"], "with_stations": True}}, "the kinds of its own numbers must be of"),
-        ({"own": {"kinds": []}}, "its own must be an object with kinds and with_stations"),
-        ({"own": {"kinds": [["scalar"]], "with_stations": True}}, "the kinds of its own numbers must be of"),
-    ],
-    ids=lambda value: shown(value) if isinstance(value, dict) else "",
-)
-def test_odd_facts_of_a_task_are_refused_in_a_sentence(change, sentence, tmp_path):
-    _, policy = small_policy("SeastarFailBlind-v0", "PPO, memory")
-    file = tmp_path / "policy.safetensors"
-    save(policy, file)
-    facts = json.loads(file.with_suffix(".json").read_text())
-    file.with_suffix(".json").write_text(json.dumps(facts | change))
-    with assert_refused(sentence):
-        load(file)
 
 
 def test_the_command_trains_compares_seeds_and_writes_a_card(monkeypatch, tmp_path, capsys):

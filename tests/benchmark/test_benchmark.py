@@ -1,6 +1,5 @@
 """The benchmark measures any agent on any registered task, and its results can be merged."""
 
-import itertools
 import json
 import math
 import os
@@ -12,7 +11,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from refusals import assert_refused
+from losing import LOST, Interrupted, Losing, first
+from refusals import assert_refused, assert_told
 from seastar_gym import Scene, __version__
 from seastar_gym.benchmark import page
 from seastar_gym.benchmark.command import main
@@ -25,8 +25,6 @@ from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.measures import MEASURES, SECONDS, measure_of
 from seastar_gym.evaluation.tasks import make_batch, require_seen, swim_episodes, task_ids
-from seastar_gym.executors import Outcome
-from seastar_gym.executors.here import Here
 
 ROOT = Path(__file__).resolve().parents[2]
 SWIM, SHORT, OTHER = "SeastarSwim-v0", "SeastarShort-v0", "SeastarDrift-v0"
@@ -192,8 +190,7 @@ def test_results_of_another_version_or_measure_are_not_merged(tmp_path, capsys):
     ):
         write([entry(**{"measure": SECONDS.name} | wrong)], file)
         assert main([*arguments, str(file)]) == 2
-        said = capsys.readouterr().err
-        assert sentence in said and said.count("\n") == 1, said
+        assert_told(capsys, sentence)
         assert not (tmp_path / "out").exists()
 
 
@@ -268,50 +265,22 @@ def test_results_are_the_same_bits_on_every_executor(executor, tmp_path, monkeyp
     assert [len(one.seeds) for one in here] == [5, 5]
 
 
-class Losing:
-    """An executor that loses the first jobs that it is given."""
-
-    def __init__(self, losses):
-        self.losses = losses
-
-    def run(self, work, tasks):
-        for outcome in Here().run(work, tasks):
-            self.losses -= 1
-            yield outcome if self.losses < 0 else Outcome(outcome.task, None, "Its worker was lost: NodeDied.")
-
-
 def test_lost_jobs_are_run_again_and_those_that_are_always_lost_are_named(tasks, tmp_path, monkeypatch, capsys):
     words = ["--agents", "rest", "--tasks", SHORT, "--seeds", "4", "--decisions", "2", "--seeds-per-job", "1"]
     for losses, code in ((5, 0), (12, 2)):
-        monkeypatch.setattr("seastar_gym.benchmark.command.executor_of", lambda options, n=losses: Losing(n))
+        monkeypatch.setattr("seastar_gym.benchmark.command.executor_of", lambda options, n=losses: Losing(first(n)))
         assert main([*words, "--out", str(tmp_path)]) == code
     assert read(tmp_path / "results.json")[0].seeds == [1000, 1001, 1002, 1003]
-    assert "rest does not swim SeastarShort-v0: Its worker was lost: NodeDied." in capsys.readouterr().err
+    assert f"rest does not swim SeastarShort-v0: {LOST}" in capsys.readouterr().err
 
 
 def test_a_lost_agent_beside_others_is_left_out_and_the_command_exits_with_1(tasks, tmp_path, monkeypatch, capsys):
-    class LosesRandom:
-        def run(self, work, tasks):
-            for outcome in Here().run(work, tasks):
-                is_lost = outcome.task.agent == "random"
-                yield Outcome(outcome.task, None, "Its worker was lost: NodeDied.") if is_lost else outcome
-
-    monkeypatch.setattr("seastar_gym.benchmark.command.executor_of", lambda options: LosesRandom())
+    executor = Losing(lambda task: task.agent == "random")
+    monkeypatch.setattr("seastar_gym.benchmark.command.executor_of", lambda options: executor)
     words = ["--agents", "random", "rest", "--tasks", SHORT, "--seeds", "2", "--decisions", "2"]
     assert main([*words, "--out", str(tmp_path)]) == 1
     assert [one.agent for one in read(tmp_path / "results.json")] == ["rest"]
-    assert "random does not swim SeastarShort-v0: Its worker was lost: NodeDied." in capsys.readouterr().err
-
-
-class Interrupted:
-    """An executor during whose run somebody presses Ctrl-C, after so many jobs."""
-
-    def __init__(self, jobs):
-        self.jobs = jobs
-
-    def run(self, work, tasks):
-        yield from Here().run(work, itertools.islice(tasks, self.jobs))
-        raise KeyboardInterrupt
+    assert f"random does not swim SeastarShort-v0: {LOST}" in capsys.readouterr().err
 
 
 def test_an_interrupt_keeps_what_is_finished_for_another_run_to_merge(tasks, tmp_path, monkeypatch, capsys):
@@ -370,8 +339,7 @@ def test_an_agent_that_does_not_fit_is_left_out_with_a_sentence(tasks, tmp_path,
 def test_what_cannot_be_measured_is_said_in_a_sentence(arguments, words, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
-    printed = capsys.readouterr()
-    assert words in printed.err and printed.err.count("\n") == 1
+    assert_told(capsys, words)
     assert not list(tmp_path.iterdir())
 
 

@@ -29,11 +29,12 @@ from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.learned import BUNDLED, bundled_file, by_name, of_task, pretrained
 from seastar_gym.controllers.planner import TIMED_BUDGETS, Budget, Planner, Targets, budget_for
 from seastar_gym.controllers.registry import AGENTS, default_agents, files_of, load_agent, load_agents
-from seastar_gym.controllers.scripted import GAITS, RandomPolicy, scripted
+from seastar_gym.controllers.scripted import GAITS, OpenLoopPolicy, RandomPolicy, scripted
 from seastar_gym.envs.paths import PATHS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
 FAST = Scene(numerics=Numerics.preset("fast"))
+FOUR = Scene(Seastar(4))
 TWO = Scene(Seastar(limb_length=np.array([0.1, 0.09])))
 
 
@@ -92,8 +93,18 @@ REFUSED = {
     "no decisions": (lambda: load_agents(["rest"], decision_period=-1.0), "decision_period"),
     "agents of no scene": (lambda: load_agents(["rest"], scene=3), "scene must be a Scene"),
     "agents in no list": (lambda: load_agents("rest"), "Agents"),
+    "an agent twice": (lambda: load_agents(["rest", "rest"]), "The agent 'rest' is named twice."),
+    "an agent for others": (lambda: load_agents(["pentagon"], scene=FOUR), "are for five limbs, not 4"),
+    "an unknown agent": (lambda: load_agents(["gallop"]), "Unknown scripted agent 'gallop'"),
+    "an unknown agent, and others": (
+        lambda: load_agents(["gallop"]), "Others are learned, greedy, planner, gait-planner",
+    ),
     "a gait by number": (lambda: scripted(3), "name must be the name of a gait"),
     "a gait of no decisions": (lambda: scripted("rest", decision_period=0.0), "decision_period"),
+    "a gait of no actions": (lambda: scripted("pentagon", "legs"), "actions must be one of"),
+    "random draws of no actions": (lambda: scripted("random", "legs"), "actions must be one of"),
+    "no pair of all limbs": (lambda: OpenLoopPolicy(np.ones((1, 5)), "pairs"), 'no action with actions="pairs"'),
+    "half a command": (lambda: OpenLoopPolicy(np.full((1, 5), 0.5), "limbs"), 'no action with actions="limbs"'),
     "a gait of no limbs": (lambda: scripted("rest", n_limbs=0), "n_limbs"),
     "a gait without rng": (lambda: scripted("random", rng=3), "rng must be a numpy Generator"),
 }  # fmt: skip
@@ -291,15 +302,3 @@ def test_a_policy_says_its_action_mode_or_takes_that_of_the_environment():
         "continuous", "pairs", "joint",
     ]  # fmt: skip
     assert actions_of(Silent(), 5) == "limbs" and actions_of(InPairs(), 5) == "pairs"
-
-
-def test_a_gait_that_does_not_fit_says_so_and_an_unknown_one_what_there_is():
-    with assert_refused("are for five limbs, not 4"):
-        load_agents(["pentagon"], scene=Scene(Seastar(4)))
-    with assert_refused("Unknown scripted agent 'gallop'", "Others are learned, greedy, planner, gait-planner"):
-        load_agents(["gallop"])
-
-
-def test_an_agent_is_named_once():
-    with assert_refused("The agent 'rest' is named twice."):
-        load_agents(["rest", "rest"])

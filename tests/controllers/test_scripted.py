@@ -17,7 +17,7 @@ from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import transform_commands
 from seastar_gym.evaluation.swim import swim
-from seastar_gym.gaits import pair_gait, pentagon_gait, straight_gait, timed, turning_wave
+from seastar_gym.gaits import pentagon_gait, straight_gait, timed, turning_wave
 
 MODES = ["limbs", "joint", "pairs"]
 OBSERVATION = np.zeros(186, np.float32)
@@ -75,14 +75,6 @@ def test_straight_gait_moves_along_x_and_not_sideways():
     assert np.all(np.abs(hub[:, 1]) < 1e-10)
 
 
-@pytest.mark.parametrize(("name", "bisector"), [("1-,2+", 36.0), ("1-,3+", 72.0), ("1-,4+", 108.0), ("1-,5+", 144.0)])
-def test_pairs_of_fig_13_8_move_along_their_bisectors(name, bisector):
-    action, _ = scripted(name).predict(OBSERVATION)
-    end = steps_of(np.repeat(to_commands("limbs", 5, action[None], 1), 3, axis=0))[-1]
-    assert np.degrees(np.arctan2(end[1], end[0])) == pytest.approx(bisector, abs=0.01)
-    assert np.hypot(*end) > 1e-3
-
-
 # Policies
 
 
@@ -115,10 +107,22 @@ def test_episode_start_begins_the_gait_anew_for_that_robot_alone():
     np.testing.assert_array_equal(state[0], [50, 1])
 
 
-@pytest.mark.parametrize("made", [np.zeros(2), [0, 0], np.zeros(3, int), np.zeros((2, 1), int)])
-def test_a_state_that_no_call_gave_is_refused(made):
-    with pytest.raises(ValueError, match=r"decisions made of shape \(2,\)"):
-        scripted("pentagon").predict(np.zeros((2, 186), np.float32), (made,))
+NO_STATES = (
+    *((made,) for made in (np.zeros(2), [0, 0], np.zeros(3, int), np.zeros(1, int), np.zeros((2, 1), int))),
+    np.zeros(2, int), (np.zeros(2, int),) * 2,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("state", NO_STATES, ids=str)
+def test_a_state_that_no_call_gave_is_refused(state):
+    with pytest.raises(ValueError, match=r"decisions made of shape \(2,\)\.$"):
+        scripted("pentagon").predict(np.zeros((2, 186), np.float32), state)
+
+
+@pytest.mark.parametrize("commands", [np.zeros(5), np.zeros((0, 5)), np.zeros((1, 1, 5))], ids=np.shape)
+def test_what_are_no_commands_is_refused(commands):
+    with pytest.raises(ValueError, match="commands"):
+        OpenLoopPolicy(commands)
 
 
 def test_two_episodes_can_share_one_gait():
@@ -177,19 +181,6 @@ def test_a_pair_needs_two_limbs_of_the_robot(name):
         scripted(name)
 
 
-@pytest.mark.parametrize("name", ["pentagon", "random"])
-def test_an_unknown_action_mode_is_refused(name):
-    with pytest.raises(ValueError, match="actions must be one of"):
-        scripted(name, "legs")
-
-
-def test_commands_without_an_action_are_refused():
-    with pytest.raises(ValueError, match='no action with actions="pairs"'):
-        OpenLoopPolicy(np.ones((1, 5)), "pairs")
-    with pytest.raises(ValueError, match='no action with actions="limbs"'):
-        OpenLoopPolicy(0.5 * pair_gait(2, 5), "limbs")
-
-
 def test_continuous_actions_are_shares_for_one_robot_or_many():
     rng, policy = np.random.default_rng(3), RandomPolicy(np.random.default_rng(3), "continuous", 4)
     for shape in ((3, 4), (4,)):
@@ -209,16 +200,6 @@ def test_gaits_that_turn_are_for_five_limbs_and_decide_as_often_as_asked():
     assert scripted("rest", n_limbs=3).predict(OBSERVATION)[0].tolist() == [0, 0, 0]
     modes = [scripted(name, decision_period=0.1).actions for name in ("thrifty", "lagged")]
     assert modes == ["continuous", "limbs"]
-
-
-def test_a_state_is_the_decisions_of_every_robot():
-    gait = scripted("pentagon")
-    for wrong in (np.zeros(1, int), (np.zeros(2, int),), (np.zeros(1),), (np.zeros(1, int),) * 2, ([0],)):
-        with pytest.raises(ValueError, match=r"decisions made of shape \(1,\)\.$"):
-            gait.predict(OBSERVATION, wrong)
-    for commands in (np.zeros(5), np.zeros((0, 5)), np.zeros((1, 1, 5))):
-        with pytest.raises(ValueError, match=r"commands"):
-            OpenLoopPolicy(commands)
 
 
 # An agent that turns to the asked heading by a gait, and swims once it has it.

@@ -10,14 +10,12 @@ from seastar_gym.der.terms.fluid import freeze_normals
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes
-from slopes import NO_RODS, NO_WORK, gradient, plain, rotated, rows, symmetric
+from slopes import NO_RODS, NO_WORK, NOTHING, gradient, plain, rotated, rows, symmetric
 
 ROBOT = Seastar(nodes_per_limb=4)
 WATER = Water(1000.0, added_mass_coefficient=0.7)
 RODS = make_rods(Scene(ROBOT, WATER))
 OF_AN_EDGE = 1000.0 * 0.7 * np.pi * ROBOT.rod_radius**2 * ROBOT.edge_length
-NOTHING = (Lanes(0.0), (Lanes(0.0), Lanes(0.0)), (Lanes(0.0), Lanes(0.0), Lanes(0.0)))
-
 
 
 def frozen(angle: float = 0.0):

@@ -233,11 +233,15 @@ def test_edges_cross_where_each_cuts_the_other_and_not_at_their_ends():
         assert np.all(found == crossing)
 
 
-def test_without_contact_nothing_is_added():
+def test_without_contact_nothing_is_added_nobody_is_left_out_and_the_decrement_is_the_stars():
     assert add_contact.plain(NO_RODS, NO_WORK, None, None, 3.0) == 3.0
     assert add_contact_energy.plain(NO_RODS, NO_WORK, None, 3.0) == 3.0
     assert plain(contact_force.plain(NO_WORK, 1)) == (0.0, 0.0)
     assert not_touching.plain(NO_WORK, EVERYONE) is EVERYONE
+    assert without_new_crossings.plain(NO_RODS, None, None, None, EVERYONE) is EVERYONE
+    one = Lanes(1.0)
+    assert solve_coupled.plain(None, NO_WORK, None, one) is one
+    assert not plain(solver_iterations.plain(NO_WORK)).any()
 
 
 # Limbs that came to cross: told from limbs that touch, that part, or that crossed before.
@@ -264,7 +268,7 @@ def found(q_1: np.ndarray, q_0: np.ndarray, ahead: bool = False, robots=None, mi
     work.q[:], work.q_hat[:] = rows(0.5 * (q_0 + q_1) if ahead else q_1), rows(q_0)
     work.contact.missed[:] = 1.0 * np.asarray(missed)
     stage = Stage(work.q_hat, work.v_hat, Lanes(1e-3), Lanes(1e3), ahead)
-    asked = Mask(np.ones(N_LANES, bool) if robots is None else robots)
+    asked = EVERYONE if robots is None else Mask(robots)
     return plain(without_new_crossings.plain(RODS, work, stage, rows(q_0), asked))
 
 
@@ -283,11 +287,6 @@ def test_limbs_that_crossed_before_may_part_again():
 
 def test_robots_whose_pairs_were_not_all_listed_are_left_out():
     np.testing.assert_array_equal(found(REST, REST, missed=ODD), ~ODD)
-
-
-def test_without_contact_nobody_is_left_out():
-    everyone = Mask(np.ones(N_LANES, bool))
-    assert without_new_crossings.plain(NO_RODS, None, None, None, everyone) is everyone
 
 
 def test_limbs_are_on_their_sides_of_a_line_across_the_difference_of_their_roots():
@@ -331,16 +330,13 @@ def test_the_deepest_overlap_is_the_depth_over_the_distance_at_which_limbs_touch
 # The Newton step where limbs touch solves the star's matrix plus that of contact.
 
 
-ALL_OF_THEM = np.ones(N_LANES, bool)
-
-
-def steps(touching, robots=ALL_OF_THEM):
+def steps(touching, robots=EVERYONE):
     """(the star's step, the coupled one, their decrements)."""
     rods, work = touching.rods, touching.work
     _, alone, _ = factorise.plain(rods, work, touching.stage, None)
     star = np.zeros_like(work.q)
     substitute_star.plain(rods, work, star)
-    together = solve_coupled.plain(rods, work, Mask(robots), alone)
+    together = solve_coupled.plain(rods, work, robots, alone)
     return star, work.contact.x.copy(), plain(alone), plain(together)
 
 
@@ -378,7 +374,7 @@ def test_contact_makes_the_matrix_stiffer_so_its_decrement_is_smaller():
 
 def test_robots_that_do_not_touch_or_are_not_asked_keep_the_stars_step_to_the_last_bit():
     asked = np.arange(N_LANES) != N_LANES - 1
-    star, x, alone, together = steps(touching_limbs(apart=1), asked)
+    star, x, alone, together = steps(touching_limbs(apart=1), Mask(asked))
     kept = [0, N_LANES - 1]
     np.testing.assert_array_equal(x[:, kept], star[:, kept])
     np.testing.assert_array_equal(together[kept], alone[kept])
@@ -402,12 +398,6 @@ def test_dot_is_the_product_of_rows_robot_by_robot():
     np.testing.assert_allclose(plain(dot.plain(touching.rods, a, b)), (a * b).sum(axis=0), rtol=1e-12)
 
 
-def test_without_contact_the_decrement_is_the_stars():
-    one = Lanes(1.0)
-    assert solve_coupled.plain(None, NO_WORK, None, one) is one
-    assert not plain(solver_iterations.plain(NO_WORK)).any()
-
-
 def test_few_iterations_solve_it_as_exactly_as_a_step_of_5_ms_allows(monkeypatch):
     """To 1e-10 of the decrement: about what rounding leaves where edges are that much stiffer than inertia.
 
@@ -415,7 +405,7 @@ def test_few_iterations_solve_it_as_exactly_as_a_step_of_5_ms_allows(monkeypatch
     """
     touching, left, product_of = touching_limbs(gamma=5e-3), [], dot.plain
     rods, work = touching.rods, touching.work
-    _, alone, _ = factorise.plain(rods, work, touching.stage, Mask(ALL_OF_THEM))
+    _, alone, _ = factorise.plain(rods, work, touching.stage, EVERYONE)
 
     def noted(rods, a, b):
         product = product_of(rods, a, b)
@@ -424,7 +414,7 @@ def test_few_iterations_solve_it_as_exactly_as_a_step_of_5_ms_allows(monkeypatch
         return product
 
     monkeypatch.setitem(solve_coupled.plain.__globals__, "dot", noted)
-    decrement = plain(solve_coupled.plain(rods, work, Mask(ALL_OF_THEM), alone))
+    decrement = plain(solve_coupled.plain(rods, work, EVERYONE, alone))
     assert not work.contact.missed.any() and len(left) < 20
     assert np.any(left[-2] > 1e-10 * decrement)
     assert 1e-11 < (left[-1] / decrement).max() < 1e-10
@@ -441,6 +431,6 @@ def test_whoever_does_not_arrive_in_200_iterations_is_missed(monkeypatch):
         return Lanes(1.0)
 
     monkeypatch.setitem(solve_coupled.plain.__globals__, "dot", never_less)
-    solve_coupled.plain(rods, work, Mask(ALL_OF_THEM), alone)
+    solve_coupled.plain(rods, work, EVERYONE, alone)
     assert work.contact.missed.all() and len(iterations) == 1 + 200
     assert np.all(plain(solver_iterations.plain(work)) == 200.0)

@@ -8,7 +8,7 @@ from seastar_gym.der.motion import relative
 from seastar_gym.der.terms.drag import add_cross_flow, add_half_edge, drag_slopes
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.numpy_lanes import Lanes
-from slopes import NO_RODS, NO_WORK, gradient, plain, symmetric
+from slopes import NO_RODS, NO_WORK, NOTHING, gradient, plain, symmetric
 
 C = 0.37
 FLOWS = np.random.default_rng(0).standard_normal((2, 60))
@@ -60,7 +60,6 @@ def test_a_node_that_drifts_with_the_current_feels_none():
 C_ACROSS, GAMMA = 0.4, 0.01
 ANGLE = 0.6
 NORMAL = np.array([[-np.sin(ANGLE)], [np.cos(ANGLE)]])
-NOTHING = (Lanes(0.0), (Lanes(0.0), Lanes(0.0)), (Lanes(0.0), Lanes(0.0), Lanes(0.0)))
 
 
 def cross_slopes(w: np.ndarray, normal: np.ndarray = NORMAL):

@@ -160,15 +160,11 @@ EVERYONE = np.ones(N_LANES, bool)
 
 
 @pytest.mark.parametrize("hub", HUBS[:2])
-def test_in_vacuum_one_move_balances_the_momentum(hub):
-    before, after, _, _ = moved(hub, False, EVERYONE)
-    assert np.all(after < 1e-13 * before)
-
-
-@pytest.mark.parametrize("hub", HUBS[:2])
-@pytest.mark.parametrize("times, left", [(1, 0.2), (5, 1e-9)])
-def test_in_a_fluid_moves_are_those_of_newtons_method(times, left, hub):
-    before, after, _, _ = moved(hub, True, EVERYONE, times)
+@pytest.mark.parametrize("fluid, times, left", [(False, 1, 1e-13), (True, 1, 0.2), (True, 5, 1e-9)])
+def test_in_vacuum_one_move_balances_the_momentum_and_in_a_fluid_moves_are_those_of_newtons_method(
+    fluid, times, left, hub
+):
+    before, after, _, _ = moved(hub, fluid, EVERYONE, times)
     assert np.all(after < left * before)
 
 

@@ -1,5 +1,6 @@
 """How an interval is covered, told by steps whose outcome the test decides: halvings, doublings, fallback, failure."""
 
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from seastar_gym import Scene, Seastar
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.interval import cover_interval, note_hub_angles
+from seastar_gym.der.stepping.interval import FALLBACK_AFTER, cover_interval, note_hub_angles
 from seastar_gym.der.stepping.report import (
     BACKTRACKS,
     COVERED,
@@ -23,7 +24,15 @@ from seastar_gym.der.stepping.report import (
 from seastar_gym.der.stepping.scales import Limits
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import LAST_STEP, SIZE, memory_row
-from seastar_gym.der.stepping.steps import Step, end_guarded_step, solve_stages, try_step
+from seastar_gym.der.stepping.steps import (
+    MOST_HALVINGS,
+    SMALLEST_FRACTION,
+    TURNABLE,
+    Step,
+    end_guarded_step,
+    solve_stages,
+    try_step,
+)
 from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.rods import make_rods
@@ -49,30 +58,36 @@ def lanes(x) -> np.ndarray:
 class Script:
     """Steps of robot 0: 's' is stuck, 'r' rejected, 'a' accepted with a large error, any other with a small one.
 
-    All other robots' steps are accepted with a large error.
+    A function instead of such letters tells the error of a step. All other robots' steps are accepted with a large one.
     """
 
-    def __init__(self, outcomes: str, iterations: float = 0.0):
+    def __init__(self, outcomes: str | Callable[[SimpleNamespace], float], iterations: float = 0.0):
         self.outcomes, self.iterations, self.tried = outcomes, iterations, []
 
     def __call__(self, rods, work, tableau, actuation, q, v, a, step, going, limits, report):
         going = going.robots
         good, accepted, error = going.copy(), going.copy(), np.full(N_LANES, LARGE)
         if going[0]:
-            outcome = self.outcomes[min(len(self.tried), len(self.outcomes) - 1)]
             self.tried.append(
                 SimpleNamespace(
                     start=lanes(step.start)[0], size=lanes(step.size)[0], h=lanes(step.h)[0],
                     most=lanes(step.iteration_limit)[0], retrying=lanes(step.retrying)[0], fallback=tableau is EULER,
                 )
             )  # fmt: skip
-            good[0], accepted[0] = outcome != "s", outcome not in "sr"
-            error[0] = {"r": 2.0 * LIMIT, "a": LARGE}.get(outcome, SMALL)
+            good[0], error[0] = self.outcome()
+            accepted[0] = good[0] and error[0] <= LIMIT
         report[NEWTON_ITERATIONS] += self.iterations * going
         return Mask(good), Mask(accepted), Lanes(error)
 
+    def outcome(self) -> tuple[bool, float]:
+        """(whether the step that was tried last is not stuck, its error)."""
+        if callable(self.outcomes):
+            return True, self.outcomes(self.tried[-1])
+        letter = self.outcomes[min(len(self.tried), len(self.outcomes)) - 1]
+        return letter != "s", {"r": 2.0 * LIMIT, "a": LARGE}.get(letter, SMALL)
 
-def cover(monkeypatch, outcomes: str, adaptive=False, last_size=0.0, iterations=0.0, alive=EVERYONE):
+
+def cover(monkeypatch, outcomes, adaptive=False, last_size=0.0, iterations=0.0, alive=EVERYONE):
     script = Script(outcomes, iterations)
     monkeypatch.setitem(cover_interval.plain.__globals__, "try_step", script)
     limits = Limits(np.array([1e-9]), 20, MOST, adaptive, np.array([LIMIT]))
@@ -121,7 +136,12 @@ def test_after_four_halvings_a_robot_goes_on_with_the_fallback(monkeypatch):
 def test_a_robot_that_is_stuck_at_the_shortest_step_has_failed_and_keeps_nobody(monkeypatch):
     found = cover(monkeypatch, "s")
     assert found.sizes == [0.5**k for k in range(13)] and found.report[HALVINGS, 0] == 13.0
+    assert [step.fallback for step in found.tried] == 4 * [False] + 9 * [True]
     np.testing.assert_array_equal(found.arrived, ~FIRST)
+
+
+def test_a_robot_is_first_helped_by_short_steps_then_by_the_fallback_then_by_letting_hinges_go_through_poles():
+    assert 1.0 <= FALLBACK_AFTER < TURNABLE < MOST_HALVINGS == -np.log2(SMALLEST_FRACTION)
 
 
 def test_a_robot_whose_iterations_are_spent_fails_when_it_is_stuck_and_not_before(monkeypatch):
@@ -156,6 +176,24 @@ def test_after_a_halving_adapted_steps_double_after_four_accepted_steps(monkeypa
     shorter = 2.0**-5
     assert found.sizes[:6] == [2.0**-4] + 4 * [shorter] + [2 * shorter]
     assert not found.tried[5].retrying and found.tried[4].retrying
+
+
+def test_the_next_doubling_waits_twice_as_long(monkeypatch):
+    found = cover(monkeypatch, "ss+", adaptive=True, last_size=2.0**-3)
+    assert found.sizes[2:7] == [2.0**-5] * 4 + [2.0**-4]
+    assert found.sizes[6:15] == [2.0**-4] * 8 + [2.0**-3]
+
+
+@pytest.mark.parametrize("largest", 2.0 ** np.linspace(-4.9, -3.1, 8))
+def test_steps_grow_to_where_their_errors_let_them_and_are_not_refused_there(monkeypatch, largest):
+    """The error per time of a step that is twice as long is four times as large; a quarter of the interval is hard."""
+
+    def error(step):
+        return LIMIT * (step.size / (largest if step.start >= 0.25 else 2.0**-8)) ** 2
+
+    found = cover(monkeypatch, error, adaptive=True)
+    settled = np.array([step.size for step in found.tried if step.start > 0.5])
+    assert found.arrived.all() and np.all((settled > 0.4 * largest) & (settled <= largest))
 
 
 def test_after_a_second_halving_they_double_after_eight_accepted_steps(monkeypatch):

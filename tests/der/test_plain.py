@@ -63,7 +63,7 @@ def scenes():
     yield "adapted", Scene(Seastar(nodes_per_limb=3), actuator=pulse, numerics=adapted)
     water = Water(950.0, 1.3, 0.1, Vortex(0.02, 0.1, -0.05, 0.06), 0.8)
     robot = Seastar(nodes_per_limb=3, relaxation_time=4e-3)
-    yield "fluid", Scene(robot, water, pulse, Numerics("implicit-midpoint", 0.01))
+    yield "fluid", Scene(robot, water, pulse, Numerics("implicit-midpoint", 0.01), loads=((4, 1e-3, -2e-3),))
     bent = Seastar(nodes_per_limb=4, along=AlongLimb(0.7, (1.0, 2.0, 0.5)), stiffening=Stiffening(2.0))
     yield "bent along", Scene(bent, None, pulse, Numerics("implicit-midpoint", 0.01))
     for name, contact in (("contact", Contact()), ("no contact", None)):
@@ -78,7 +78,8 @@ def ends() -> dict[str, np.ndarray]:
         simulator, rng = Simulator(scene, n_robots, threads=2), np.random.default_rng(0)
         simulator.v[:, :, -2:] = blow * rng.standard_normal(simulator.v[:, :, -2:].shape)
         report = simulator.stroke(rng.integers(-1, 2, (n_robots, 5)).astype(float))
-        found[name], found[f"{name} counts"] = simulator.positions, np.array([report.steps, report.halvings])
+        counts = np.array([report.steps, report.halvings, report.energy_cuts])
+        found[name], found[f"{name} counts"] = simulator.positions, counts
     return found
 
 
@@ -124,6 +125,7 @@ def test_strokes_in_plain_python_are_those_of_the_machine_code(tmp_path):
         for name in expected:
             np.testing.assert_allclose(found[name], expected[name], rtol=0.0, atol=1e-13, err_msg=name)
     assert expected["implicit-euler counts"][1].sum() > 0  # steps were halved
+    assert expected["bent along counts"][2].sum() > 0  # energy was cut
     assert np.abs(expected["contact"] - expected["no contact"]).max() > 1e-5  # limbs have met
 
 

@@ -19,7 +19,7 @@ from seastar_gym.simd.numpy_lanes import Lanes
 from slopes import nodes, plain, rows
 from stages import RandomStages, robot_and_star, turn_limbs
 
-ZERO, NO_BLOCK, NO_PAIR = Lanes(0.0), (Lanes(0.0),) * 3, (Lanes(0.0),) * 2
+ZERO = Lanes(0.0)
 
 
 def neighbours(n_limbs: int, nodes_per_limb: int) -> np.ndarray:

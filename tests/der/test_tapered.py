@@ -14,7 +14,7 @@ from seastar_gym.der.terms.fluid import freeze_normals
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes
-from slopes import plain, rows, symmetric
+from slopes import NOTHING, plain, rows, symmetric
 
 LENGTH, EDGE = 0.09, 0.03
 LIMBS = tuple(Limb(length=LENGTH, radius=(2e-3 + 2e-4 * k, 1e-3)) for k in range(5))
@@ -22,7 +22,6 @@ ROBOT = Seastar(5, 4, limbs=LIMBS, density=1100.0, discretisation="chapter")
 WATER = Water(950.0, 1.3, 0.2, None, 0.7)
 RODS = make_rods(Scene(ROBOT, WATER, gravity=(0.3, -9.81), loads=((7, 0.1, 0.0), (7, 0.2, -0.5))))
 Q = ROBOT.nodes() + 2e-3 * np.random.default_rng(0).standard_normal((ROBOT.n_nodes, 2))
-NOTHING = (Lanes(0.0), (Lanes(0.0), Lanes(0.0)), (Lanes(0.0), Lanes(0.0), Lanes(0.0)))
 
 
 def radius(limb: int, share: float) -> float:

@@ -3,6 +3,7 @@
 import inspect
 import itertools
 import json
+import pickle
 import re
 
 import gymnasium as gym
@@ -149,7 +150,10 @@ def test_every_named_path_is_documented():
     assert all(f'"{name}"' in section("Arguments") for name in PATHS)
 
 
-@pytest.mark.parametrize("id", ["SeastarSwim-v0", "SeastarSwimHeading-v0", *seastar_gym.TIMED])
+OF_WAYPOINTS = "SeastarSwim-v0", "SeastarSwimContinuous-v0", "SeastarSwimHeading-v0", *seastar_gym.TIMED
+
+
+@pytest.mark.parametrize("id", OF_WAYPOINTS)
 def test_ids_are_those_of_the_table(id):
     period, actions, limit, decisions, actuator = row_of(id, SeastarSwimEnv)
     env, inner = gym.make(id), gym.make(id).unwrapped
@@ -364,9 +368,9 @@ def test_a_batch_of_gymnasiums_own_comes_back_where_it_was_told_in_plain_form():
 
 def test_wrappers_come_back_too():
     env = SymmetryReduction(gym.make(ID, scene=SCENE, actions="pairs"))
-    other = gym.make(by_json(env.spec))
-    assert isinstance(other, SymmetryReduction)
-    assert_same(swum(env, 3), swum(other, 3))
+    for other in (gym.make(by_json(env.spec)), pickle.loads(pickle.dumps(env))):
+        assert isinstance(other, SymmetryReduction)
+        assert_same(swum(env, 3), swum(other, 3))
 
 
 def test_a_spec_can_be_copied_changed_and_made_again():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import DomainRandomization, Uniform
+from seastar_gym import DomainRandomization, Scene, Seastar, Sight, SmaPulse, SmaWires, SymmetryReduction, Uniform
 from seastar_gym.envs.commands import action_space, choices, command_table, to_commands
 from seastar_gym.envs.goal import GoalForm
 from seastar_gym.envs.headings import HeadingTargets
@@ -15,19 +15,35 @@ from seastar_gym.envs.paths import FARTHEST, make_path, register_path
 from seastar_gym.envs.randomization import LogUniform, Normal
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry import Symmetry, memory_mirror, symmetry_of
+from seastar_gym.envs.symmetry import (
+    Symmetry,
+    VectorFrameStack,
+    VectorSymmetryReduction,
+    memory_mirror,
+    symmetry_of,
+)
 from seastar_gym.envs.task_env import checked_options
-from seastar_gym.envs.tasks.obst_trap import ObstTrap
+from seastar_gym.envs.tasks.course import Pursuit, draw_course
+from seastar_gym.envs.tasks.obst_trap import ObstTrap, draw_discs
 from seastar_gym.envs.vector import SeastarSwimVectorEnv, checked_seeds
+from symmetries import symmetry_for
 
-LIMBS, SHARES = (Symmetry(5, (), Layout(5), mode) for mode in ("limbs", "continuous"))
+LIMBS, SHARES, JOINT = (Symmetry(5, (), Layout(5), mode) for mode in ("limbs", "continuous", "joint"))
 ONE = np.zeros(1, int)
+WIRES = memory_mirror(SmaWires())
+NINE = Scene(Seastar(9), actuator=SmaPulse(0.1))
+RNG, SLOW = np.random.default_rng(0), Pursuit(1e-3, 1e-3)
 
 
 def goals(achieved, desired):
     """Rewards of goals."""
     env = GoalForm(gym.make("SeastarSwim-v0", fidelity="fast"))
     return env.compute_reward(achieved, desired, {})
+
+
+def swimmers(**options):
+    """Two of them."""
+    return SeastarSwimVectorEnv(2, fidelity="fast", threads=1, **options)
 
 
 def drawing(name, low, high):
@@ -38,6 +54,8 @@ def drawing(name, low, high):
 REFUSED = {
     "goals of two shapes": (lambda: goals(np.zeros((3, 2)), np.zeros(2)), "Goals must have one shape (..., 2)"),
     "goals in space": (lambda: goals(np.zeros(3), np.zeros(3)), "Goals must have one shape (..., 2)"),
+    "goals of a cart": (lambda: GoalForm(gym.make("CartPole-v1")), "GoalForm needs an environment of waypoints"),
+    "goals seen by a camera": (lambda: GoalForm(gym.make("SeastarSwim-v0", sight=Sight())), "which no camera knows"),
     "entries in a list": (lambda: Layout(entries=["scalar"]), "entries must be a tuple of scalar"),
     "an entry of no text": (lambda: Layout(entries=(3,)), "entries must be a tuple of scalar"),
     "an unknown entry": (lambda: Layout(entries=("tensor",)), "entries must be a tuple of scalar"),
@@ -76,6 +94,20 @@ REFUSED = {
     "a group of no limbs": (lambda: Symmetry(0, (), Layout(5)), "group"),
     "another number of limbs": (lambda: Symmetry(4, (), Layout(5)), "A group of 4 limbs and a mirror of 0 numbers"),
     "another number of numbers": (lambda: Symmetry(5, (), Layout(5, 1)), "do not fit a layout of 5 limbs and 1"),
+    "no layout": (lambda: Symmetry(5, (), "five"), "layout"),
+    "seen of seven limbs": (lambda: symmetry_for(7).reduce(np.zeros((1, 186))), "not that of a robot of 7 limbs"),
+    "seen of wires alone": (lambda: symmetry_for(5, WIRES).reduce(np.zeros((1, 186))), "not that of a robot of 5"),
+    "seen of more than that": (lambda: symmetry_for(5).reduce(np.zeros((1, 206))), "not that of a robot of 5 limbs"),
+    "seen of headings": (lambda: symmetry_for(5, WIRES).reduce(np.zeros((1, 200))), "not that of a robot of 5 limbs"),
+    "actions below": (lambda: JOINT.restore(np.array([-1]), ONE), "an action is a whole number from 0 to 242"),
+    "actions beyond": (lambda: JOINT.restore(np.array([243]), ONE), "an action is a whole number from 0 to 242"),
+    "halves of actions": (lambda: JOINT.restore(np.array([0.5]), ONE), "an action is a whole number from 0 to 242"),
+    "a reduced cart": (lambda: SymmetryReduction(gym.make("CartPole-v1").unwrapped), "SeastarSwim-v0", "CartPole"),
+    "reduced carts": (
+        lambda: VectorSymmetryReduction(gym.make_vec("CartPole-v1", 2, "sync")), "SeastarSwim-v0", "SyncVectorEnv",
+    ),
+    "no past": (lambda: VectorFrameStack(swimmers(), 0), "past must be"),
+    "a past of headings": (lambda: VectorFrameStack(swimmers(headings=HeadingTargets()), 2), "Asked headings have no"),
     "a symmetry of no scene": (lambda: symmetry_of(3), "scene must be a Scene"),
     "a mirror of no actuator": (lambda: memory_mirror(3), "actuator must be an actuator, such as SmaWires"),
     "whole observations": (lambda: LIMBS.reduce(np.zeros((1, 186), int)), "Observations must be floats"),
@@ -86,11 +118,12 @@ REFUSED = {
     "shares of texts": (lambda: SHARES.carry_actions(np.full((1, 5), "a"), ONE), "an action is numbers, not"),
     "options in a list": (lambda: checked_options(["path"], {"path"}), "options must be a dictionary"),
     "unknown options": (lambda: checked_options({"way": 1}, {"path"}), "Unknown reset option(s)"),
-    "seeds that are too few": (lambda: checked_seeds([1], 2), "seed must be one number or 2 of them, not 1"),
+    "seeds that are too few": (lambda: swimmers().reset(seed=[1]), "seed must be one number or 2 of them, not 1"),
     "a seed below zero": (lambda: checked_seeds([1, -1], 2), "seed"),
     "a radius beyond": (lambda: SwimOptions(waypoint_radius=2e6), "waypoint_radius must be at most 1e+06 m"),
     "a table of limbs": (lambda: command_table("limbs", 5), "not a table of commands: use LIMB_COMMANDS"),
     "too many limbs": (lambda: command_table("joint", 9), "would have 3^9 = 19,683 actions for 9 limbs"),
+    "an action for nine limbs": (lambda: SeastarSwimEnv(scene=NINE, actions="joint"), "19,683 actions"),
     "a table of shares": (lambda: command_table("continuous", 5), 'actions="continuous" has no finite number'),
     "choices of shares": (lambda: choices("continuous", 5), 'actions="continuous" has no finite number of actions'),
     "no action mode": (lambda: action_space("Limbs", 5), "actions must be one of", "'limbs', 'joint', 'pairs'"),
@@ -100,6 +133,10 @@ REFUSED = {
     "half a turn and more": (lambda: HeadingTargets(tolerance=3.2), "HeadingTargets.tolerance must be at most pi"),
     "an aim beyond": (lambda: RewardWeights(aim=1.01), "RewardWeights.aim must be from 0 to 1"),
     "a goal too far": (lambda: ObstTrap(distance=(0.45, 0.61)), "ObstTrap.distance must lie from 0.45 to 0.6"),
+    "a goal too near": (lambda: ObstTrap(distance=(0.1, 0.5)), "ObstTrap.distance must lie from 0.45 to 0.6 m"),
+    "no potential": (lambda: ObstTrap(potential="by air"), "ObstTrap.potential must be one of 'straight', 'geodesic'"),
+    "prey too fast": (lambda: draw_course(RNG, (9.0, 10.0), (0.5, 1.0), 0.1, SLOW), "a robot could meet none"),
+    "discs without end": (lambda: draw_discs(RNG, np.array([0.5, 0.0]), 3, 0.4), "none can be passed"),
     "frames without end": (lambda: SeastarSwimEnv(frames_per_stroke=1_000_001), "frames_per_stroke"),
 }  # fmt: skip
 """What is refused, and words of the sentence."""

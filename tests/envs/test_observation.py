@@ -15,6 +15,7 @@ from seastar_gym import (
     Attachment,
     Body,
     DomainRandomization,
+    Limited,
     Numerics,
     Scene,
     Seastar,
@@ -27,7 +28,6 @@ from seastar_gym import (
     Uniform,
 )
 from seastar_gym.envs.commands import command_table
-from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
 from seastar_gym.envs.observation import at_station, layout, observe, to_float32
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -97,15 +97,17 @@ def test_a_layout_names_every_place_once_and_in_the_order_of_the_table(n_limbs, 
     np.testing.assert_array_equal(places[at.stations_and_hub], places[: 4 * 9 * n_limbs + 2])
 
 
-def test_the_layout_of_a_scene_finds_what_its_actuators_remember():
-    scene = Scene(TEN, actuator=ThermalSma(), numerics=Numerics.preset("fast"))
-    env, plain = SeastarSwimEnv(scene=scene), SeastarSwimEnv(fidelity="fast")
-    env.reset(seed=0)
-    seen, at = env.step([0, 1, 0, 0, 2])[0], Layout.of(scene)
-    np.testing.assert_allclose(seen[at.actuators], env.simulator.observe_actuators()[0], rtol=1e-6)
-    assert np.any(seen[at.actuators])
-    first, bare = plain.reset(seed=0)[0], Layout.of(plain.scene)
-    np.testing.assert_array_equal(env.reset(seed=0)[0][at.waypoints], first[bare.waypoints])
+@pytest.mark.parametrize("actuator", [ThermalSma(), Limited(SmaPulse(), largest_rate=0.5)], ids=["thermal", "slow"])
+def test_the_layout_of_a_scene_finds_what_its_actuators_remember(actuator):
+    """Nothing at first, then shares of the limbs that were turned."""
+    scene = Scene(TEN, actuator=actuator, numerics=Numerics.preset("fast"))
+    env, plain, at = SeastarSwimEnv(scene=scene), SeastarSwimEnv(fidelity="fast"), Layout.of(scene)
+    rest, first, bare = env.reset(seed=0)[0], plain.reset(seed=0)[0], Layout.of(plain.scene)
+    np.testing.assert_array_equal(rest[at.waypoints], first[bare.waypoints])
+    seen = env.step([0, 1, 0, 0, 2])[0][at.actuators].reshape(5, -1)
+    np.testing.assert_allclose(seen, env.simulator.observe_actuators().reshape(5, -1), rtol=1e-6)
+    assert not rest[at.actuators].any() and not seen[[0, 2, 3]].any()
+    assert 0.0 < seen[1, 0] < 1.0 and seen[4].any() and np.abs(seen).max() < 1.0
     assert env.observation_space.shape == (at.size,) and plain.observation_space.shape == (bare.size,)
 
 
@@ -123,6 +125,17 @@ def test_every_index_holds_what_the_table_says(scene):
             scene.robot, simulator.positions[robot], simulator.velocities[robot], targets[robot, :2], targets[robot, 2:]
         )
         np.testing.assert_allclose(found[robot], expected, rtol=0.0, atol=1e-12)
+
+
+def test_an_environment_shows_its_simulators_state_and_its_waypoints():
+    env = SeastarSwimEnv("random", fidelity="fast", random_heading=True, scene=Scene(TEN))
+    (observation, _), rng = env.reset(seed=3), np.random.default_rng(0)
+    for _ in range(10):
+        q, v = env.simulator.positions[0], env.simulator.velocities[0]
+        expected = expected_observation(env.scene.robot, q, v, *env.waypoints[:2])
+        np.testing.assert_allclose(observation, expected, rtol=2e-7, atol=1e-6)
+        observation, _, _, _, info = env.step(rng.integers(0, 3, 5))
+        assert info["waypoint_index"] == 0
 
 
 @pytest.mark.parametrize("nodes_per_limb", [5, 10])
@@ -589,10 +602,3 @@ def test_masks_are_those_of_the_robots_that_are_shown():
         info, others = memory.step(actions)[-1], reduced.step(actions)[-1]
         np.testing.assert_array_equal(memory.action_masks(), reduced.action_masks())
         assert ("action_mask" in info) == ("action_mask" in others)
-
-
-def test_what_cannot_be_remembered_is_refused():
-    with assert_refused("past must be"):
-        VectorFrameStack(batch("prey"), 0)
-    with assert_refused("Asked headings have no place"):
-        VectorFrameStack(SeastarSwimVectorEnv(1, 50, fidelity="fast", headings=HeadingTargets(), threads=1), 2)

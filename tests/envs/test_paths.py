@@ -375,8 +375,3 @@ def test_with_ten_nodes_and_without_a_body_roots_have_no_part():
     assert not of_beginning(weights(10, 10)).any() and not stations_of(Seastar(4, 10, body=FRAME)).root_weights.any()
     assert stations_of(Seastar(4, 7)).root_weights is None
     assert stations_of(Seastar(4, 7, body=Body())).root_weights is None
-
-
-def test_cached_weights_cannot_be_changed():
-    with pytest.raises(ValueError, match="read-only"):
-        weights(7, 10)[0] = 0.0

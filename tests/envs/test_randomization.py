@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
+from episodes import both, swim_together
 from seastar_gym import (
     Body,
     DomainRandomization,
@@ -13,6 +13,7 @@ from seastar_gym import (
     Normal,
     Scene,
     Seastar,
+    Simulator,
     SmaPulse,
     ThermalSma,
     Uniform,
@@ -52,35 +53,26 @@ def test_a_normal_distribution_is_cut_at_three_standard_deviations():
     assert 2.8 < np.abs(drawn).max() <= 3.0 and drawn.std() == pytest.approx(0.987, abs=0.02)
 
 
-def test_a_robot_is_drawn_alone_as_in_a_batch_and_swims_as_the_robot_that_was_drawn():
-    batch = gym.make_vec(
-        "SeastarSwim-v0", 3, "vector_entry_point", fidelity="fast", randomization=DRAWS, max_episode_steps=2
-    )
-    alone = [SeastarSwimEnv(fidelity="fast", randomization=DRAWS) for _ in range(3)]
-    observations, info = batch.reset(seed=7)
-    firsts = [env.reset(seed=7 + i) for i, env in enumerate(alone)]
-    for robot, (observation, own) in enumerate(firsts):
-        np.testing.assert_array_equal(observations[robot], observation)
-        for name in DRAWS.distributions:
-            np.testing.assert_array_equal(info[name][robot], own[name])
-    action = np.array([0, 1, 2, 0, 1])
-    observations, _, _, _, info = batch.step(np.tile(action, (3, 1)))
-    for robot, env in enumerate(alone):
-        observation, _, _, _, own = env.step(action)
-        np.testing.assert_array_equal(observations[robot], observation)
-        np.testing.assert_array_equal(info["limb_strengths"][robot], own["limb_strengths"])
-        modulus, drag = own["robot.youngs_modulus"], own["fluid.drag_coefficient"]
-        fast = Scene.preset("fast")
-        robot = replace(fast.robot, youngs_modulus=modulus, limb_length=own["robot.limb_length"])
-        pulse = SmaPulse(own["actuator.peak_angle"])
-        scene = Scene(robot, Water(drag_coefficient=drag), pulse, numerics=Numerics.preset("fast"))
-        env.simulator.reset()
-        plain = SeastarSwimEnv(scene=scene)
-        plain.reset()
-        command = np.array([0.0, 1.0, -1.0, 0.0, 1.0])
-        env.simulator.stroke(command[None])
-        plain.simulator.stroke(own["limb_strengths"] * command[None])
-        np.testing.assert_array_equal(env.simulator.positions, plain.simulator.positions)
+def test_a_batch_draws_and_swims_as_single_environments_do():
+    batch, singles = both("SeastarSwim-v0", 3, randomization=DRAWS, max_episode_steps=2)
+    swim_together(batch, singles, 5)
+    drawn = batch.step(np.zeros((3, 5), int))[4]
+    assert all(len(np.unique(drawn[name], axis=0)) == 3 for name in DRAWS.distributions)
+
+
+@pytest.mark.parametrize("seed", [7, 8, 9])
+def test_an_environment_swims_as_the_robot_that_was_drawn(seed):
+    env = SeastarSwimEnv(fidelity="fast", randomization=DRAWS)
+    _, own = env.reset(seed=seed)
+    modulus, drag = own["robot.youngs_modulus"], own["fluid.drag_coefficient"]
+    fast = Scene.preset("fast")
+    robot = replace(fast.robot, youngs_modulus=modulus, limb_length=own["robot.limb_length"])
+    pulse = SmaPulse(own["actuator.peak_angle"])
+    plain = Simulator(Scene(robot, Water(drag_coefficient=drag), pulse, numerics=fast.numerics))
+    command = np.array([0.0, 1.0, -1.0, 0.0, 1.0])
+    env.simulator.stroke(command[None])
+    plain.stroke(own["limb_strengths"] * command[None])
+    np.testing.assert_array_equal(env.simulator.positions, plain.positions)
 
 
 def test_lengths_are_seen_in_the_robots_own_limb_length():

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-import seastar_gym
 from episodes import break_robot
 from refusals import assert_refused
 from seastar_gym import (
@@ -75,17 +74,6 @@ def test_gymnasiums_checker_passes_with_pictures(monkeypatch):
 def test_gymnasiums_checker_passes_without_a_display(no_display):
     """It makes the environment with every render mode that it names."""
     check_env(gym.make("SeastarSwim-v0", fidelity="fast").unwrapped)
-
-
-def test_make_gives_the_documented_environment():
-    env = gym.make("SeastarSwim-v0")
-    assert isinstance(env.unwrapped, SeastarSwimEnv)
-    assert env.action_space == gym.spaces.MultiDiscrete([3] * 5)
-    assert env.observation_space == gym.spaces.Box(-np.inf, np.inf, (186,), np.float32)
-    assert env.unwrapped.scene == Scene.preset("balanced")
-    assert env.spec.max_episode_steps == 400
-    assert env.unwrapped.simulator.n_robots == 1
-    assert "SeastarSwim-v0" in gym.registry and seastar_gym.__version__
 
 
 @pytest.mark.parametrize("n_limbs, nodes_per_limb", [(3, 4), (6, 10)])
@@ -230,25 +218,6 @@ def test_table_actions_do_what_the_limb_actions_they_stand_for_do(actions):
 # Observation
 
 
-def test_observation_is_that_of_the_simulators_state():
-    """Recomputed from positions and velocities with complex numbers, index by index."""
-    scene, rng = Scene(Seastar(nodes_per_limb=10)), np.random.default_rng(0)
-    env = fast(path="random", random_heading=True, scene=scene)
-    observation, _ = env.reset(seed=3)
-    rest = env.scene.robot.nodes() @ [1.0, 1j]
-    for _ in range(10):
-        q, v = env.simulator.positions[0] @ [1.0, 1j], env.simulator.velocities[0] @ [1.0, 1j]
-        turn = np.exp(-1j * np.angle(np.sum(np.conj(rest) * (q - q[0]))))
-        way = env.waypoints @ [1.0, 1j]
-        expected = (
-            np.concatenate([(q[1:] - q[0]) / 0.1, (v[1:] - v[0]) / 0.025, v[:1] / 0.025, (way[:2] - q[0]) / 0.1]) * turn
-        )
-        np.testing.assert_allclose(observation[0::2], expected.real, rtol=2e-7, atol=1e-6)
-        np.testing.assert_allclose(observation[1::2], expected.imag, rtol=2e-7, atol=1e-6)
-        observation, _, _, _, info = env.step(rng.integers(0, 3, 5))
-        assert info["waypoint_index"] == 0
-
-
 def test_next_waypoint_is_the_current_one_on_the_last_leg():
     env = fast(path=[[0.004, 0.0], [0.3, 0.1]], waypoint_radius=0.005)
     observation, _ = env.reset(seed=0)
@@ -281,14 +250,12 @@ def test_the_same_episode_under_another_heading_looks_the_same():
     assert np.abs(there.simulator.positions - here.simulator.positions).max() > 0.01
 
 
-def test_no_observation_shares_memory_with_the_next_or_with_the_simulator():
+def test_no_observation_shares_memory_with_the_simulator():
     env = fast()
-    first, info = env.reset(seed=0)
-    kept, kept_info = first.copy(), copy.deepcopy(info)
+    _, info = env.reset(seed=0)
+    kept = copy.deepcopy(info)
     second = env.step(STRAIGHT)[0]
-    assert not np.shares_memory(first, second)
-    np.testing.assert_array_equal(first, kept)
-    np.testing.assert_array_equal(info["hub_position"], kept_info["hub_position"])
+    np.testing.assert_array_equal(info["hub_position"], kept["hub_position"])
     state, table = env.simulator.get_state(), env.waypoints
     second[:], info["hub_position"][:], table[:] = 7.0, 7.0, 7.0
     np.testing.assert_array_equal(env.simulator.positions, state.positions)
@@ -498,7 +465,7 @@ def test_what_is_no_action_is_refused_and_changes_nothing(action):
         ({"random_heading": np.array([True])}, "random_heading"),
         ({"randomization": {}}, "DomainRandomization"),
         ({"render_mode": "ansi"}, "render_mode"),
-        ({"frames_per_stroke": 0}, "frames_per_stroke"),
+        *(({"frames_per_stroke": n}, "frames_per_stroke must be a whole number") for n in (0, -1, 2.5, True)),
         ({"scene": Scene(Seastar(hub_hinge="turning", discretisation="chapter"))}, "turning"),
     ],
     ids=str,
@@ -508,13 +475,6 @@ def test_arguments_that_mean_nothing_are_refused_with_a_sentence(arguments, word
         if make is SeastarSwimEnv or not {"render_mode", "frames_per_stroke"} & {*arguments}:  # a batch has its own
             with assert_refused(words):
                 make(**arguments)
-
-
-@pytest.mark.parametrize("name", ["progress", "waypoint", "effort"])
-@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf, "1", None])
-def test_weights_are_finite_and_not_negative(name, value):
-    with pytest.raises(ValueError, match=rf"RewardWeights\.{name} .*\.$"):
-        RewardWeights(**{name: value})
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import pickle
 from dataclasses import replace
 
 import gymnasium as gym
@@ -125,12 +124,6 @@ def test_old_names_do_the_same_for_one_release():
     np.testing.assert_array_equal(symmetry.restore_actions(actions, elements, "pairs", 5), restored)
 
 
-@pytest.mark.parametrize("group, mirror, at", [(4, (), Layout(5)), (5, ((1, 1), (0, 1)), Layout(5)), (5, (), "five")])
-def test_what_does_not_fit_together_is_no_symmetry(group, mirror, at):
-    with assert_refused("layout"):
-        symmetry.Symmetry(group, mirror, at)
-
-
 # Observations
 
 
@@ -181,11 +174,6 @@ def test_one_observation_is_a_batch_without_an_axis():
         alone, its_element = symmetry_for(5).reduce(one)
         np.testing.assert_array_equal(alone, reduced)
         assert its_element == element and its_element.shape == ()
-
-
-def test_observations_of_another_robot_are_refused():
-    with pytest.raises(ValueError, match="not that of a robot of 7 limbs"):
-        symmetry_for(7).reduce(observations_of(5))
 
 
 # Boundaries
@@ -268,18 +256,6 @@ def test_restored_actions_are_those_before_the_reduction(mode, group):
     np.testing.assert_array_equal(symmetry_for(group, mode=mode).restore(reduced, elements), actions)
 
 
-@pytest.mark.parametrize("action", [-1, 243, 0.5])
-def test_an_action_that_is_none_is_refused(action):
-    with pytest.raises(ValueError, match="an action is a whole number from 0 to 242"):
-        symmetry_for(5, mode="joint").restore(np.array([action]), np.zeros(1, int))
-
-
-def test_cached_tables_cannot_be_changed():
-    for table in (symmetry.turns(5), symmetry.limb_order(5), symmetry.action_table("pairs", 5)):
-        with pytest.raises(ValueError, match="read-only"):
-            table[0] = table[1]
-
-
 # A policy behind it
 
 
@@ -320,30 +296,6 @@ def test_a_policy_behind_the_reduction_is_equivariant(element):
     np.testing.assert_allclose(carried_hubs, hubs @ carry.T, atol=1e-9)
 
 
-@pytest.mark.parametrize("n_limbs, nodes_per_limb", [(4, 4), (5, 4), (7, 4), (5, 7)])
-def test_a_random_policy_in_the_wrapper_swims_the_carried_way(n_limbs, nodes_per_limb):
-    """From rest, along a carried path, for every element of the group."""
-    path = np.array([[0.01, 0.013], [-0.03, 0.02], [0.02, -0.03]])
-    weights = np.random.default_rng(6).normal(size=(Layout(n_limbs).size, 1 + n_limbs * (n_limbs - 1)))
-    scene = Scene(robot=Seastar(n_limbs, nodes_per_limb), numerics=Numerics.preset("fast"))
-
-    def hubs_along(path):
-        env = SymmetryReduction(gym.make("SeastarSwim-v0", path=path, actions="pairs", scene=scene))
-        observation, _ = env.reset(seed=0)
-        hubs = []
-        for _ in range(10):
-            action = np.argmax(observation @ weights)
-            observation, *_, info = env.step(action)
-            hubs.append(info["hub_position"])
-        return np.array(hubs)
-
-    hubs = hubs_along(path)
-    assert np.ptp(hubs, axis=0).min() > 1e-3
-    for element in range(1, 2 * n_limbs):
-        carry = matrix(element, n_limbs)
-        np.testing.assert_allclose(hubs_along(path @ carry.T), hubs @ carry.T, atol=1e-9)
-
-
 MEMORIES = {
     "wires": SmaWires(period=0.5),
     "refractory": SmaWires(cooling_time=0.6, period=0.3, refractory=True),
@@ -353,13 +305,18 @@ MEMORIES = {
 }
 
 
-@pytest.mark.parametrize("actuator", MEMORIES.values(), ids=MEMORIES)
-@pytest.mark.parametrize("n_limbs", [4, 5])
-def test_what_actuators_remember_is_carried_with_the_robot(actuator, n_limbs):
-    """From rest, along a carried path, for every element: the same reduced observations and the carried swim."""
+@pytest.mark.parametrize(
+    "actuator, n_limbs, nodes_per_limb",
+    [
+        *((SmaPulse(), *shape) for shape in ((4, 4), (5, 4), (7, 4), (5, 7))),
+        *((actuator, n_limbs, 4) for actuator in MEMORIES.values() for n_limbs in (4, 5)),
+    ],
+)
+def test_a_random_policy_in_the_wrapper_swims_the_carried_way(actuator, n_limbs, nodes_per_limb):
+    """From rest, along a carried path, for every element: what is seen, with the memory of actuators, is the same."""
     path = np.array([[0.01, 0.013], [-0.03, 0.02], [0.02, -0.03]])
     numerics, n_actions = Numerics("implicit-midpoint", 0.01, newton_tolerance=1e-10), 1 + n_limbs * (n_limbs - 1)
-    scene = Scene(Seastar(n_limbs, 4), actuator=actuator, numerics=numerics)
+    scene = Scene(Seastar(n_limbs, nodes_per_limb), actuator=actuator, numerics=numerics)
 
     def swim_along(path):
         env = SymmetryReduction(gym.make("SeastarSwim-v0", path=path, actions="pairs", scene=scene))
@@ -372,8 +329,10 @@ def test_what_actuators_remember_is_carried_with_the_robot(actuator, n_limbs):
         return np.array(seen), np.array(hubs)
 
     seen, hubs = swim_along(path)
-    remembered = seen[1:, -4 - n_limbs * len(symmetry.memory_mirror(actuator)) : -4]
-    assert np.ptp(hubs, axis=0).max() > 1e-3 and (np.abs(remembered).max(axis=1) > 0.01).sum() > 5
+    n_remembered = n_limbs * len(symmetry.memory_mirror(actuator))
+    remembered = seen[1:, -4 - n_remembered : -4]
+    assert np.ptp(hubs, axis=0).max() > 1e-3
+    assert not n_remembered or (np.abs(remembered).max(axis=1) > 0.01).sum() > 5
     for element in range(1, 2 * n_limbs):
         carry = matrix(element, n_limbs)
         carried_seen, carried_hubs = swim_along(path @ carry.T)
@@ -381,15 +340,13 @@ def test_what_actuators_remember_is_carried_with_the_robot(actuator, n_limbs):
         np.testing.assert_allclose(carried_seen, seen, atol=1e-5)
 
 
-def test_memory_is_restored_by_the_inverse_and_another_size_refused():
+def test_memory_is_restored_by_the_inverse():
     mirror = symmetry.memory_mirror(ThermalSma())
     assert mirror == ((1, 1), (0, 1), (3, 1), (2, 1)) and symmetry.memory_mirror(SmaPulse()) == ()
     observations = np.random.default_rng(0).normal(size=(50, Layout(5).size + 20))
     reduced, elements = symmetry_for(5, mirror).reduce(observations)
     restored = symmetry_for(5, mirror).carry(reduced, symmetry.inverse(elements, 5))
     np.testing.assert_allclose(restored, observations, atol=1e-14)
-    with assert_refused("not that of a robot of 5 limbs"):
-        symmetry_for(5).reduce(observations)
 
 
 # Wrappers
@@ -452,15 +409,6 @@ def test_observations_of_the_batch_are_fresh_every_step():
     second, *_ = batch.step(np.ones((2, 4), int))
     np.testing.assert_array_equal(first, kept)
     assert not np.shares_memory(first, second)
-
-
-def test_the_wrapped_environment_can_be_copied_and_made_again():
-    env = SymmetryReduction(gym.make("SeastarSwim-v0", **SETTINGS))
-    there = pickle.loads(pickle.dumps(env))
-    here, _ = env.reset(seed=1)
-    np.testing.assert_array_equal(there.reset(seed=1)[0], here)
-    again = gym.make(env.spec)
-    np.testing.assert_array_equal(again.reset(seed=1)[0], here)
 
 
 def test_the_wrapper_refuses_an_action_that_is_none():
@@ -708,14 +656,6 @@ def followed_as_a_whole(action, mask, mode):
     return bool(mask[action])
 
 
-def test_observations_of_another_memory_are_refused():
-    seen = observations_of(5)
-    mirror = symmetry.memory_mirror(SmaWires())
-    with assert_refused("not that of a robot of 5 limbs"):
-        symmetry_for(5, mirror).reduce(seen)
-    assert symmetry.memory_mirror(SmaPulse()) == ()
-
-
 def test_unobserved_memory_is_not_carried():
     """The environment without it is symmetric all the same."""
     env = SymmetryReduction(SeastarSwimEnv(decision_period=0.5, observe_actuators=False))
@@ -729,10 +669,3 @@ def test_every_robot_of_a_batch_has_to_be_symmetric():
         VectorSymmetryReduction(SeastarSwimVectorEnv(3, scene=one_bent))
     alike = Seastar(4, 4, limb_length=np.array([0.1, 0.11, 0.12]))
     VectorSymmetryReduction(SeastarSwimVectorEnv(3, scene=Scene(alike)))
-
-
-def test_another_environment_is_refused():
-    with assert_refused("SeastarSwim-v0", "CartPole"):
-        SymmetryReduction(gym.make("CartPole-v1").unwrapped)
-    with assert_refused("SeastarSwim-v0", "SyncVectorEnv"):
-        VectorSymmetryReduction(gym.make_vec("CartPole-v1", 2, "sync"))

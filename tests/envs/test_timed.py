@@ -115,13 +115,11 @@ def test_weak_limbs_are_promised_nothing_in_time():
     assert np.isnan(env.step([0] * 5)[4]["path_error"])
 
 
-def test_decisions_beyond_the_measured_times_are_promised_nothing():
-    assert not set(NAMES) & set(SeastarSwimEnv(fidelity="fast", decision_period=0.05).reset(seed=0)[1])
-
-
-@pytest.mark.parametrize("scene", [REFRACTORY, HOT, STIFF])
-def test_other_robots_and_wires_are_promised_nothing_in_time(scene):
-    assert not set(NAMES) & set(SeastarSwimEnv(scene=scene, decision_period=0.2).reset(seed=0)[1])
+@pytest.mark.parametrize("scene, period", [(None, 0.05), (REFRACTORY, 0.2), (HOT, 0.2), (STIFF, 0.2)])
+def test_other_robots_and_wires_and_times_that_were_not_measured_are_promised_nothing(scene, period):
+    fidelity = "fast" if scene is None else None
+    env = SeastarSwimEnv(scene=scene, fidelity=fidelity, decision_period=period)
+    assert not set(NAMES) & set(env.reset(seed=0)[1])
 
 
 # Heat

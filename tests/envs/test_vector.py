@@ -450,11 +450,6 @@ def test_reset_options_that_mean_nothing_are_refused(options, words):
         batch.reset(options=options)
 
 
-def test_a_list_of_seeds_has_one_for_every_robot():
-    with pytest.raises(ValueError, match=r"seed must be one number or 3 of them, not 2\.$"):
-        native().reset(seed=[1, 2])
-
-
 @pytest.mark.parametrize(
     "arguments, words",
     [

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from agents.evaluate import main
-from refusals import assert_refused
+from refusals import assert_refused, assert_told
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.comparison import evaluate
@@ -197,8 +197,7 @@ def test_damaged_speeds_are_refused_in_a_sentence(text, tmp_path, capsys):
     (tmp_path / "bound.json").write_text(text)
     arguments = ["--report", "--no-video", "--out", str(tmp_path / "out")]
     assert main([*arguments, "--bound", str(tmp_path / "bound.json")]) == 2
-    said = capsys.readouterr().err
-    assert "bound.json is no " in said and said.count("\n") == 1, said
+    assert_told(capsys, "bound.json is no ")
     assert not (tmp_path / "out").exists()
 
 
@@ -301,8 +300,7 @@ def test_command_line_writes_the_report_with_the_curves_of_runs(tmp_path, capsys
 
 def test_a_folder_without_a_run_is_answered_with_one_sentence(tmp_path, capsys):
     assert main(["--report", "--runs", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
-    printed = capsys.readouterr().err
-    assert "progress.csv" in printed and printed.count("\n") == 1
+    assert_told(capsys, "progress.csv")
 
 
 # In a browser

@@ -89,19 +89,20 @@ def check_environment(seed: int, n_steps: int = 4) -> None:
     for k, single in enumerate(singles):
         observation, info = single.reset(seed=seed + k)
         assert_same(observation, info, observations[k], infos, k)
+    keys = set(info)
     for _ in range(n_steps):
-        step_together(batch, singles)
+        step_together(batch, singles, keys)
         begin_anew(batch, singles, rng)
     batch.close()
 
 
-def step_together(batch: SeastarSwimVectorEnv, singles: list[SeastarSwimEnv]) -> None:
+def step_together(batch: SeastarSwimVectorEnv, singles: list[SeastarSwimEnv], keys: set[str]) -> None:
     actions = batch.action_space.sample()
     observations, rewards, terminated, truncated, infos = batch.step(actions)
     assert observations in batch.observation_space and np.isfinite(observations).all() and not truncated.any()
     for k, single in enumerate(singles):
         observation, reward, is_over, is_cut, info = single.step(actions[k])
-        assert observation in single.observation_space
+        assert observation in single.observation_space and set(info) == keys
         assert (reward, is_over, is_cut) == (rewards[k], terminated[k], truncated[k])
         assert_same(observation, info, observations[k], infos, k)
 
@@ -121,11 +122,3 @@ def assert_same(observation: np.ndarray, info: dict[str, Any], row: np.ndarray, 
     np.testing.assert_array_equal(observation, row)
     for name, value in info.items():
         np.testing.assert_array_equal(infos[name][k], value, err_msg=name)
-
-
-def check_info_keys(seed: int) -> None:
-    """The same on reset and on every step."""
-    env = SeastarSwimEnv(**draw_arguments(Random(seed)))
-    env.action_space.seed(seed)
-    keys = set(env.reset(seed=seed)[1])
-    assert set(env.step(env.action_space.sample())[4]) == keys

@@ -127,12 +127,6 @@ def test_a_batch_of_environments_does_what_they_do_alone(seed):
     swims.check_environment(seed)
 
 
-@settings(max_examples=5)
-@given(SEEDS)
-def test_info_has_the_same_keys_on_reset_and_on_every_step(seed):
-    swims.check_info_keys(seed)
-
-
 @pytest.mark.parametrize("terms, seed", [(CONTACT, 26_110_000_015), (CONTACT | {OWN}, 892_955_996)])
 def test_overlaps_are_a_robot_s_own(terms, seed):
     """Pairs that only others have on the list were counted, too, where one of them touched; and slopes are computed

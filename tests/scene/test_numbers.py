@@ -1,9 +1,11 @@
 """What parts declare of their numbers: refusals say name, unit and value, and docstrings have the same units."""
 
 import contextlib
+import copy
 import math
+import pickle
 import re
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import FrozenInstanceError, fields, is_dataclass, replace
 
 import numpy as np
 import pytest
@@ -251,6 +253,16 @@ def accepted(part, name, value):
 def test_every_kind_of_part_is_tried():
     known = {kind for name, kind in KINDS.items() if kind.__module__.startswith("seastar_gym") and is_dataclass(kind)}
     assert known == {type(part) for part in FOUND.values()}
+
+
+@pytest.mark.parametrize("kind", sorted({type(part).__name__ for part in FOUND.values()}))
+def test_parts_are_frozen_equal_by_value_hashable_and_travel(kind):
+    for part in (part for part in FOUND.values() if type(part).__name__ == kind):
+        name = fields(part)[0].name
+        with pytest.raises(FrozenInstanceError):
+            setattr(part, name, getattr(part, name))
+        for twin in (replace(part), copy.deepcopy(part), pickle.loads(pickle.dumps(part))):
+            assert twin == part and hash(twin) == hash(part)
 
 
 def test_a_whole_number_or_one_of_numpy_is_the_float():

@@ -1,6 +1,5 @@
 """Robots of a batch with numbers of their own swim, to the last bit, as each would alone."""
 
-import copy
 import pickle
 from dataclasses import replace
 
@@ -18,13 +17,10 @@ from seastar_gym import (
     Numerics,
     Scene,
     Seastar,
-    ShearCurrent,
     Simulator,
     SmaPulse,
     Stiffening,
     ThermalSma,
-    UniformCurrent,
-    Vortex,
     Water,
 )
 from seastar_gym.simd.lanes import N_LANES
@@ -178,22 +174,6 @@ def test_a_batch_of_different_robots_travels():
     strokes(simulator, COMMANDS[:1])
     twin = pickle.loads(pickle.dumps(simulator))
     np.testing.assert_array_equal(strokes(twin, COMMANDS[1:]), strokes(simulator, COMMANDS[1:]))
-
-
-@pytest.mark.parametrize(
-    "part",
-    [
-        varied(),
-        varied().robot,
-        *ACTUATORS.values(),
-        UniformCurrent(np.zeros(3)),
-        ShearCurrent(np.ones(2)),
-        Vortex(0.1, np.ones(2)),
-    ],
-)
-def test_parts_with_arrays_are_equal_by_value_hashable_and_travel(part):
-    for twin in (copy.deepcopy(part), pickle.loads(pickle.dumps(part))):
-        assert twin == part and hash(twin) == hash(part)
 
 
 def test_a_scene_knows_its_robots():

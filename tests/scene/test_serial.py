@@ -215,15 +215,6 @@ def assert_same_bits(one, other):
         assert type(one) is type(other) and np.asarray(one).tobytes() == np.asarray(other).tobytes()
 
 
-def test_numbers_of_numpy_become_pythons_and_do_not_compute_to_their_own_precision():
-    robot = Seastar(density=np.float32(1000.1), n_limbs=np.int64(5), limbs=(Limb(radius=np.float32(1e-3)),) * 5)
-    scene = Scene(robot, Water(density=np.array([1.0, 2.0], np.float32)))
-    assert type(scene.robot.density) is float and {type(one) for one in scene.fluid.density} == {float}
-    assert again(scene) == scene
-    pulse = Scene(actuator=SmaPulse(heating_time=np.float32(0.1), cooling_time=np.float32(0.9)))
-    assert type(pulse.actuator.heating_time) is float and again(pulse) == pulse
-
-
 @pytest.mark.parametrize(
     "part",
     [

@@ -7,7 +7,7 @@ import pytest
 
 from momenta import bodied_momenta as momenta
 from momenta import cross
-from seastar_gym import Attachment, Body, Numerics, Scene, Seastar, Simulator, SmaPulse, State, UniformCurrent, Water
+from seastar_gym import Attachment, Body, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, UniformCurrent, Water
 from seastar_gym.der.stepping.schemes import SCHEMES
 
 MIDPOINT = Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-10)
@@ -32,11 +32,13 @@ def set_moving(simulator: Simulator, velocity: tuple[float, float], spin: float)
     simulator.set_state(simulator.get_state()._replace(velocities=v, spin=np.full(len(q), spin)))
 
 
-def test_a_body_without_size_is_the_point_hub_to_the_last_bit():
+@pytest.mark.parametrize("contact", [None, Contact()], ids=["free", "contact"])
+def test_a_body_without_size_is_the_point_hub_to_the_last_bit(contact):
     for body in (Body(), Body(mass=0.0, inertia=0.0, height=1.0)):
-        one, other = (Simulator(Scene(Seastar(nodes_per_limb=5, body=body)), 2) for body in (None, body))
+        robots = (Seastar(nodes_per_limb=5, body=each) for each in (None, body))
+        one, other = (Simulator(Scene(robot, contact=contact), 3) for robot in robots)
         for simulator in (one, other):
-            simulator.advance(0.1, [[0, 1, 0, 0, -1], [1, 0, -1, 1, 0]])
+            simulator.stroke([[0, 1, 0, 0, -1], [1, 0, -1, 1, 0], [1, -1, 0, 1, -1]])
         np.testing.assert_array_equal(one.q, other.q)
         np.testing.assert_array_equal(one.v, other.v)
 
@@ -269,15 +271,6 @@ def test_a_state_with_orientation_continues_to_the_same_bits():
     np.testing.assert_array_equal(simulator.positions, other.positions)
     np.testing.assert_array_equal(simulator.velocities, other.velocities)
     np.testing.assert_array_equal(simulator.orientation(), other.orientation())
-
-
-def test_a_state_without_orientation_has_that_of_its_shape():
-    simulator = Simulator(Scene(FOUR_LIMBS))
-    simulator.reset(heading=1.25)
-    state = simulator.get_state()
-    simulator.set_state(State(*state[:3]))
-    assert simulator.orientation()[0] == pytest.approx(1.25, abs=1e-12)
-    assert simulator.spin()[0] == 0.0
 
 
 @pytest.mark.slow

@@ -144,6 +144,6 @@ def test_a_heading_is_that_of_a_robots_own_shape_at_rest(read, order):
 @pytest.mark.parametrize("order", [[0, 1, 2], [2, 1, 0]])
 def test_a_state_without_orientation_has_that_of_every_robots_own_shape(order):
     simulator = unequal(ON_A_BODY, order)
-    simulator.set_state(simulator.get_state()._replace(orientation=None))
+    simulator.set_state(State(*simulator.get_state()[:3]))
     np.testing.assert_allclose(simulator.orientation(), 0.5 * np.array(order) - 0.3, rtol=0.0, atol=1e-14)
-    assert simulator.elastic_energy().max() < 1e-20
+    assert simulator.elastic_energy().max() < 1e-20 and not simulator.spin().any()

@@ -1,9 +1,7 @@
 """Error bars: a twin tells how far the hub may be from the truth, and changes nothing else."""
 
-import _thread
 import math
 import pickle
-import time
 from dataclasses import replace
 
 import gymnasium as gym
@@ -31,7 +29,6 @@ from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import batch as module
 from seastar_gym.simulator import error_bars
-from seastar_gym.simulator import simulator as simulator_module
 from strokes import assert_same, finished
 
 FAST = Scene.preset("fast")
@@ -153,54 +150,6 @@ def test_strokes_in_parts_have_the_same_estimates(parts):
     seen, report = finished(generator, lambda time: simulator.error_estimate)
     np.testing.assert_array_equal(seen, [before] * parts)
     np.testing.assert_array_equal(report.error_estimate, wanted.error_estimate)
-    assert_same(simulator, other)
-
-
-def test_a_stroke_in_parts_that_is_closed_has_not_begun_for_the_twin_either():
-    simulator, other = swimmers(), swimmers()
-    generator = simulator.stroke_in_parts(COMMANDS[2], 2)
-    next(generator)
-    generator.close()
-    assert_same(simulator, other)
-    simulator.stroke(COMMANDS[1])
-    other.stroke(COMMANDS[1])
-    assert_same(simulator, other)
-
-
-@pytest.mark.parametrize("call", [1, 2], ids=["in the twin", "after the twin"])
-@pytest.mark.parametrize("actuator", [None, ThermalSma()], ids=["pulse", "thermal"])
-def test_an_interrupted_stroke_has_not_begun_for_the_twin_either(monkeypatch, call, actuator):
-    scene = FAST if actuator is None else replace(FAST, actuator=actuator)
-    simulator, other, advance, calls = swimmers(scene), swimmers(scene), module.advance, []
-
-    def interrupted(*arguments):
-        calls.append(arguments)
-        advance(*arguments)
-        if len(calls) == call:
-            _thread.interrupt_main()
-            time.sleep(0.001)
-
-    monkeypatch.setattr(module, "advance", interrupted)
-    with pytest.raises(KeyboardInterrupt):  # noqa: PT012
-        simulator.stroke(COMMANDS[2])
-        time.sleep(1.0)  # an interrupt that is on its way
-    monkeypatch.setattr(module, "advance", advance)
-    assert_same(simulator, other)
-    simulator.stroke(COMMANDS[1])
-    other.stroke(COMMANDS[1])
-    assert_same(simulator, other)
-
-
-def test_a_stroke_interrupted_at_its_very_end_leaves_the_estimate_as_it_was(monkeypatch):
-    simulator, other = swimmers(), swimmers()
-
-    def interrupt(*arguments):
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(simulator_module, "make_report", interrupt)
-        with pytest.raises(KeyboardInterrupt):
-            simulator.stroke(COMMANDS[2])
     assert_same(simulator, other)
 
 

@@ -16,7 +16,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from seastar_gym import DomainRandomization, Scene, Seastar, Simulator, State, ThermalSma, Uniform
+from seastar_gym import DomainRandomization, Scene, Seastar, Simulator, SmaPulse, State, ThermalSma, Uniform
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.model.coefficients import Coefficients
@@ -30,11 +30,12 @@ FAST = Numerics.preset("fast")
 N_ROBOTS = 20 * N_LANES + 1
 COMMANDS = np.random.default_rng(0).integers(-1, 2, (3, N_ROBOTS, 5)).astype(float)
 THREADS = pytest.mark.parametrize("threads", [1, 3])
+BARS = pytest.mark.parametrize("bars", [False, True], ids=["plain", "error bars"])
 
 
-def swimmers(threads: int = 1, scene: Scene = Scene(numerics=FAST)) -> Simulator:
+def swimmers(threads: int = 1, scene: Scene = Scene(numerics=FAST), bars: bool = False) -> Simulator:
     """Robots after their first stroke."""
-    simulator = Simulator(scene, N_ROBOTS, threads)
+    simulator = Simulator(scene, N_ROBOTS, threads, error_bars=bars)
     simulator.stroke(COMMANDS[0])
     return simulator
 
@@ -91,19 +92,25 @@ def interrupted(simulator: Simulator, kernel: Kernel, error=KeyboardInterrupt):
     kernel.remove()
 
 
-@THREADS
-@pytest.mark.parametrize("when", ["before", "after"])
-@pytest.mark.parametrize("nth", [1, 3])
-@pytest.mark.parametrize("actuator", [None, ThermalSma()], ids=["pulse", "thermal"])
-def test_an_interrupted_stroke_is_as_if_it_had_not_begun(monkeypatch, threads, when, nth, actuator):
-    scene = Scene(numerics=FAST) if actuator is None else Scene(numerics=FAST, actuator=actuator)
-    simulator, other = swimmers(threads, scene), swimmers(1, scene)
-    with interrupted(simulator, Kernel(monkeypatch, nth=nth, **{when: interrupt})):
-        simulator.stroke(COMMANDS[1])
+def assert_not_begun(simulator: Simulator, other: Simulator) -> None:
+    """The same now, and after another stroke, in which what is not seen shows, such as the twin of error bars."""
     assert_same(simulator, other)
     simulator.stroke(COMMANDS[2])
     other.stroke(COMMANDS[2])
     assert_same(simulator, other)
+
+
+@THREADS
+@pytest.mark.parametrize("when", ["before", "after"])
+@pytest.mark.parametrize("nth, bars", [(1, False), (3, False), (1, True), (12, True)])
+@pytest.mark.parametrize("actuator", [SmaPulse(), ThermalSma()], ids=["pulse", "thermal"])
+def test_an_interrupted_stroke_is_as_if_it_had_not_begun(monkeypatch, threads, when, nth, bars, actuator):
+    """In the twin of error bars, too, and after it: its eleven parts come first."""
+    scene = Scene(numerics=FAST, actuator=actuator)
+    simulator = swimmers(threads, scene, bars)
+    with interrupted(simulator, Kernel(monkeypatch, nth=nth, **{when: interrupt})):
+        simulator.stroke(COMMANDS[1])
+    assert_not_begun(simulator, swimmers(1, scene, bars))
 
 
 @THREADS
@@ -117,26 +124,30 @@ def test_a_part_that_fails_undoes_the_stroke(monkeypatch, threads):
     assert_same(simulator, swimmers())
 
 
+@BARS
 @THREADS
 @pytest.mark.parametrize("where", ["_begin_interval", "_end_interval"])
-def test_an_interrupt_before_or_after_the_kernels_undoes_the_stroke(monkeypatch, threads, where):
-    simulator, whole = swimmers(threads), getattr(Simulator, where)
+def test_an_interrupt_before_or_after_the_kernels_undoes_the_stroke(monkeypatch, threads, where, bars):
+    simulator, whole = swimmers(threads, bars=bars), getattr(Simulator, where)
 
     def broken_off(self, *arguments):
-        whole(self, *arguments)
-        raise KeyboardInterrupt
+        report = whole(self, *arguments)
+        if self is simulator:
+            raise KeyboardInterrupt
+        return report  # of its twin
 
     monkeypatch.setattr(Simulator, where, broken_off)
     with pytest.raises(KeyboardInterrupt):
         simulator.stroke(COMMANDS[1])
     monkeypatch.undo()
-    assert_same(simulator, swimmers())
+    assert_not_begun(simulator, swimmers(bars=bars))
 
 
 @pytest.mark.parametrize("how", ["interrupted", "closed", "dropped", "interrupted by whoever looks"])
 @THREADS
-def test_a_stroke_in_parts_that_does_not_come_to_its_end_has_not_begun(monkeypatch, threads, how):
-    simulator = swimmers(threads)
+@BARS
+def test_a_stroke_in_parts_that_does_not_come_to_its_end_has_not_begun(monkeypatch, threads, how, bars):
+    simulator = swimmers(threads, bars=bars)
     parts = simulator.stroke_in_parts(COMMANDS[1], 4)
     next(parts)
     assert simulator.time[0] > 1.0
@@ -151,7 +162,7 @@ def test_a_stroke_in_parts_that_does_not_come_to_its_end_has_not_begun(monkeypat
         case _:
             with pytest.raises(KeyboardInterrupt), contextlib.closing(parts):
                 raise KeyboardInterrupt
-    assert_same(simulator, swimmers())
+    assert_not_begun(simulator, swimmers(bars=bars))
 
 
 IN_THE_MIDDLE = {

@@ -338,11 +338,14 @@ def test_the_twin_of_error_bars_advances_likewise():
 # --- time and refusals -----------------------------------------------------------------------------------------------
 
 
-def test_the_clock_counts_intervals_without_drift():
-    simulator = Simulator(Scene(Seastar(nodes_per_limb=3), numerics=Numerics("implicit-euler", 0.1)))
+def test_the_clock_counts_intervals_and_strokes_without_drift():
+    numerics, pulse = Numerics("implicit-euler", 0.1), SmaPulse(cooling_time=0.2)
+    in_time, in_strokes = (Simulator(Scene(Seastar(nodes_per_limb=3), Water(), pulse, numerics)) for _ in range(2))
     for _ in range(1000):
-        simulator.advance(0.1)
-    assert simulator.time[0] == 1000 * 0.1 != sum([0.1] * 1000)
+        in_time.advance(0.1)
+        in_strokes.stroke(np.zeros((1, 5)))
+    assert in_time.time[0] == 1000 * 0.1 != sum([0.1] * 1000)
+    assert in_strokes.time[0] == 1000 * (0.1 + 0.2)
 
 
 @pytest.mark.parametrize(

@@ -1,59 +1,92 @@
 """A simulator refuses bad arguments in one sentence, before anything moves."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from hubs import TEN
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar, Simulator, State
-from seastar_gym.simd.lanes import N_LANES
+from strokes import assert_same
 
-STRAIGHT = np.array([[0.0, 1.0, 0.0, 0.0, -1.0]])
+STRAIGHT = np.array([[0.0, 1.0, 0.0, 0.0, -1.0]] * 2)
 SCENE = Scene(TEN, numerics=Numerics("implicit-midpoint", 0.01))
+MAKING = [
+    *(({"n_robots": value}, "n_robots", repr(value)) for value in (0, -1, 2.5, "2", None, True)),
+    *(({"scene": value}, "Scene") for value in (None, Scene, TEN, "chapter")),
+    *(({"threads": value}, "threads") for value in ("two", 1.5, -1, True)),
+]
 
 
-@pytest.mark.parametrize("value", [0, -1, 2.5, "2", None, True], ids=repr)
-def test_a_batch_has_one_robot_or_more(value):
-    with assert_refused("n_robots", repr(value)):
-        Simulator(Scene(TEN), value)
+@pytest.mark.parametrize("refused", MAKING, ids=str)
+def test_what_is_no_simulator_is_refused(refused):
+    arguments, *words = refused
+    with assert_refused(*words):
+        Simulator(**{"scene": SCENE, "n_robots": 2} | arguments)
 
 
-@pytest.mark.parametrize("scene", [None, Scene, TEN, "chapter"])
-def test_a_simulator_needs_a_scene(scene):
-    with assert_refused("Scene"):
-        Simulator(scene)
+def begin_parts(simulator: Simulator, commands=STRAIGHT, parts=2) -> None:
+    next(simulator.stroke_in_parts(commands, parts))
 
 
-@pytest.mark.parametrize("value", ["two", 1.5, -1, True], ids=repr)
-def test_threads_are_a_whole_number(value):
-    with assert_refused("threads"):
-        Simulator(Scene(TEN), 3 * N_LANES, threads=value)
+def set_part(field: str, shape: tuple[int, ...], simulator: Simulator) -> None:
+    """Set a state of which a part has another shape."""
+    simulator.set_state(simulator.get_state()._replace(**{field: np.zeros(shape)}))
 
 
-@pytest.mark.parametrize("shape", [(5,), (1, 5), (2, 4), (2, 6), (5, 2), (2, 5, 1), ()])
-def test_commands_of_another_shape_are_refused(shape):
-    with assert_refused("(n_robots, n_limbs) = (2, 5)", str(shape)):
-        Simulator(Scene(TEN), 2).stroke(np.zeros(shape))
+def set_number(field: str, value: float, simulator: Simulator) -> None:
+    """Set a state of which the last number of a part is another."""
+    state = simulator.get_state()
+    getattr(state, field).reshape(-1)[-1] = value
+    simulator.set_state(state)
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1.0000001, -2.0])
-def test_commands_beyond_one_or_not_numbers_are_refused_before_anything_moves(value):
-    simulator = Simulator(SCENE, 2)
-    simulator.stroke(np.tile(STRAIGHT, (2, 1)))
-    before, commands = simulator.get_state(), np.zeros((2, 5))
+def commands_with(value: float) -> np.ndarray:
+    commands = np.zeros((2, 5))
     commands[1, 2] = value
-    with assert_refused("[-1, 1]", "robot 1", "limb 3"):
-        simulator.stroke(commands)
-    with assert_refused("[-1, 1]"):
-        next(simulator.stroke_in_parts(commands, 2))
-    for now, then in zip(simulator.get_state(), before, strict=True):
-        np.testing.assert_array_equal(now, then)
+    return commands
 
 
-@pytest.mark.parametrize("commands", ["abc", [[1, 2], [3]], [["a"] * 5] * 2, np.full((2, 5), 1j)], ids=str)
-def test_commands_that_are_no_numbers_at_all_are_refused_with_a_sentence(commands):
-    with assert_refused("commands"):
-        Simulator(Scene(TEN), 2).stroke(commands)
+SHAPES = (5,), (1, 5), (2, 4), (2, 6), (5, 2), (2, 5, 1), ()
+OF_STATES = [
+    ("positions", (2, 45, 2)), ("positions", (1, 46, 2)), ("velocities", (2, 46, 3)), ("velocities", (2, 92)),
+    ("time", ()), ("time", (3,)),
+]  # fmt: skip
+NO_COMMANDS = "abc", [[1, 2], [3]], [["a"] * 5] * 2, np.full((2, 5), 1j)
+NO_STATES = (np.zeros((2, 46, 2)),), 3, None
+NO_MASKS = [1, 0], [True], [[True, False]], "both", np.ones(3, bool)
+RAGGED = [[True], [True, False]]
+ASKING = [
+    *((partial(Simulator.stroke, commands=np.zeros(shape)), "(n_robots, n_limbs) = (2, 5)", str(shape))
+      for shape in SHAPES),
+    *((partial(call, commands=commands_with(value)), "[-1, 1]", "robot 1", "limb 3")
+      for call in (Simulator.stroke, begin_parts) for value in (np.nan, np.inf, -np.inf, 1.0000001, -2.0)),
+    *((partial(Simulator.stroke, commands=commands), "commands") for commands in NO_COMMANDS),
+    *((partial(begin_parts, parts=parts), "parts") for parts in (0, -1, 2.5, None)),
+    *((partial(set_number, field, value), f"State.{field}", "finite")
+      for field in State._fields[:3] for value in (np.nan, np.inf)),
+    *((partial(set_part, field, shape), f"State.{field}", str(shape)) for field, shape in OF_STATES),
+    *((partial(Simulator.set_state, state=state), "State") for state in NO_STATES),
+    *((partial(Simulator.reset, mask=mask), "mask", "(2,)") for mask in NO_MASKS),
+    *((partial(Simulator.reset, heading=heading), "heading", "finite") for heading in (np.nan, [0.0, np.inf])),
+    *((partial(Simulator.reset, heading=heading), "heading")
+      for heading in ([0.0, 1.0, 2.0], "north", [[0.0], [1.0]])),
+    (partial(Simulator.reset, mask=RAGGED), "mask", "rows of different lengths"),
+    (partial(Simulator.set_scene, scene=SCENE, mask=RAGGED), "mask", "rows of different lengths"),
+]  # fmt: skip
+"""What two robots are asked for, and words of the refusal."""
+
+
+@pytest.mark.parametrize("refused", ASKING, ids=lambda refused: " ".join(refused[1:]))
+def test_what_means_nothing_is_refused_before_anything_moves(refused):
+    call, *words = refused
+    simulator, other = Simulator(SCENE, 2), Simulator(SCENE, 2)
+    for each in (simulator, other):
+        each.stroke(STRAIGHT)
+    with assert_refused(*words):
+        call(simulator)
+    assert_same(simulator, other)
 
 
 def test_a_turning_hub_refuses_the_command_that_closes_it():
@@ -61,63 +94,3 @@ def test_a_turning_hub_refuses_the_command_that_closes_it():
     with assert_refused("robot 1", "limbs 2 and 3", "opening"):
         simulator.stroke([[0.0] * 5, [0.0, 1.0, -1.0, 0.0, 0.0]])
     assert not simulator.stroke([[0.0] * 5, [0.0, -1.0, 1.0, 0.0, 0.0]]).status.any()
-
-
-@pytest.mark.parametrize("field", range(3))
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_states_that_are_not_finite_are_refused_and_change_nothing(field, value):
-    simulator = Simulator(SCENE, 2)
-    simulator.stroke(np.tile(STRAIGHT, (2, 1)))
-    before, state = simulator.get_state(), simulator.get_state()
-    state[field].reshape(-1)[-1] = value
-    with assert_refused(f"State.{State._fields[field]}", "finite"):
-        simulator.set_state(state)
-    for now, then in zip(simulator.get_state(), before, strict=True):
-        np.testing.assert_array_equal(now, then)
-
-
-@pytest.mark.parametrize(
-    "field, shape", [(0, (2, 45, 2)), (0, (1, 46, 2)), (1, (2, 46, 3)), (1, (2, 92)), (2, ()), (2, (3,))]
-)
-def test_states_of_another_shape_are_refused(field, shape):
-    simulator = Simulator(Scene(TEN), 2)
-    state = list(simulator.get_state())
-    state[field] = np.zeros(shape)
-    with assert_refused(f"State.{State._fields[field]}", str(shape)):
-        simulator.set_state(state)
-
-
-@pytest.mark.parametrize("state", [(np.zeros((1, 46, 2)),), 3, None], ids=["one field", "number", "None"])
-def test_what_is_no_state_is_refused_with_a_sentence(state):
-    with assert_refused("State"):
-        Simulator(Scene(TEN)).set_state(state)
-
-
-@pytest.mark.parametrize("mask", [[1, 0], [True], [[True, False]], "both", np.ones(3, bool)], ids=str)
-def test_masks_of_another_shape_or_kind_are_refused(mask):
-    with assert_refused("mask", "(2,)"):
-        Simulator(Scene(TEN), 2).reset(mask)
-
-
-@pytest.mark.parametrize("heading", [np.nan, [0.0, np.inf]], ids=str)
-def test_headings_that_are_not_finite_are_refused(heading):
-    with assert_refused("heading", "finite"):
-        Simulator(Scene(TEN), 2).reset(heading=heading)
-
-
-@pytest.mark.parametrize("heading", [[0.0, 1.0, 2.0], "north", [[0.0], [1.0]]], ids=str)
-def test_headings_of_another_shape_are_refused_with_a_sentence(heading):
-    with assert_refused("heading"):
-        Simulator(Scene(TEN), 2).reset(heading=heading)
-
-
-@pytest.mark.parametrize("parts", [0, -1, 2.5, None], ids=repr)
-def test_a_stroke_has_one_part_or_more(parts):
-    with assert_refused("parts"):
-        next(Simulator(Scene(TEN)).stroke_in_parts(STRAIGHT, parts))
-
-
-@pytest.mark.parametrize("name, arguments", [("reset", ()), ("set_scene", (SCENE,))])
-def test_a_mask_of_rows_of_different_lengths_is_refused(name, arguments):
-    with assert_refused("mask", "rows of different lengths"):
-        getattr(Simulator(SCENE, 2), name)(*arguments, mask=[[True], [True, False]])

@@ -95,13 +95,6 @@ def test_what_is_read_is_a_copy():
     assert_same_bits(simulator.get_state(), before)
 
 
-def test_time_counts_strokes():
-    simulator = Simulator(Scene(TEN, actuator=SmaPulse(cooling_time=0.2), numerics=Numerics(step=0.05)))
-    for _ in range(1000):
-        simulator.stroke(np.zeros((1, 5)))
-    assert simulator.time[0] == 1000 * (0.1 + 0.2)
-
-
 def test_reset_puts_the_chosen_robots_at_rest_and_touches_no_other():
     simulator, commands = Simulator(scene_of(), n_robots=11), random_commands(11)
     simulator.stroke(commands[0])
@@ -128,6 +121,7 @@ def test_no_state_leaks_across_a_reset():
 def test_heading_turns_the_robot_at_rest():
     simulator, headings = Simulator(Scene(TEN), n_robots=3), np.array([0.0, 0.7, -3.0])
     simulator.reset(heading=headings)
+    np.testing.assert_allclose(simulator.heading(), headings, rtol=0.0, atol=1e-12)
     for nodes, heading in zip(simulator.positions, headings, strict=True):
         c, s = np.cos(heading), np.sin(heading)
         np.testing.assert_allclose(nodes, TEN.nodes() @ [[c, s], [-s, c]], rtol=0.0, atol=1e-16)
@@ -206,11 +200,13 @@ def test_any_lane_width_gives_the_same_bits(tmp_path, width):
 @pytest.mark.parametrize("parts", [1, 2, 7, 10, 100])
 def test_a_stroke_in_parts_gives_the_same_bits_as_a_whole_one(scheme, parts):
     whole, cut = Simulator(scene_of(scheme), 3), Simulator(scene_of(scheme), 3)
-    for command in random_commands(3):
+    for k, command in enumerate(random_commands(3)):
         report = whole.stroke(command)
-        times, cut_report = finished(cut.stroke_in_parts(command, parts))
-        assert len(times) == parts and times[-1] == 1.0
-        np.testing.assert_allclose(times, np.arange(1, parts + 1) / parts, atol=0.01)
+        seen, cut_report = finished(cut.stroke_in_parts(command, parts), lambda time: (time, *cut.time))
+        times = np.array(seen)
+        assert len(times) == parts and (times[-1] == [1.0, *[k + 1.0] * 3]).all()
+        np.testing.assert_allclose(times[:, 0], np.arange(1, parts + 1) / parts, atol=0.01)
+        np.testing.assert_allclose(times[:, 1:], k + times[:, :1] * np.ones(3), rtol=1e-12)
         assert_same_bits(whole.get_state(), cut.get_state())
         for one, other in zip(report, cut_report, strict=True):
             np.testing.assert_array_equal(one, other)
@@ -223,37 +219,22 @@ def test_a_stroke_of_any_length_pauses_after_equal_times():
     np.testing.assert_allclose(times, 1e-28 * np.arange(1, 11), rtol=1e-9, atol=0.0)
 
 
-def test_time_runs_on_within_a_stroke_in_parts():
-    simulator = Simulator(scene_of(), 2)
-    simulator.stroke(random_commands(2)[0])
-    for time in simulator.stroke_in_parts(random_commands(2)[1], 4):
-        np.testing.assert_allclose(simulator.time, 1.0 + time, rtol=1e-12)
-    assert simulator.time.tolist() == [2.0, 2.0]
-
-
+@pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("scheme", EVERY_WAY)
-def test_a_state_set_again_continues_to_the_same_bits(scheme):
-    first, second, commands = Simulator(scene_of(scheme), 3), Simulator(scene_of(scheme), 3), random_commands(3, 4)
+def test_a_state_set_again_and_a_pickle_continue_to_the_same_bits(scheme, threads):
+    n_robots = N_LANES + 1
+    first, second = (Simulator(scene_of(scheme), n_robots, threads) for _ in range(2))
+    commands = random_commands(n_robots, 4)
     for command in commands[:2]:
         first.stroke(command)
     second.stroke(commands[3])
     second.set_state(first.get_state())
+    third = pickle.loads(pickle.dumps(first))
     for command in commands[2:]:
-        first.stroke(command)
-        second.stroke(command)
+        for simulator in (first, second, third):
+            simulator.stroke(command)
         assert_same_bits(first.get_state(), second.get_state())
-
-
-@pytest.mark.parametrize("threads", [1, 2])
-def test_a_pickled_simulator_continues_to_the_same_bits(threads):
-    n_robots = N_LANES + 1
-    first, commands = Simulator(scene_of("sdirk3"), n_robots, threads=threads), random_commands(n_robots)
-    first.stroke(commands[0])
-    second = pickle.loads(pickle.dumps(first))
-    for command in commands[1:]:
-        first.stroke(command)
-        second.stroke(command)
-        assert_same_bits(first.get_state(), second.get_state())
+        assert_same_bits(first.get_state(), third.get_state())
 
 
 def test_a_pickled_simulator_swims_on_under_another_lane_width(tmp_path):

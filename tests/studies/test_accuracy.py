@@ -13,7 +13,6 @@ from seastar_gym.accuracy.measure import swim as swim_commands
 from seastar_gym.accuracy.setting import at
 from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene.numerics import Resolution
-from seastar_gym.simulator import Simulator
 from studies.accuracy import convergence
 from studies.accuracy import rows as accuracy_rows
 from studies.accuracy import study as accuracy
@@ -39,8 +38,8 @@ TINY = Plan(
 KINDS = ("path", "straight", "pair", "pentagon", "random", "slow", "gait", "heading", "end")
 
 
-def ten(numerics: Numerics, discretisation: str = "chapter", nodes: int = 10) -> Scene:
-    return at(Scene(), Resolution(discretisation, nodes, numerics))
+def ten(numerics: Numerics) -> Scene:
+    return at(Scene(), Resolution("chapter", 10, numerics))
 
 
 def swim(cases: Cases, scene: Scene) -> Swims:
@@ -111,20 +110,7 @@ def test_slow_swims_are_a_tenth_of_random_ones_and_gaits_repeat():
     assert np.isin(alternating[:, ::2], (-1.0, 0.0, 1.0)).all()
 
 
-def test_a_scene_of_a_setting_is_the_physics_with_its_resolution_and_numerics():
-    numerics = Numerics("sdirk3", 0.05)
-    scene = ten(numerics, "continuum", 7)
-    assert scene.is_chapters and scene.numerics == numerics
-    assert (scene.robot.discretisation, scene.robot.nodes_per_limb) == ("continuum", 7)
-
-
 # Errors
-
-
-def test_heading_is_what_a_robot_was_turned_by():
-    simulator = Simulator(ten(Numerics()), 3)
-    simulator.reset(heading=[0.0, 0.4, -2.5])
-    np.testing.assert_allclose(simulator.heading(), [0.0, 0.4, -2.5], atol=1e-12)
 
 
 def test_figures_leave_gaits_and_slow_swims_out_of_the_path_error():
@@ -159,13 +145,9 @@ def test_two_schemes_of_different_kind_agree_on_the_converged_straight_swim():
 # Promises
 
 
-def test_a_promise_is_the_sum_of_space_and_time():
+def test_a_promise_is_the_sum_of_space_and_time_with_a_margin_for_gaits_that_were_not_measured():
     (only,) = accuracy_rows.promised([row(space=0.1, time=0.02)])
     assert only.total("path") == only.promise("path") == pytest.approx(0.12)
-
-
-def test_a_promise_of_gaits_has_a_margin_for_those_that_were_not_measured():
-    (only,) = accuracy_rows.promised([row(space=0.1, time=0.02)])
     assert only.promise("gait") == only.promise("slow") == pytest.approx(1.5 * only.total("gait"))
 
 

@@ -15,7 +15,7 @@ from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.configurations import Swim, configuration_with
 from seastar_gym.sweep.swimming import swim
 from studies.designs import search
-from studies.designs.front import AT_WORK, CHAPTER, FASTEST, OWN, STUDY, THRIFTIEST, draw, radii, scene_of
+from studies.designs.front import AT_WORK, CHAPTER, FASTEST, OWN, STUDY, THRIFTIEST, radii, scene_of
 from studies.designs.search import CHILDREN, POWERS, Limit, children, fastest, first, grown, sizes, thriftiest
 from studies.designs.space import ANGLES, MEASURED, Body
 from studies.frame import DOCS
@@ -95,8 +95,3 @@ def test_the_page_and_the_readme_tell_the_front():
     robots = FRONT["robots"]
     gain = f"{robots[AT_WORK]['mm_per_s'] / robots[CHAPTER]['mm_per_s']:.1f} times as fast"
     assert gain in page and gain in readme
-
-
-def test_the_picture_is_drawn_from_what_is_written(tmp_path):
-    draw(FRONT, tmp_path / "front.png")
-    assert (tmp_path / "front.png").stat().st_size > 20_000

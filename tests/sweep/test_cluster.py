@@ -56,19 +56,14 @@ def test_a_node_that_is_killed_in_mid_sweep_costs_its_cells(cluster, tmp_path):
     assert len(nodes) == 2 and min(nodes.values()) <= 6  # what was done on the killed node before
 
 
-@pytest.mark.parametrize("address", ["127.0.0.1:1", "127.0.0.1:99999"])
-def test_there_is_no_cluster_at_a_wrong_address(address):
+@pytest.mark.parametrize(
+    "address, words", [*((f"127.0.0.1:{port}", "no Ray cluster") for port in (1, 99999)), ("head", "HOST:PORT")]
+)
+def test_there_is_no_cluster_at_a_wrong_address(address, words):
     from seastar_gym.executors.on_ray import RayTasks
 
-    with assert_refused("no Ray cluster", address):
+    with assert_refused(words, address):
         next(RayTasks(address).run(works.named, iter(())))
-
-
-def test_an_address_has_a_port():
-    from seastar_gym.executors.on_ray import RayTasks
-
-    with assert_refused("HOST:PORT", "head"):
-        next(RayTasks("head").run(works.named, iter(())))
 
 
 @pytest.mark.slow

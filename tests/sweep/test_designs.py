@@ -191,15 +191,7 @@ def test_bad_sweeps_are_refused(arguments, words):
         Sweep(FAST, *arguments)
 
 
-def test_a_scene_of_several_robots_is_refused():
-    with assert_refused("one robot"):
-        Sweep(Scene(Seastar(limb_length=np.array([0.1, 0.2]))), ())
-
-
-def test_a_number_that_not_all_choices_have_is_refused():
-    axes = Choices("fluid", (FAST.fluid, None), ("water", "vacuum")), Range("fluid.density", 900.0, 1100.0)
-    with assert_refused("vacuum", "fluid.density"):
-        Sweep(FAST, axes, samples=2)
+WATER_OR_NOT = Choices("fluid", (FAST.fluid, None), ("water", "vacuum"))
 
 
 @pytest.mark.parametrize(
@@ -213,8 +205,11 @@ def test_a_number_that_not_all_choices_have_is_refused():
         (lambda: Choices("x", [1]), ("tuple of values",)),
         (lambda: Choices("x", (1, 2), ("a",)), ("labels",)),
         (lambda: Choices("x", (SmaPulse(0.1), SmaPulse(0.2))), ("labels that differ",)),
+        (lambda: Sweep(FAST, (WATER_OR_NOT, Range("fluid.density", 900.0, 1100.0)), samples=2),
+         ("vacuum", "fluid.density")),
+        (lambda: Sweep(Scene(Seastar(limb_length=np.array([0.1, 0.2]))), ()), ("one robot",)),
     ],
-)
+)  # fmt: skip
 def test_bad_axes_are_refused(make, words):
     with assert_refused(*words):
         make()
@@ -251,6 +246,12 @@ def test_a_range_has_both_ends_and_its_shares_in_between():
             Range(name, 0.0, 1.0)
 
 
+def test_a_straight_swim_goes_ahead_and_turns_nothing():
+    (batch,) = Sweep(FAST, (), settling=1, measured=2).batches()
+    found = swim(batch)
+    assert found["ahead"][0] > 0.0 and abs(found["aside"][0]) < 1e-12 and abs(found["turn"][0]) < 1e-9
+
+
 def test_a_swim_is_measured_after_it_has_settled():
     """Columns of repeated strokes are those of a simulator, robot by robot."""
     lengths = np.array([0.08, 0.1])
@@ -271,7 +272,7 @@ def test_a_swim_is_measured_after_it_has_settled():
             "newton_iterations": sum(report.newton_iterations.item() for report in reports + measured),
             "smallest_opening_angle": min(report.smallest_opening_angle.item() for report in reports + measured),
         }  # fmt: skip
-        assert {name: values[k] for name, values in found.items()} == pytest.approx(expected, rel=1e-9)
+        assert {name: values[k] for name, values in found.items()} == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_design_that_a_scene_refuses_costs_itself_alone():
@@ -279,5 +280,7 @@ def test_a_design_that_a_scene_refuses_costs_itself_alone():
     found = swim(Batch(frame, {"robot.limb_length": np.array([0.1, -1.0])}, 2))
     assert found["status"].tolist() == [0, REFUSED] and found["status"].dtype == np.int64
     assert np.isnan([found[name][1] for name in UNITS if name != "status"]).all() and found["speed"][0] > 0.0
+    alone = swim(Batch(frame, {"robot.limb_length": np.array([0.1])}, 1))
+    assert all(found[name][0] == alone[name][0] for name in UNITS)
     none = swim(Batch(frame, {"robot.limb_length": np.array([-1.0])}, 1))
     assert none["status"].tolist() == [REFUSED] and np.isnan(none["speed"]).all()

@@ -14,6 +14,7 @@ import optuna
 import pytest
 from optuna.trial import TrialState
 
+from losing import Losing, first
 from refusals import assert_refused
 from seastar_gym.executors import Outcome
 from seastar_gym.executors.here import Here
@@ -78,14 +79,6 @@ def states(study):
     return [trial.state for trial in study.get_trials(deepcopy=False)]
 
 
-class Losing:
-    """An executor that loses the first batch."""
-
-    def run(self, work, batches):
-        for k, batch in enumerate(batches):
-            yield Outcome(batch, None, "Lost.") if k == 0 else Outcome(batch, work(batch))
-
-
 def test_proposals_are_simulated_and_told(storage, tmp_path):
     study = explore(SWEEP, Search(), storage, 10, tmp_path, Here())
     assert states(study) == [TrialState.COMPLETE] * 10
@@ -130,7 +123,7 @@ def test_another_file_of_any_controller_is_another_study(sqlite, tmp_path):
 
 
 def test_proposals_of_a_lost_cell_are_proposed_again(sqlite, tmp_path):
-    study = explore(SWEEP, Search(), sqlite, 6, tmp_path, Losing())
+    study = explore(SWEEP, Search(), sqlite, 6, tmp_path, Losing(first(1)))
     lost = [trial for trial in study.trials if trial.state == TrialState.FAIL]
     again = {trial.user_attrs["put back"]: trial for trial in study.trials if "put back" in trial.user_attrs}
     assert lost and set(again) == {trial.number for trial in lost}

@@ -10,8 +10,6 @@ import pytest
 from own_actuators import Remembering, Triangle
 from refusals import assert_refused
 from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires, ThermalSma
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry import SymmetryReduction
 from seastar_gym.scene.actuators.actuator import Actuator, complete
 
 NUMERICS = Numerics("implicit-midpoint", 0.01)
@@ -78,18 +76,14 @@ def test_phases_that_do_not_go_once_round_are_refused(tmp_path, text):
         MeasuredCurve.from_curvatures(file, 1.0, 0.03)
 
 
-@pytest.mark.parametrize("text", ["0,0\n1,0,0\n", "0,0\n0.5\n", "time,angle\n", "0,O\n", ""])
-def test_lines_that_are_no_samples_are_refused(tmp_path, text):
+JUMPING = "0,0\n1,1\n"
+
+
+@pytest.mark.parametrize("text", ["0,0\n1,0,0\n", "0,0\n0.5\n", "time,angle\n", "0,O\n", "", JUMPING])
+def test_lines_that_are_no_samples_and_curves_that_jump_are_refused_by_the_name_of_their_file(tmp_path, text):
     file = tmp_path / "curve.csv"
     file.write_text(text)
-    with assert_refused(str(file)):
-        MeasuredCurve.from_csv(file)
-
-
-def test_a_curve_that_jumps_is_refused_by_the_name_of_its_file(tmp_path):
-    file = tmp_path / "curve.csv"
-    file.write_text("0,0\n1,1\n")
-    with assert_refused("curve.csv: A measured curve must begin and end at 0"):
+    with assert_refused(str(file), "curve.csv: A measured curve must begin and end at 0" if text == JUMPING else ""):
         MeasuredCurve.from_csv(file)
 
 
@@ -167,20 +161,6 @@ def test_a_slow_limb_goes_on_from_where_the_last_stroke_left_it():
     assert not np.any([turn[1:] for turn in turns])
 
 
-def test_a_stroke_left_half_way_is_forgotten():
-    simulator = Simulator(Scene(actuator=SLOW, numerics=NUMERICS), 2)
-    stroke = simulator.stroke_in_parts(np.ones((2, 5)), 4)
-    next(stroke)
-    assert simulator.actuators.all()
-    stroke.close()
-    assert not simulator.actuators.any() and simulator.elastic_energy()[0] < 1e-20
-
-
-def test_what_has_a_memory_is_not_limited():
-    with pytest.raises(ValueError, match="without memory"):
-        Limited(SLOW)
-
-
 # --- weak limbs ------------------------------------------------------------------------------------------------------
 
 
@@ -203,20 +183,6 @@ def test_every_robot_may_have_weak_limbs_of_its_own():
                 batch.stroke(COMMANDS[0])
                 copy.stroke(COMMANDS[0])
             assert batch.positions[robot].tobytes() == alone.positions[0].tobytes() == copy.positions[robot].tobytes()
-
-
-@pytest.mark.parametrize(
-    "strengths", [(1.0,) * 4, (1.0, 1.0, 1.0, 1.0, 1.1), (-0.1, 1.0, 1.0, 1.0, 1.0), [1.0] * 5, "a"]
-)
-def test_strengths_are_shares_one_per_limb(strengths):
-    with pytest.raises(ValueError, match="limb_strengths"):
-        Scene(limb_strengths=strengths)
-
-
-@pytest.mark.parametrize("strengths", [np.ones(4), np.full((2, 5), 1.5), np.full(5, np.nan), np.ones((3, 5))])
-def test_strengths_of_a_batch_are_shares_too(strengths):
-    with pytest.raises(ValueError, match="limb_strengths"):
-        Simulator(Scene(), 2).set_limb_strengths(strengths)
 
 
 # --- any actuator ----------------------------------------------------------------------------------------------------
@@ -247,52 +213,32 @@ def test_what_an_actuator_of_ones_own_says_is_heeded():
     np.testing.assert_allclose(simulator.stroke(np.ones((2, 5))).energy, 2.0 * 5 * 0.6)
 
 
-@pytest.mark.parametrize(
-    "changes, words",
-    [
-        ({"corners": (0.0, 0.2, 0.5)}, "from 0 to its period"),
-        ({"corners": (0.0, 0.7, 0.6)}, "increasing"),
-        ({"peak_angle": 0.2}, "largest angle"),
-        ({"delta_psi": lambda self, t: 0.1 + 0.0 * t}, "jump"),
-        ({"delta_psi": lambda self, t: 0.1}, "per time"),
-    ],
-)
-def test_an_actuator_that_contradicts_itself_is_refused(changes, words):
-    with pytest.raises(ValueError, match=words):
-        Scene(actuator=type("Wrong", (Triangle,), changes)())
+def wrong(**changes):
+    """A scene of an actuator that contradicts itself."""
+    return Scene(actuator=type("Wrong", (Triangle,), changes)())
 
 
-def test_a_turning_hub_has_no_room_for_a_stroke_that_begins_turned():
-    robot = Seastar(hub_hinge="turning", discretisation="chapter")
-    with pytest.raises(ValueError, match="above zero"):
-        Scene(robot, actuator=Limited(SmaPulse(), largest_rate=1.0))
+TURNING = Seastar(hub_hinge="turning", discretisation="chapter")
+NO_STRENGTHS = (1.0,) * 4, (1.0, 1.0, 1.0, 1.0, 1.1), (-0.1, 1.0, 1.0, 1.0, 1.0), [1.0] * 5, "a"
+NO_STRENGTHS_OF_TWO = np.ones(4), np.full((2, 5), 1.5), np.full(5, np.nan), np.ones((3, 5))
+REFUSED = [
+    (lambda: wrong(corners=(0.0, 0.2, 0.5)), "from 0 to its period"),
+    (lambda: wrong(corners=(0.0, 0.7, 0.6)), "increasing"),
+    (lambda: wrong(peak_angle=0.2), "largest angle"),
+    (lambda: wrong(delta_psi=lambda self, t: 0.1 + 0.0 * t), "jump"),
+    (lambda: wrong(delta_psi=lambda self, t: 0.1), "per time"),
+    (lambda: Limited(SLOW), "without memory"),
+    (lambda: Scene(TURNING, actuator=Limited(SmaPulse(), largest_rate=1.0)), "above zero"),  # a stroke begins turned
+    *((partial(Scene, limb_strengths=strengths), "limb_strengths") for strengths in NO_STRENGTHS),
+    *((partial(Simulator(Scene(), 2).set_limb_strengths, shares), "limb_strengths") for shares in NO_STRENGTHS_OF_TWO),
+]
+"""Actuators and strengths of limbs that cannot be."""
 
 
-# --- the environment -------------------------------------------------------------------------------------------------
-
-
-def test_what_actuators_remember_is_seen_before_the_waypoints():
-    env = SeastarSwimEnv(scene=Scene(actuator=SLOW, numerics=NUMERICS))
-    plain = SeastarSwimEnv(scene=Scene(numerics=NUMERICS))
-    first, _ = env.reset(seed=0)
-    assert first.shape == env.observation_space.shape == (plain.reset(seed=0)[0].size + 5,)
-    np.testing.assert_array_equal(first[-9:-4], 0.0)
-    observation, *_ = env.step([0, 1, 0, 0, 2])
-    np.testing.assert_allclose(observation[-9:-4], env.simulator.actuators[0, :, 0] / (np.pi / 5), rtol=1e-6)
-    assert observation[-8] > 0.0 > observation[-5]
-
-
-@pytest.mark.parametrize(
-    "scene, words",
-    [
-        (Scene(actuator=Remembering()), "remember"),
-        (Scene(limb_strengths=(1.0, 1.0, 0.5, 1.0, 1.0)), "equally strong"),
-        (Scene(loads=((3, 1e-5, 0.0),)), "loaded"),
-    ],
-)
-def test_symmetry_is_refused_where_the_scene_has_none(scene, words):
-    with pytest.raises(ValueError, match=words):
-        SymmetryReduction(SeastarSwimEnv(scene=scene))
+@pytest.mark.parametrize("make, words", REFUSED)
+def test_what_contradicts_itself_or_its_robot_is_refused(make, words):
+    with assert_refused(words):
+        make()
 
 
 def test_a_missing_file_of_a_curve_is_said_in_one_sentence(tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +14,6 @@ from scipy.integrate import solve_ivp
 import oracle
 from refusals import assert_refused
 from seastar_gym import AlongLimb, Limited, Numerics, Scene, Seastar, Simulator, SmaLimb, SmaPulse, SmaWires, ThermalSma
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.scene.actuators.actuator import check_actuator
 from seastar_gym.scene.actuators.pulse import pulse
 from seastar_gym.scene.actuators.sma_limb import MEASURED
@@ -115,15 +115,6 @@ def test_corners_are_those_of_the_wire_whatever_the_period(period):
     assert set(wires.corners) == {0.0, 0.1, 1.0, period} and wires.period == period
     check_actuator(wires)
     assert SmaWires(heating_time=0.1, cooling_time=0.2, period=0.3).corners == (0.0, 0.1, 0.3)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [{"refractory": 1}, {"period": None, "heating_time": 1e308, "cooling_time": 1e308}],
-)  # fmt: skip
-def test_pairs_of_wires_that_cannot_be_are_refused(change):
-    with assert_refused(next(iter(change))):
-        SmaWires(**change)
 
 
 # The thermal actuator: its heat, its hysteresis, and what a batch of robots remembers of it.
@@ -249,15 +240,6 @@ def test_it_swims_about_as_far_as_the_pulse():
     assert hubs[0] == pytest.approx(hubs[1], rel=0.2)
 
 
-def test_temperatures_are_observed():
-    env = SeastarSwimEnv(scene=SCENE)
-    first, _ = env.reset(seed=0)
-    assert first.size == 186 + 20 == env.observation_space.shape[0]
-    observation, *_ = env.step([1, 0, 0, 0, 0])
-    seen = observation[-24:-4].reshape(5, 4)
-    assert 0.0 < seen[0, 0] < 1.0 and 0.0 < seen[0, 2] < 1.0 and not seen[1:].any()
-
-
 # --- a largest temperature -------------------------------------------------------------------------------------------
 
 LIMIT = 75.0
@@ -297,18 +279,6 @@ def test_a_limit_that_is_never_reached_changes_no_bit():
         rest = np.tile(one.rest, (4, 1))
         for seen, wanted in zip(other.respond(t, commands, rest), one.respond(t, commands, rest), strict=True):
             np.testing.assert_array_equal(seen, wanted)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"water_temperature": 22.0}, {"austenite_start": 80.0}, {"martensite_start": 80.0}, {"martensite_finish": 24.0},
-        {"austenite_start": 70.5}, {"time_constant": 0.9e-3}, {"largest_temperature": 20.0},
-    ],
-)  # fmt: skip
-def test_wires_that_cannot_be_are_refused(change):
-    with pytest.raises(ValueError, match=r"\.$"):
-        ThermalSma(**change)
 
 
 # The limb with measured curves: its heat, its delay, its presets, and what it makes of the chapter's commands.
@@ -394,18 +364,24 @@ def test_a_robot_swims_with_intervals_of_any_length_and_forgets_on_reset(duratio
     assert not simulator.actuators.any()
 
 
-@pytest.mark.parametrize(
-    "change",
-    [{"heating_time": 1e3}, {"time_constant": 1e9}],
+NO_WIRES = (
+    {"water_temperature": 22.0}, {"austenite_start": 80.0}, {"martensite_start": 80.0}, {"martensite_finish": 24.0},
+    {"austenite_start": 70.5}, {"time_constant": 0.9e-3}, {"largest_temperature": 20.0},
 )  # fmt: skip
-def test_limbs_that_cannot_be_are_refused(change):
-    with assert_refused("heating_time"):
-        replace(LIMB, **change)
+REFUSED = [
+    (partial(SmaWires, refractory=1), "refractory"),
+    (partial(SmaWires, period=None, heating_time=1e308, cooling_time=1e308), "period"),
+    *((partial(ThermalSma, **change), "") for change in NO_WIRES),
+    (partial(replace, LIMB, heating_time=1e3), "heating_time"),
+    (partial(replace, LIMB, time_constant=1e9), "heating_time"),
+    (partial(SmaLimb.preset, 15), "0, 10, 20, 30, 40, 50 % of liquid metal"),  # it was not measured
+]
 
 
-def test_a_material_that_was_not_measured_is_refused():
-    with assert_refused("0, 10, 20, 30, 40, 50 % of liquid metal"):
-        SmaLimb.preset(15)
+@pytest.mark.parametrize("make, words", REFUSED)
+def test_wires_and_limbs_that_cannot_be_are_refused(make, words):
+    with assert_refused(words):
+        make()
 
 
 # The pulse is the ramp of Fig. 13.5b.
