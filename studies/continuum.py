@@ -23,9 +23,8 @@ from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene import Contact, Limb, Numerics, Scene, Seastar, SmaPulse, Vortex, Water
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study
+from studies.frame import Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.style import CYCLE, PERCENT, as_percent, subplots
 
 TAU = 5e-3

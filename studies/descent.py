@@ -30,9 +30,8 @@ from seastar_gym.identify import Measurement, identify
 from seastar_gym.scene import Contact, Limb, Scene, SmaWires
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.per_robot import with_numbers
-from studies.frame import DOCS, RESULTS, Results, Study
+from studies.frame import DOCS, RESULTS, Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 
 Floats = NDArray[np.float64]
 

@@ -5,13 +5,14 @@ its room, whose module is `study`.
 """
 
 import json
+import re
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from studies.results_file import keep
+from seastar_gym.files import write_atomically
 
 DOCS = Path(__file__).parents[1] / "docs"
 RESULTS = Path("results")
@@ -149,3 +150,27 @@ def require_known(kind: str, asked: Collection[str], known: Collection[str]) -> 
 def seed(cell: tuple[str, Any]) -> int:
     """Number of a cell that is named by its seed; 0 for others."""
     return int(cell[0]) if cell[0].isdecimal() else 0
+
+
+# Numbers as JSON that a person can read: one line for every list of numbers.
+
+
+INNERMOST = re.compile(r"\[\n([^\[\]{}]*)\n\s*\]")
+BREAK = re.compile(r"\n\s*")
+
+
+def as_json(results: Mapping[str, Any]) -> str:
+    """Plain data as JSON; ValueError where a number is not finite."""
+    text = json.dumps(results, indent=1, ensure_ascii=False, allow_nan=False)
+    return INNERMOST.sub(lambda found: f"[{BREAK.sub(' ', found[1]).strip()}]", text) + "\n"
+
+
+def keep(results: Mapping[str, Any], file: Path) -> None:
+    """Write plain data into a file, whose folder is made."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(file, as_json(results).encode())
+
+
+def rounded(value: float, digits: int = 4) -> float:
+    """A number with a few significant digits."""
+    return float(f"{value:.{digits}g}")

@@ -37,9 +37,8 @@ from seastar_gym.scene import (
 from seastar_gym.scene.numerics import Fidelity, SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study
+from studies.frame import Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.speed.operations import count_operations, numbers_moved
 from studies.speed.terms import scenes as scenes_of_terms
 from studies.style import CYCLE, FAINT, subplots

@@ -32,9 +32,8 @@ from seastar_gym.gradients import differentiate, record
 from seastar_gym.scene import Contact, Scene, SmaWires, Vortex, Water
 from seastar_gym.scene.per_robot import at, side_by_side, with_numbers
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study
+from studies.frame import Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.style import CYCLE, INK, subplots
 
 Floats = NDArray[np.float64]

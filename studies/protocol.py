@@ -120,9 +120,7 @@ def written_down(results: Mapping[str, Any]) -> Scene:
 
 def environment(scene: Scene, seed: int, path: str = "pentagon", logs: Path | None = None) -> PlantSwim:
     """The tank on a day, as policies see it."""
-    return PlantSwim(
-        plant(seed), LIMITS, scene=scene, decision_period=PERIOD, actions="pairs", path=path, logs=logs
-    )
+    return PlantSwim(plant(seed), LIMITS, scene=scene, decision_period=PERIOD, actions="pairs", path=path, logs=logs)
 
 
 def track(scene: Scene, folder: Path, seed: int) -> Measurement:

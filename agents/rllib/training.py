@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 from ray.rllib.algorithms.ppo import PPO
 from ray.rllib.utils.metrics import ENV_RUNNER_RESULTS, NUM_ENV_STEPS_SAMPLED_LIFETIME
 
-from agents.rllib.algorithm import make_algorithm
+from agents.rllib.algorithm import make_algorithm, policy_of
 from agents.rllib.options import Options
-from agents.rllib.policy import policy_of
 from agents.training import efficiency
 from agents.training.folder import recorded
 from seastar_gym.controllers.learned import save

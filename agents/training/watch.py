@@ -1,8 +1,10 @@
 """Watch over a training: progress bar, logs, checkpoints, and an orderly stop."""
 
+import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import FrameType
 
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
@@ -117,3 +119,25 @@ class Watch(BaseCallback):
         self.efficiency = self.efficiency.after(strokes, seconds, done)
         efficiency.write(self.efficiency, self.folder)
         return done
+
+
+class Interruption:
+    """Context in which a first Ctrl-C (or a termination) asks for an orderly stop; a second one stops at once."""
+
+    SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+    def __enter__(self) -> "Interruption":
+        self.requested = False
+        self._before = {number: signal.signal(number, self._request) for number in self.SIGNALS}
+        return self
+
+    def _request(self, number: int, frame: FrameType | None) -> None:
+        self.requested = True
+        self._restore()
+
+    def _restore(self) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def __exit__(self, *exception: object) -> None:
+        self._restore()

@@ -28,9 +28,8 @@ from seastar_gym.scene.numerics import DAMPING, PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from studies.accuracy.settings import MILLI
 from studies.accuracy.work_precision import cost, draw_sequences, finite
-from studies.frame import Results, Study
+from studies.frame import Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.style import PERCENT
 
 Floats = NDArray[np.float64]

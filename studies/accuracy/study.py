@@ -13,6 +13,7 @@ are processor times of one thread, the best of several rounds, for a batch of ra
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,21 +22,122 @@ from numpy.typing import NDArray
 
 from seastar_gym.accuracy.chapter import STROKES
 from seastar_gym.accuracy.command import progress_bar
-from seastar_gym.accuracy.measure import Progress
+from seastar_gym.accuracy.measure import Measured, Progress, Swims, errors, measure, path_lengths, swim_all
 from seastar_gym.accuracy.setting import at
 from seastar_gym.gaits import PAIRS, STRAIGHT
-from seastar_gym.scene import Scene
+from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene.numerics import Resolution, SchemeName
+from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
 from studies.accuracy import page
 from studies.accuracy.cases import Cases, gaits, joined, pentagon, random_gaits, random_sequences, slow_sequences, swims
-from studies.accuracy.convergence import measured, rows_of, second_opinion
 from studies.accuracy.pictures import draw_all
-from studies.accuracy.rows import Row, promised
+from studies.accuracy.rows import Figures, Row, figures, medians, promised
 from studies.accuracy.rows import Study as Found
 from studies.accuracy.settings import QUICK, Plan, settings
 from studies.accuracy.tables import as_markdown, store, write_csv
 from studies.frame import Results, Study
 from studies.pages import show
+
+Floats = NDArray[np.float64]
+
+TIGHT = 1e-9
+"""Newton tolerance of the swims that others are compared with."""
+
+
+def tight(nodes: int, step: float, scheme: SchemeName = "implicit-midpoint") -> Resolution:
+    """Resolution of a swim that others are compared with."""
+    return Resolution("continuum", nodes, Numerics(scheme, step, TIGHT))
+
+
+def short(plan: Plan, discretisation: Discretisation, nodes: int) -> Numerics:
+    """Numerics that stand for infinitely short steps with a discretisation and nodes per limb."""
+    step = plan.limit[1] if nodes >= plan.limit[0] else plan.fine
+    if discretisation == "chapter" and nodes > plan.finest:
+        step = 4.0 * plan.fine
+    return Numerics("implicit-midpoint", step, TIGHT)
+
+
+def measured(cases: Cases, plan: Plan, resolutions: Sequence[Resolution], progress: Progress) -> Measured:
+    """Swims of some cases and their errors at all resolutions."""
+    return measure(Scene(), resolutions, tight(*plan.limit), partial(short, plan), cases.commands, progress)
+
+
+def rows_of(batches: Sequence[Cases], found: Sequence[Measured], resolutions: Sequence[Resolution]) -> list[Row]:
+    """Rows of all resolutions, yet without speeds. found: Errors of every batch."""
+    rows = []
+    for k, resolution in enumerate(resolutions):
+        space, time = [each.space[k] for each in found], [each.time[k] for each in found]
+        reports = [each.swims[k] for each in found]
+
+        def mean(name: str, reports: list[Swims] = reports) -> float:
+            return float(np.mean(np.concatenate([getattr(each, name).ravel() for each in reports])))
+
+        rows.append(
+            Row(
+                resolution,
+                figures(batches, space),
+                figures(batches, time),
+                iterations=mean("newton_iterations"),
+                steps=mean("steps"),
+                rejections=sum(int(each.rejections.sum()) for each in reports),
+                halvings=sum(int(each.halvings.sum()) for each in reports),
+                typical=medians(batches, space, time),
+            )
+        )
+    return rows
+
+
+def second_opinion(cases: Cases, plan: Plan, progress: Progress) -> dict[str, Figures]:
+    """Errors of the limit itself on some cases, by what they are from.
+
+    Space: Twice the edges bring a quarter of the error, so a third of the difference that they make is left. Time: The
+    same for half the steps. Scheme: SDIRK3 against the midpoint rule, with the same nodes.
+    """
+    nodes, step = plan.opinion
+    finer = 2 * nodes - 1
+    wanted = tight(nodes, step), tight(finer, step), tight(nodes, 0.5 * step), tight(nodes, step, "sdirk3")
+    plain, fine, shorter, other = swim_all([at(Scene(), each) for each in wanted], cases.commands, progress)
+    lengths = path_lengths(Scene(), fine.hub)
+    space, time, scheme = (
+        figures([cases], [errors(each, against, lengths)])
+        for each, against in ((plain, fine), (plain, shorter), (other, shorter))
+    )
+    return {
+        f"space, from {nodes} and {finer} nodes": space._replace(
+            path=space.path / 3.0, straight=space.straight / 3.0, pair=space.pair / 3.0
+        ),
+        f"time, midpoint {1e3 * step:g} ms": time,
+        f"scheme, sdirk3 {1e3 * step:g} ms": scheme,
+    }
+
+
+def measure_speeds(scenes: Sequence[Scene], rounds: int, progress: Progress, n_robots: int = 32) -> Floats:
+    """Real-time factors on one core for mixed commands and for the straight swim, shape (len(scenes), 2).
+
+    Every round times all settings once, after the first stroke from rest. The best round counts, because other work of
+    the machine can only add time.
+    """
+    mixed = random_sequences(n_robots, np.random.default_rng(1)).commands[:3]
+    workloads = [mixed, np.broadcast_to(STRAIGHT, mixed.shape)]
+    best = np.full((len(scenes), 2), np.inf)
+    simulators: dict[tuple[int, int], tuple[Simulator, Any]] = {}
+    for turn in range(rounds):
+        for k, scene in enumerate(scenes):
+            for w, commands in enumerate(workloads):
+                if (k, w) not in simulators:
+                    simulator = Simulator(scene, n_robots, threads=1)
+                    simulator.stroke(commands[0])
+                    simulators[k, w] = simulator, simulator.get_state()
+                simulator, state = simulators[k, w]
+                simulator.set_state(state)
+                start = time.thread_time()
+                for command in commands[1:]:
+                    simulator.stroke(command)
+                best[k, w] = min(best[k, w], time.thread_time() - start)
+            progress((turn + (k + 1) / len(scenes)) / rounds)
+    simulated = n_robots * (len(mixed) - 1) * Scene().actuator.period
+    return simulated / best
 
 
 def study(plan: Plan, progress: bool = True) -> Found:
@@ -108,37 +210,3 @@ STUDY = Study(
     },
     drawn=("accuracy/convergence.png", "accuracy/work_precision.png"),
 )
-
-
-# Real-time factors of settings.
-
-
-Floats = NDArray[np.float64]
-
-
-def measure_speeds(scenes: Sequence[Scene], rounds: int, progress: Progress, n_robots: int = 32) -> Floats:
-    """Real-time factors on one core for mixed commands and for the straight swim, shape (len(scenes), 2).
-
-    Every round times all settings once, after the first stroke from rest. The best round counts, because other work of
-    the machine can only add time.
-    """
-    mixed = random_sequences(n_robots, np.random.default_rng(1)).commands[:3]
-    workloads = [mixed, np.broadcast_to(STRAIGHT, mixed.shape)]
-    best = np.full((len(scenes), 2), np.inf)
-    simulators: dict[tuple[int, int], tuple[Simulator, Any]] = {}
-    for turn in range(rounds):
-        for k, scene in enumerate(scenes):
-            for w, commands in enumerate(workloads):
-                if (k, w) not in simulators:
-                    simulator = Simulator(scene, n_robots, threads=1)
-                    simulator.stroke(commands[0])
-                    simulators[k, w] = simulator, simulator.get_state()
-                simulator, state = simulators[k, w]
-                simulator.set_state(state)
-                start = time.thread_time()
-                for command in commands[1:]:
-                    simulator.stroke(command)
-                best[k, w] = min(best[k, w], time.thread_time() - start)
-            progress((turn + (k + 1) / len(scenes)) / rounds)
-    simulated = n_robots * (len(mixed) - 1) * Scene().actuator.period
-    return simulated / best

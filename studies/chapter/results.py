@@ -10,8 +10,8 @@ from seastar_gym.scene import Scene
 from studies.chapter.pictures import PENTAGON_TIMES
 from studies.chapter.statements import PAIRS, stroke_motion
 from studies.chapter.swims import QUICK, SETTINGS, Floats, Swim
+from studies.frame import rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.style import MM
 
 UNIT = 1e-6

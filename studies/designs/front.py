@@ -19,9 +19,8 @@ from seastar_gym.sweep.configurations import Swim, configuration_with
 from seastar_gym.sweep.swimming import swim
 from studies.designs.search import BODIES, CHILDREN, GENERATIONS, SPEEDS, Limit, Row, fastest, grown, search, thriftiest
 from studies.designs.space import MEASURED, SETTLING, Body
-from studies.frame import Results, Study
+from studies.frame import Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.style import INK, MM, subplots
 
 Table = dict[str, Any]
@@ -144,9 +143,7 @@ def draw(results: Table, file: Path) -> None:
     for name, row in results["robots"].items():
         text, place, side = LABELS[name]
         ax.plot(row["mm_per_s"], row["J_per_metre"], "o" if name == CHAPTER else "s", color=INK)
-        ax.annotate(
-            text, (row["mm_per_s"], row["J_per_metre"]), place, textcoords="offset points", ha=side, fontsize=8
-        )
+        ax.annotate(text, (row["mm_per_s"], row["J_per_metre"]), place, textcoords="offset points", ha=side, fontsize=8)
     ax.set(xlabel="speed [mm/s]", ylabel="work per metre [J/m]", xlim=(2.5, 20.0), ylim=(1e-4, 0.5))
     ticks = (3, 5, 10, 20)
     ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])

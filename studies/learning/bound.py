@@ -197,17 +197,19 @@ def run(options: Options, results: Results, beam: int = 300) -> None:
     mixed = mixed_speed(displacements, directions)
     learned = MM * agent_speeds("learned", load_agents(("learned",))["learned"], scene, directions)
     pentagon = search_path(scene, make_path("pentagon", np.random.default_rng(0)), "pairs", beam)
-    results.update({
-        "fidelity": options.fidelity,
-        "fastest_gaits": fastest,
-        "directions_deg": np.degrees(directions).tolist(),
-        "mm_per_stroke": {MIXED: (MM * mixed).tolist(), "learned": learned.tolist()},
-        "pentagon": {
-            "strokes": len(pentagon),
-            "beam": beam,
-            "gait": [name(command) for command in command_table("pairs", scene.robot.n_limbs)[pentagon]],
-        },
-    })
+    results.update(
+        {
+            "fidelity": options.fidelity,
+            "fastest_gaits": fastest,
+            "directions_deg": np.degrees(directions).tolist(),
+            "mm_per_stroke": {MIXED: (MM * mixed).tolist(), "learned": learned.tolist()},
+            "pentagon": {
+                "strokes": len(pentagon),
+                "beam": beam,
+                "gait": [name(command) for command in command_table("pairs", scene.robot.n_limbs)[pentagon]],
+            },
+        }
+    )
     print(json.dumps({key: value for key, value in results.items() if key != "pentagon"}, indent=1))
     print(f"Pentagon: {results['pentagon']['strokes']} strokes. All in {time.perf_counter() - began:.0f} s.")
 

@@ -45,9 +45,8 @@ from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.gradients import Record, record
 from seastar_gym.scene import Scene
-from studies.frame import Results, Study
+from studies.frame import Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 
 Floats = NDArray[np.float64]
 Tensor = torch.Tensor

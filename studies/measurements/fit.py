@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from studies.measurements.curves import Curve, peaks
-from studies.measurements.model import MODELS, curvature
+from studies.measurements.curves import MODELS, Curve, curvature, peaks
 
 Floats = NDArray[np.float64]
 

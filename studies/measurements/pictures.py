@@ -10,8 +10,7 @@ import numpy as np
 
 from seastar_gym.files import save_figure
 from seastar_gym.scene.actuators.pulse import pulse
-from studies.measurements.curves import Curve, read_curves
-from studies.measurements.model import curvature
+from studies.measurements.curves import Curve, curvature, read_curves
 from studies.style import CYCLE, FAINT, INK, new_figure
 
 HEATING_SHARE = 0.1

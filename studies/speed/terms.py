@@ -71,10 +71,14 @@ def scenes() -> dict[str, Scene]:
         "all of these": Scene(replace(damped, youngs_modulus=np.full(n_robots, 1e6)), everything),
         "all, a body, bent along, contact": Scene(
             replace(
-                damped, youngs_modulus=np.full(n_robots, 1e6), along=AlongLimb(), stiffening=Stiffening(),
+                damped,
+                youngs_modulus=np.full(n_robots, 1e6),
+                along=AlongLimb(),
+                stiffening=Stiffening(),
                 body=Body.rectangle(0.06, 0.03),
             ),
-            everything, contact=Contact(),
+            everything,
+            contact=Contact(),
         ),
     }
     return {name: in_ten_nodes(scene) for name, scene in found.items()}

@@ -20,9 +20,8 @@ from seastar_gym.accuracy.measure import machine
 from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar
 from studies.frame import Results, Study
+from studies.speed.kernels import part_seconds, peak_gigaflops, peak_speedup
 from studies.speed.operations import count_operations, flops
-from studies.speed.parts import part_seconds
-from studies.speed.peak import peak_gigaflops, peak_speedup
 from studies.speed.process import (
     FIRST_SCENES,
     IMPORT,

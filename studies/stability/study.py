@@ -24,9 +24,8 @@ from tqdm import tqdm
 
 from seastar_gym.scene.numerics import SchemeName
 from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
-from studies.frame import Results, Study
+from studies.frame import Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.stability.cases import STEPS, SWEEPS, Sweep, format_value
 from studies.stability.cells import Cell, commands_of, converged_displacements, run_cell, stroke_duration
 from studies.stability.pictures import draw as draw_cells

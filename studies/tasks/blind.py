@@ -14,8 +14,7 @@ from seastar_gym.envs.tasks.fail_blind import MOST_DEAD
 from seastar_gym.evaluation.rollout import Info
 from seastar_gym.simulator import Simulator, State
 from studies.tasks.ahead import Ahead, Robots
-from studies.tasks.greedy import Actions, Floats, Floats32, route
-from studies.tasks.hypotheses import Guess
+from studies.tasks.greedy import Actions, Floats, Floats32, Guess, route
 
 
 def ends_in_world(robots: Robots, observations: Floats32, state: State) -> tuple[Floats, Floats]:

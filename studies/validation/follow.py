@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.validation.priors import SWEEPS
-from studies.validation.simulate import FIRST, STROKES
 from studies.validation.speeds import Condition
-from studies.validation.swimmer import ELASTOMER, FRAME, LIQUID_METAL, TYPICAL, WATER, How, bending
+from studies.validation.swimmer import ELASTOMER, FIRST, FRAME, LIQUID_METAL, STROKES, TYPICAL, WATER, How, bending
 
 Floats = NDArray[np.float64]
 

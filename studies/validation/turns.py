@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.simulator import Simulator
+from studies.frame import rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.style import MM, PERCENT
 from studies.validation.inference import predict, score
 from studies.validation.priors import SWEEPS, of_sweep

@@ -19,9 +19,8 @@ from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simulator import Simulator, State
-from studies.frame import Results, Study
+from studies.frame import Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.style import COLOURS, FAINT, MS, PERCENT, subplots
 from studies.verification import exact
 from studies.verification.unactuated import HUB, let_pass, pause

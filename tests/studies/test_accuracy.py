@@ -14,7 +14,6 @@ from seastar_gym.accuracy.setting import at
 from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene.numerics import Resolution
 from seastar_gym.simulator import Simulator
-from studies.accuracy import convergence
 from studies.accuracy import rows as accuracy_rows
 from studies.accuracy import study as accuracy
 from studies.accuracy import tables as accuracy_tables
@@ -139,7 +138,7 @@ def test_figures_leave_gaits_and_slow_swims_out_of_the_path_error():
 @pytest.mark.slow
 def test_limit_is_that_of_the_continuum():
     """34.360 mm after ten strokes straight on, 28.189, 34.360, 39.355 and 32.282 mm of the pairs, to 1e-4."""
-    found = swim(swims(), at(Scene(), convergence.tight(*Plan().limit)))
+    found = swim(swims(), at(Scene(), accuracy.tight(*Plan().limit)))
     distances = np.hypot(*found.hub[-1].T)
     np.testing.assert_allclose(1e3 * distances, [34.360, 28.189, 34.360, 39.355, 32.282], rtol=1e-4)
 

@@ -15,10 +15,9 @@ from studies.chapter import results as chapter
 from studies.chapter.study import STUDY, make_figures
 from studies.chapter.swims import CHAPTER, swim
 from studies.continuum import NAMES, scene
-from studies.frame import DOCS
+from studies.frame import DOCS, as_json, keep, rounded
 from studies.learning import traces
 from studies.pages import numbers
-from studies.results_file import as_json, keep, rounded
 
 COARSE = replace(swims.CHAPTER, numerics=Numerics("implicit-euler", 10e-3))
 PAIRS = list(statements.PAIRS.values())
@@ -208,9 +207,7 @@ def test_snapshots_show_actuated_limbs_in_blue(pentagon, tmp_path):
     pictures.draw_pentagon_snapshots(pentagon, pentagon, tmp_path / "blue.png")
     at_rest = replace(pentagon, commands=np.zeros_like(pentagon.commands))
     pictures.draw_pentagon_snapshots(at_rest, at_rest, tmp_path / "grey.png")
-    blue, grey = (
-        pixels_like(picture(tmp_path / f"{name}.png"), pictures.ACTUATED) for name in ("blue", "grey")
-    )
+    blue, grey = (pixels_like(picture(tmp_path / f"{name}.png"), pictures.ACTUATED) for name in ("blue", "grey"))
     assert blue > 10 * grey > 0  # the legend's line stays
 
 

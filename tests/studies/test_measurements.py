@@ -12,9 +12,8 @@ from seastar_gym.scene.actuators.sma_limb import FREQUENCIES, MEASURED
 from studies.command import main
 from studies.frame import DOCS
 from studies.measurements import limbs
-from studies.measurements.curves import read_curves
+from studies.measurements.curves import MODELS, curvature, lagging, pulsed, read_curves
 from studies.measurements.fit import fit, predict
-from studies.measurements.model import MODELS, curvature, lagging, pulsed
 from studies.pages import numbers
 from studies.scenes import gallery
 

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from studies.command import main
-from studies.results_file import as_json
+from studies.frame import as_json
 from studies.stability import cells as stability_cells
 from studies.stability import study as stability
 from studies.stability.cases import SWEEPS, format_step, format_value

@@ -31,12 +31,11 @@ from studies.tasks.controllers import (
     straight_on,
 )
 from studies.tasks.episodes import swim
-from studies.tasks.page import means, table
+from studies.tasks.page import means, table, verdicts
 from studies.tasks.rounds import BestRound, MostPerMetre
 from studies.tasks.rows import Row, rows_of
 from studies.tasks.study import Options, has_cell
 from studies.tasks.trap import SEEN, Belief, all_discs, discs_so_far, horseshoes_to, way, with_clearance
-from studies.tasks.verdicts import verdicts
 
 
 def batch(task, n=6, **arguments):

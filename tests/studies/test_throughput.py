@@ -11,8 +11,8 @@ from hubs import TEN
 from seastar_gym import Numerics, Scene, Seastar, der
 from studies.command import main
 from studies.speed import history, process, strokes, throughput
+from studies.speed.kernels import PARTS, part_seconds
 from studies.speed.operations import count_operations, flops
-from studies.speed.parts import PARTS, part_seconds
 
 
 def test_exponent_of_a_linear_cost_is_one():
