@@ -1,6 +1,6 @@
 """Recorded swims: with the chapter's setting, with its ten nodes converged in time, and in the continuum."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,13 +26,7 @@ class Setting:
         scheme = self.numerics.scheme.replace("-", " ").replace("euler", "Euler")
         return f"{self.name} ({scheme}, {MS * self.numerics.step:g} ms)"
 
-    def coarser(self, step: float) -> "Setting":
-        """The setting with time steps of at least `step` [s]."""
-        return replace(self, numerics=replace(self.numerics, step=max(step, self.numerics.step)))
 
-
-QUICK = 1e-3
-"""Shortest time steps of a quick run [s]."""
 THE_CHAPTERS = Seastar(discretisation="chapter")
 CONVERGED = Numerics("implicit-midpoint", 0.25e-3)
 CHAPTER = Setting("the chapter's setting", THE_CHAPTERS, Numerics("implicit-euler", 3e-3))
