@@ -94,7 +94,7 @@ def told(study: Study, results: Results, out: Path, file: Path) -> None:
     results.read()
     files = [file, *study.write(results, out)]
     for name, text in study.tables.items():
-        show(f"{name}:\n\n{text(results)}")
+        show(text(results), name)
     print(f"Written: {', '.join(map(str, files))}")
     if file.resolve() == study.committed(DOCS, study.file):
         fill(DOCS, (study,))

@@ -4,10 +4,11 @@ A study is a module with `STUDY = Study(...)`. `python -m studies NAME` runs it,
 its room, whose module is `study`.
 """
 
+import csv
 import json
 import re
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -91,6 +92,12 @@ class Results(dict[str, Any]):
             self["settings"] = dict(settings)
             self.read()
 
+    @property
+    def folder(self) -> Path:
+        """The folder `out`, which is made."""
+        self.out.mkdir(parents=True, exist_ok=True)
+        return self.out
+
     def read(self) -> None:
         """Take what is in the file, if there is one; ValueError if it has other settings."""
         if self.file is None or not self.file.is_file():
@@ -169,6 +176,13 @@ def keep(results: Mapping[str, Any], file: Path) -> None:
     """Write plain data into a file, whose folder is made."""
     file.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(file, as_json(results).encode())
+
+
+def write_rows(file: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write rows below a head as CSV into a file, whose folder is made."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("w", newline="", encoding="utf-8") as stream:
+        csv.writer(stream).writerows([head, *rows])
 
 
 def rounded(value: float, digits: int = 4) -> float:

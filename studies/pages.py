@@ -49,9 +49,9 @@ def markdown(head: Sequence[object], rows: Iterable[Sequence[object]], texts: Co
     return "\n".join([first, f"|{rule}|", *others])
 
 
-def show(text: str) -> None:
-    """Print Markdown as tables that a terminal shows."""
-    Console().print(Markdown(text))
+def show(text: str, title: str = "") -> None:
+    """Print Markdown as tables that a terminal shows, below a title."""
+    Console().print(Markdown(f"{title}:\n\n{text}" if title else text))
 
 
 def footer_of(docs: Path, names: str) -> str:

@@ -10,7 +10,7 @@ from typing import get_args
 from seastar_gym.accuracy import Setting, chapters_certificate, timed_certificate
 from seastar_gym.scene import Scene, SmaWires
 from seastar_gym.scene.numerics import Fidelity
-from studies.accuracy.tables import two_digits
+from studies.frame import rounded
 from studies.pages import markdown
 
 IN_README: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
@@ -27,7 +27,7 @@ PURPOSES: dict[Fidelity, str] = {
 
 def percent(error: float) -> str:
     """Error in per cent, of two digits."""
-    return f"{two_digits(100 * error):g} %"
+    return f"{rounded(100 * error, 2):g} %"
 
 
 def pair(bound: float, typical: float) -> str:

@@ -140,18 +140,18 @@ def measure_speeds(scenes: Sequence[Scene], rounds: int, progress: Progress, n_r
     return simulated / best
 
 
-def study(plan: Plan, progress: bool = True) -> Found:
+def study(plan: Plan) -> Found:
     """Run the whole study; drawing is left to the caller."""
     rng = np.random.default_rng(0)
     batches, mine = [sequences(plan, rng), pentagon(*plan.side)], settings(plan)
     few = joined(swims(), random_sequences(min(11, plan.n_random), rng))
-    with progress_bar("second opinion", progress) as report:
+    with progress_bar("second opinion") as report:
         doubt = second_opinion(few, plan, report)
     found = []
     for batch in batches:
-        with progress_bar(f"errors of {len(batch)} swims", progress) as report:
+        with progress_bar(f"errors of {len(batch)} swims") as report:
             found.append(measured(batch, plan, mine, report))
-    rows = with_speeds(rows_of(batches, found, mine), plan, progress)
+    rows = with_speeds(rows_of(batches, found, mine), plan)
     hub = found[0].limit.hub
     distances = dict(zip(("straight", *PAIRS), np.hypot(*hub[-1, :5].T).tolist(), strict=True))
     return Found(rows, doubt, distances, float(hub[0, 0, 0]))
@@ -163,9 +163,9 @@ def sequences(plan: Plan, rng: np.random.Generator) -> Cases:
     return joined(some, gaits(), random_gaits(plan.n_gaits, rng))
 
 
-def with_speeds(rows: list[Row], plan: Plan, progress: bool) -> list[Row]:
+def with_speeds(rows: list[Row], plan: Plan) -> list[Row]:
     """Rows with their speeds and promises."""
-    with progress_bar("speeds", progress) as report:
+    with progress_bar("speeds") as report:
         speeds = measure_speeds([at(Scene(), row.resolution) for row in rows], plan.rounds, report)
     timed = zip(rows, speeds, strict=True)
     return promised([replace(row, speed=float(mixed), straight_speed=float(alone)) for row, (mixed, alone) in timed])
@@ -188,7 +188,6 @@ class Options:
 def run(options: Options, results: Results) -> None:
     """Run the study, write its files and print its table."""
     found = study(QUICK if options.quick else Plan())
-    results.out.mkdir(parents=True, exist_ok=True)
     write_csv(found, results.out / "accuracy.csv")
     (results.out / "accuracy.md").write_text(as_markdown(found), encoding="utf-8")
     drawn = draw_all(found, results.out)

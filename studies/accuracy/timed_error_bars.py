@@ -57,8 +57,7 @@ def run(results: Results) -> None:
     """Measure, write and print the table."""
     plan = timed.Plan(samples=SAMPLES)
     text = table({period: measure(period, plan) for period in tqdm(PERIODS, unit="period")})
-    results.out.mkdir(parents=True, exist_ok=True)
-    (results.out / "timed_error_bars.md").write_text(text, encoding="utf-8")
+    (results.folder / "timed_error_bars.md").write_text(text, encoding="utf-8")
     show(text)
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from tqdm import tqdm
 
 from seastar_gym import gaits
@@ -33,7 +32,7 @@ from studies.chapter.statements import (
 )
 from studies.chapter.swims import CONTINUUM, LIMIT, SETTINGS, THE_CHAPTERS, Floats, Swim, swim
 from studies.frame import Results, Study, rounded
-from studies.pages import markdown
+from studies.pages import markdown, show
 from studies.style import MM
 
 UNIT = 1e-6
@@ -180,7 +179,7 @@ def run(results: Results) -> None:
     """Swim, write the figures and the statements, and print the statements."""
     statements, found = make_figures(results.out)
     write_csv(statements, results.out / "statements.csv")
-    Console().print(as_table(statements))
+    show(as_table(statements), "Statements of the chapter, and computed values")
     results.update(found)
 
 

@@ -14,9 +14,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from seastar_gym.controllers.contract import Policy, actions_of
 from seastar_gym.controllers.learned import LearnedPolicy, pretrained
@@ -34,6 +31,7 @@ from studies.frame import Results, Study
 from studies.measurements.curves import MODELS, PHASES, Curve, read_curves
 from studies.measurements.fit import Fit, fit, predict
 from studies.measurements.pictures import HEATING_SHARE, draw
+from studies.pages import markdown, show
 
 CHOSEN = "delay"
 """The model of `SmaLimb`."""
@@ -106,17 +104,7 @@ def summary(figures: dict[str, Any]) -> list[str]:
     return cells
 
 
-def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """Table of texts."""
-    made = Table(title=escape(title))
-    for k, column in enumerate(columns):
-        made.add_column(escape(column), no_wrap=k == 0)
-    for row in rows:
-        made.add_row(*row)
-    return made
-
-
-def print_fits(console: Console, figures: dict[str, Any], curves: dict[int, list[Curve]]) -> None:
+def print_fits(figures: dict[str, Any], curves: dict[int, list[Curve]]) -> None:
     """Tables of the errors of fits and of predictions."""
     rows, predicted = [], []
     for (liquid_metal, one), of_one in zip(figures.items(), curves.values(), strict=True):
@@ -128,9 +116,9 @@ def print_fits(console: Console, figures: dict[str, Any], curves: dict[int, list
                 [f"{liquid_metal} %", name, ", ".join(f"{f:g}" for f in there["fitted_hz"]), f"{there['error']:.3f}",
                  f"{100 * there['coverage']:.0f} %", f"{there['half_width']:.3f}"]
             )  # fmt: skip
-    console.print(table("Root mean square error over the peak", ("material", "Hz", "fit", "ramp"), rows))
+    show(markdown(("material", "Hz", "fit", "ramp"), rows), "Root mean square error over the peak")
     columns = ("material", "held out", "fitted [Hz]", "error", f"within {100 * SHARE:.0f} %", "half width")
-    console.print(table("Predictions, over the peak", columns, predicted))
+    show(markdown(columns, predicted, (0, 1, 2)), "Predictions, over the peak")
 
 
 # How far the chapter's robot swims with measured limbs instead of the ramp of Fig. 13.5b
@@ -184,18 +172,18 @@ def round_the_pentagon(name: str, policy: Policy, scene: Scene) -> Swim:
     return swim(name, policy, env, max_strokes=MOST_STROKES)
 
 
-def study_swims(console: Console) -> dict[str, Any]:
+def study_swims() -> dict[str, Any]:
     """Distances per stroke with every actuator; prints them."""
     found = {name: (actuator.period, distances(actuator)) for name, actuator in actuators().items()}
     rows = [[name, f"{period:.3f}", *(f"{mm:.2f}" for mm in far)] for name, (period, far) in found.items()]
     title = f"Distance per stroke [mm], strokes {STROKES // 2 + 1} to {STROKES} from rest, {FIDELITY}"
-    console.print(table(title, ("limb", "period [s]", *GAITS), rows))
+    show(markdown(("limb", "period [s]", *GAITS), rows), title)
     return {
         name: {"period_s": period, "mm_per_stroke": np.round(far, 3).tolist()} for name, (period, far) in found.items()
     }
 
 
-def study_policies(console: Console) -> dict[str, Any]:
+def study_policies() -> dict[str, Any]:
     """Strokes of policies round the pentagon with every actuator, None where they do not arrive; prints them."""
     found: dict[str, Any] = {}
     for limb, actuator in actuators().items():
@@ -203,22 +191,22 @@ def study_policies(console: Console) -> dict[str, Any]:
         swims = [round_the_pentagon(name, policy, scene) for name, policy in policies(actuator.period).items()]
         found[limb] = {one.agent: one.strokes if one.finished else None for one in swims}
     rows = [[limb, *("-" if n is None else str(n) for n in strokes.values())] for limb, strokes in found.items()]
-    console.print(table(f"Strokes round the pentagon, {FIDELITY}", ("limb", "learned", "pentagon"), rows))
+    show(markdown(("limb", "learned", "pentagon"), rows), f"Strokes round the pentagon, {FIDELITY}")
     return found
 
 
 def run(results: Results) -> None:
     """Fit and predict, compare models and swim; prints tables."""
-    console, curves = Console(), read_curves()
+    curves = read_curves()
     _, figures = study_model(CHOSEN, curves)
-    print_fits(console, figures, curves)
+    print_fits(figures, curves)
     results.update(model=CHOSEN, fits=figures)
     all_models = {name: summary(study_model(name, curves)[1]) for name in MODELS}
     columns = ("model", f"curves below {AIM}", "error", "AIC", "between", "beyond")
-    console.print(table("Models", columns, [[name, *cells] for name, cells in all_models.items()]))
+    show(markdown(columns, [[name, *cells] for name, cells in all_models.items()]), "Models")
     results["models"] = {name: dict(zip(columns[1:], cells, strict=True)) for name, cells in all_models.items()}
-    results["gaits"], results["swims"] = list(GAITS), study_swims(console)
-    results["strokes_round_the_pentagon"] = study_policies(console)
+    results["gaits"], results["swims"] = list(GAITS), study_swims()
+    results["strokes_round_the_pentagon"] = study_policies()
 
 
 Floats = NDArray[np.float64]

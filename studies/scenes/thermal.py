@@ -95,8 +95,7 @@ def draw(actuator: ThermalSma, file: Path) -> None:
 def run(results: Results) -> None:
     """Print the fit and the defaults, and draw the default actuator."""
     print(describe("fitted", fit()), describe("default", ThermalSma()), sep="\n")
-    results.out.mkdir(parents=True, exist_ok=True)
-    draw(ThermalSma(), results.out / "thermal.png")
+    draw(ThermalSma(), results.folder / "thermal.png")
 
 
 STUDY = Study("scenes.thermal", run, out=Path("runs/thermal"))

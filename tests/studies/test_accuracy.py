@@ -30,6 +30,7 @@ from studies.accuracy.cases import (
 )
 from studies.accuracy.rows import Figures, Row, medians
 from studies.accuracy.settings import MILLI, Plan, presets, settings
+from studies.frame import rounded
 
 TINY = Plan(
     n_random=2, n_slow=1, n_gaits=1, side=(1, 0), limit=(13, 5 * MILLI), fine=5 * MILLI, opinion=(4, 5 * MILLI),
@@ -216,10 +217,10 @@ def test_every_mesh_has_a_front_of_its_own():
 
 
 @pytest.mark.parametrize(
-    "value, rounded, up", [(0.04912, 0.049, 0.05), (17_432.0, 17_000.0, 18_000.0), (0.03, 0.03, 0.03), (0.0, 0.0, 0.0)]
+    "value, nearest, up", [(0.04912, 0.049, 0.05), (17_432.0, 17_000.0, 18_000.0), (0.03, 0.03, 0.03), (0.0, 0.0, 0.0)]
 )
-def test_stored_figures_have_two_digits_and_errors_are_rounded_upwards(value, rounded, up):
-    assert accuracy_tables.two_digits(value) == rounded
+def test_stored_figures_have_two_digits_and_errors_are_rounded_upwards(value, nearest, up):
+    assert rounded(value, 2) == nearest
     assert rounded_up(value) == up
 
 
@@ -228,7 +229,7 @@ def test_stored_figures_have_two_digits_and_errors_are_rounded_upwards(value, ro
 
 @pytest.fixture(scope="module")
 def found():
-    return accuracy.study(TINY, progress=False)
+    return accuracy.study(TINY)
 
 
 def test_study_measures_every_setting_in_time_and_space(found):

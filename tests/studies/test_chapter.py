@@ -179,7 +179,8 @@ def test_cost_is_measured_for_every_step():
 def test_statements_become_a_table_and_a_file(tmp_path):
     Statement = statements.Statement
     rows = [Statement("It moves.", "x", "mm", (1.0, 2.0, 4.0)), Statement("It moves.", "y", "mm", (3.0, 5.0))]
-    assert statements.as_table(rows).row_count == 2
+    lines = statements.as_table(rows).splitlines()
+    assert len(lines) == 4 and [line[:20] for line in lines[2:]] == ["| It moves. | x | 1 ", "|  | y | 3 mm |  | 5"]
     statements.write_csv(rows, tmp_path / "s.csv")
     written = list(csv.reader((tmp_path / "s.csv").read_text(encoding="utf-8").splitlines()))
     x, y = ["It moves.", "x", "mm", "1.0", "2.0", "4.0", ""], ["It moves.", "y", "mm", "3.0", "", "5.0", ""]

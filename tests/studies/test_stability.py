@@ -25,7 +25,7 @@ GRID = tuple(replace(sweep, values=VALUES[sweep.name]) for sweep in SWEEPS if sw
 def cells():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(stability_cells, "REFERENCE_STEPS", 1000)
-        return stability.atlas(GRID, STEPS, progress=False, workers=1)
+        return stability.atlas(GRID, STEPS, workers=1)
 
 
 @pytest.fixture(scope="module")
