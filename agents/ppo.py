@@ -2,16 +2,15 @@
 
 import os
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any
 
 import gymnasium as gym
-import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
 
-from agents.coasting import CoastingProgress, fit_coasting
+from agents.coasting import with_coasting
 from agents.hyperparameters import Hyperparameters
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers import checkpoint
@@ -23,7 +22,6 @@ from seastar_gym.envs.options import Path as SwimPath
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction, observed_mirror
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
-from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.checks import require_count, require_kind, shown
 from seastar_gym.scene.numerics import Fidelity
 
@@ -54,9 +52,7 @@ def make_training_env(
         **{**hyperparameters.options, **options},
     )
     if hyperparameters.coasting:
-        swum = cast(SeastarSwimVectorEnv, env.unwrapped).scene
-        coasting = fit_coasting(swum, hyperparameters.decision_period, np.random.default_rng(0))
-        env = CoastingProgress(env, coasting, hyperparameters.reward)
+        env = with_coasting(env, hyperparameters.reward)
     return BatchVecEnv(VectorSymmetryReduction(env) if hyperparameters.symmetry else env)
 
 

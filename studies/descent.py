@@ -13,7 +13,6 @@ Fit: the radii of all limbs, each its own, from positions of all nodes after eve
 derivatives are differences, and by the gradient of the sum of squares (L-BFGS). Costs are processor time.
 """
 
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -31,7 +30,7 @@ from seastar_gym.scene import Contact, Limb, Scene, SmaWires
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.per_robot import with_numbers
 from studies.frame import DOCS, RESULTS, Results, Study, rounded
-from studies.pages import markdown
+from studies.pages import markdown, read
 
 Floats = NDArray[np.float64]
 
@@ -42,11 +41,8 @@ MARGIN, LARGEST = 0.001, 0.05
 TRIES, ROUNDS = 20, 6
 """Steps that may fail one after the other, and times that commands at their ends are looked for in each."""
 FIDELITIES: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
-
-
-def read(name: str) -> Any:
-    """Numbers of another study."""
-    return json.loads((DOCS / RESULTS / name).read_text(encoding="utf-8"))
+PENTAGON, WAYPOINTS = (DOCS / RESULTS / name for name in ("gaits/pentagon_reheated.json", "learning/pentagon.json"))
+"""Numbers of other studies."""
 
 
 def wires(fidelity: Fidelity) -> Scene:
@@ -56,7 +52,7 @@ def wires(fidelity: Fidelity) -> Scene:
 
 def found_by_search() -> Floats:
     """Commands of the beam search, shape (n, 5)."""
-    gait = read("gaits/pentagon_reheated.json")["gait"]
+    gait = read(PENTAGON)["gait"]
     commands = np.zeros((len(gait), 5))
     for command, pulses in zip(commands, gait, strict=True):
         for limb, sign in filter(None, pulses.strip("{}").split(",")):
@@ -137,7 +133,7 @@ def again(fidelity: Fidelity, commands: Floats, goals: Floats) -> list[float]:
 def pulses() -> dict[str, Any]:
     """The beam search's pulses, improved."""
     goals, searched, began = (
-        np.array(read("learning/pentagon.json")["waypoints_m"]),
+        np.array(read(WAYPOINTS)["waypoints_m"]),
         found_by_search(),
         time.process_time(),
     )

@@ -34,6 +34,7 @@ from seastar_gym.scene.per_robot import at, side_by_side, with_numbers
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study, rounded
 from studies.pages import markdown
+from studies.speed.strokes import repeat
 from studies.style import CYCLE, INK, subplots
 
 Floats = NDArray[np.float64]
@@ -211,13 +212,7 @@ UNKNOWNS: dict[str, list[str]] = {
 
 def processor_time(run: Callable[[], Any]) -> float:
     """Shortest processor time of some trials [s], after a first one that may compile."""
-    run()
-    found = []
-    for _ in range(TRIALS):
-        began = time.process_time()
-        run()
-        found.append(time.process_time() - began)
-    return min(found)
+    return min(repeat(run, 0.0, TRIALS, time.process_time))
 
 
 def swim_alone(scene: Scene, commands: Floats) -> None:

@@ -33,6 +33,7 @@ from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.symmetry import VectorFrameStack
 from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.evaluation.swim import TIME_LIMIT
+from seastar_gym.gaits import pair_gait
 from seastar_gym.identify import Measurement, identify
 from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.simulated import SimulatedPlant
@@ -168,10 +169,8 @@ def fitted(results: Mapping[str, Any]) -> Scene:
 def gait_commands(name: str) -> Floats:
     """Commands of a gait for SECONDS, shape (n, 5)."""
     if "," in name:
-        pair = np.zeros(5)
-        for limb in name.split(","):
-            pair[int(limb[0]) - 1] = 1.0 if limb[1] == "+" else -1.0
-        gait = np.vstack([pair, np.zeros((4, 5))])
+        plus, minus = (int(limb[0]) for limb in name.split(","))
+        gait = np.vstack([pair_gait(plus, minus), np.zeros((4, 5))])
     else:
         gait = SCRIPTED[name](5, PERIOD)
     n = round(SECONDS / PERIOD)

@@ -4,12 +4,11 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import gymnasium as gym
-import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 
-from agents.coasting import CoastingProgress, fit_coasting
+from agents.coasting import with_coasting
 from agents.distillation import distil
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model
@@ -57,8 +56,7 @@ class Learner(NamedTuple):
         """The batch as the learner sees it."""
         if self.coasting:
             inner: Any = batch.unwrapped
-            coasting = fit_coasting(inner.scene, inner.decision_period, np.random.default_rng(0))
-            batch = CoastingProgress(batch, coasting, inner.challenge.reward)
+            batch = with_coasting(batch, inner.challenge.reward)
         if self.past:
             return VectorFrameStack(batch, self.past)
         return VectorSymmetryReduction(batch) if self.symmetric else batch

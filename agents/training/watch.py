@@ -13,7 +13,7 @@ from tqdm import tqdm
 from agents.learner_file import save
 from agents.ppo import policy_of
 from agents.training import efficiency
-from agents.training.folder import recorded
+from agents.training.folder import record
 from agents.training.options import Options
 from agents.training.robot import Robot
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
@@ -111,13 +111,7 @@ class Watch(BaseCallback):
         done = swim("learned", policy_of(self.learner), self.pentagon, max_strokes=limit)
         self.learner.logger.record("eval/pentagon_strokes", done.strokes)
         self.learner.logger.record("eval/pentagon_waypoints", done.waypoints_reached)
-        earlier = [row for row in recorded(self.folder) if row[0] < strokes]
-        rows = [*earlier, [strokes, done.strokes, done.waypoints_reached]]
-        text = "".join(",".join(map(str, row)) + "\n" for row in rows)
-        write_atomically(self.folder / "progress.csv", text)
-        seconds = self._before.seconds + sum(self.seconds.values())
-        self.efficiency = self.efficiency.after(strokes, seconds, done)
-        efficiency.write(self.efficiency, self.folder)
+        self.efficiency = record(self.folder, strokes, self._before.seconds + sum(self.seconds.values()), done)
         return done
 
 

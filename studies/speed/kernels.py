@@ -1,7 +1,7 @@
 """Compiled loops that are timed: fused products alone, whose rate is the peak, and parts of a Newton iteration."""
 
-import time
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 
@@ -83,10 +83,6 @@ def part_seconds(scene: Scene, seconds: float) -> dict[str, list[float]]:
     durations: dict[str, list[float]] = {}
     n = 500
     for part, name in enumerate(PARTS):
-        repeat_part(rods, work, simulator.q[0], simulator.v[0], scene.numerics.step, part, 1)
-        durations[name] = []
-        while sum(durations[name]) * n * N_LANES < seconds or len(durations[name]) < 5:
-            start = time.perf_counter()
-            repeat_part(rods, work, simulator.q[0], simulator.v[0], scene.numerics.step, part, n)
-            durations[name].append((time.perf_counter() - start) / n / N_LANES)
+        run = partial(repeat_part, rods, work, simulator.q[0], simulator.v[0], scene.numerics.step, part, n)
+        durations[name] = [d / n / N_LANES for d in repeat(run, seconds)]
     return durations

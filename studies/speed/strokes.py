@@ -69,12 +69,14 @@ def iteration_seconds(scene: Scene, seconds: float) -> list[float]:
 # Timing of repeated runs on this machine.
 
 
-def repeat(run: Callable[[], object], seconds: float, at_least: int = 5) -> list[float]:
+def repeat(
+    run: Callable[[], object], seconds: float, at_least: int = 5, clock: Callable[[], float] = time.perf_counter
+) -> list[float]:
     """Durations of repeated runs [s], after a first run that does not count, for about `seconds` [s]."""
     run()
     durations: list[float] = []
     while len(durations) < at_least or sum(durations) < seconds:
-        start = time.perf_counter()
+        start = clock()
         run()
-        durations.append(time.perf_counter() - start)
+        durations.append(clock() - start)
     return durations

@@ -95,7 +95,7 @@ class Interceptor:
         self._ahead = Ahead(robots, robots.table)
         self.later = robots.period + (0.0 if robots.in_strokes else self._ahead.coasting)
         challenge: Prey = robots.inner.challenge
-        self._pursuit = Pursuit(SPEED_IN_STROKES if robots.in_strokes else SPEED_IN_TIME, 0.9 * challenge.catch_radius)
+        self._pursuit = Pursuit(robots.speed, 0.9 * challenge.catch_radius)
         self.velocity: Floats | None = None  # at the last decision, in the world [m/s]
 
     def act(self, observations: Floats32, info: Info) -> Actions:
@@ -110,8 +110,6 @@ class Interceptor:
         return np.minimum(self._pursuit.meeting_time(hub, many, SINCE), NEVER + np.maximum(lacking, 0.0))
 
 
-SPEED_IN_STROKES, SPEED_IN_TIME = 0.0043, 0.0075
-"""Speed at which a robot swims any way [m/s]."""
 SINCE = np.arange(0.0, 201.0)
 """Times ahead at which the prey is foreseen [s]."""
 NEVER = 1e3
