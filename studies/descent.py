@@ -29,10 +29,8 @@ from seastar_gym.identify import Measurement, identify
 from seastar_gym.scene import Contact, Limb, Scene, SmaWires
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.per_robot import with_numbers
-from studies.frame import DOCS, RESULTS, Results, Study, rounded
+from studies.frame import DOCS, RESULTS, Floats, Results, Study, rounded
 from studies.pages import markdown, read
-
-Floats = NDArray[np.float64]
 
 EVERY, RADIUS, WITHIN = 0.2, 0.010, 0.0098
 """Length of a decision [s], radius of a waypoint [m], and the distance from it that is aimed at [m]."""
@@ -273,11 +271,6 @@ CELLS: dict[tuple[str, str], Callable[[], Any]] = {
 }
 
 
-def settings() -> dict[str, float]:
-    """What all numbers have in common."""
-    return {"largest_change": LARGEST, "tries": TRIES, "uneven": UNEVEN, "strokes_fitted": SWUM}
-
-
 def run(results: Results) -> None:
     """Compute what is missing."""
     results.fill(CELLS, str)
@@ -308,6 +301,7 @@ def table_of_fits(results: Mapping[str, Any]) -> str:
 
 
 STUDY = Study(
-    "descent", run, file="gradients/descent.json", settings=settings,
+    "descent", run, file="gradients/descent.json",
+    settings=lambda: {"largest_change": LARGEST, "tries": TRIES, "uneven": UNEVEN, "strokes_fitted": SWUM},
     tables={"descent pulses": table_of_pulses, "descent radii": table_of_radii, "descent fits": table_of_fits},
 )  # fmt: skip

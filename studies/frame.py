@@ -13,7 +13,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from seastar_gym.files import write_atomically
+
+Floats = NDArray[np.float64]
 
 DOCS = Path(__file__).parents[1] / "docs"
 RESULTS = Path("results")

@@ -22,7 +22,6 @@ from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.controllers.learned import bundled_file, load
 from seastar_gym.envs.commands import to_commands
@@ -32,12 +31,11 @@ from seastar_gym.gradients import differentiate, record
 from seastar_gym.scene import Contact, Scene, SmaWires, Vortex, Water
 from seastar_gym.scene.per_robot import at, side_by_side, with_numbers
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study, rounded
+from studies.frame import Floats, Results, Study, rounded
 from studies.pages import markdown
 from studies.speed.strokes import repeat
 from studies.style import CYCLE, INK, subplots
 
-Floats = NDArray[np.float64]
 Commands = Callable[[int, int, np.random.Generator], Floats]
 
 STROKES, SWIMS = 100, 32
@@ -258,11 +256,6 @@ def cost_table(results: Mapping[str, Any]) -> str:
     return markdown(["unknowns", *ways], rows)
 
 
-def settings() -> dict[str, float]:
-    """What all numbers have in common."""
-    return {"strokes": STROKES, "swims": SWIMS, "newton_tolerance": NEWTON_TOLERANCE, "timed_strokes": SWUM}
-
-
 def run(results: Results) -> None:
     """Measure all cases and costs that are missing."""
     cases = {
@@ -313,6 +306,9 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
 
 
 STUDY = Study(
-    "gradients", run, file="gradients/gradients.json", settings=settings, pictures={"gradients.png": draw},
+    "gradients", run, file="gradients/gradients.json", pictures={"gradients.png": draw},
     tables={"gradients growth": table, "gradients cost": cost_table},
+    settings=lambda: {
+        "strokes": STROKES, "swims": SWIMS, "newton_tolerance": NEWTON_TOLERANCE, "timed_strokes": SWUM,
+    },
 )  # fmt: skip

@@ -17,7 +17,6 @@ import gymnasium as gym
 import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
-from numpy.typing import NDArray
 from scipy.optimize import curve_fit
 from scipy.stats import t as student
 
@@ -39,10 +38,8 @@ from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.simulated import SimulatedPlant
 from seastar_gym.plant.swim import PlantSwim
 from seastar_gym.scene.per_robot import with_numbers
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study
 from studies.pages import markdown
-
-Floats = NDArray[np.float64]
 
 PERIOD = 0.2
 """Time between decisions [s]."""

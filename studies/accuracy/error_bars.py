@@ -27,11 +27,9 @@ from seastar_gym.scene import Numerics, Scene, Seastar, Water, relaxation_time
 from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator.error_bars import factor
 from studies.accuracy.work_precision import cost
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study
 from studies.pages import markdown
 from studies.style import CYCLE, FAINT, PERCENT, subplots
-
-Floats = NDArray[np.float64]
 
 ROBOTS: dict[str, Scene] = {
     "the chapter's": Scene(),
@@ -100,10 +98,10 @@ def by_class(covered: NDArray[np.bool_]) -> dict[str, float]:
     return dict(zip(CLASSES, shares.tolist(), strict=True))
 
 
-def measure(names: tuple[str, ...], samples: int, seeds: tuple[int, int], bar: Any = None) -> list[Row]:
+def measure(names: tuple[str, ...], samples: int, seeds: tuple[int, int]) -> list[Row]:
     """Measure error bars of robots of these names at all settings; seeds: of the calibration and of the test."""
     rows = []
-    for name in names:
+    for name in tqdm(names, unit="robot"):
         scene = ROBOTS[name]
         drawn = [draw_classes(samples, scene.robot.n_limbs, seed) for seed in seeds]
         exact = [swim(at(scene, TRUE), commands).hub for commands in drawn]
@@ -115,8 +113,6 @@ def measure(names: tuple[str, ...], samples: int, seeds: tuple[int, int], bar: A
             with np.errstate(divide="ignore"):
                 needed = factor(swum) * float(np.quantile(true / estimate, LEVEL))
             rows.append(judged(name, setting, needed, *held_out))
-        if bar is not None:
-            bar.update()
     return rows
 
 
@@ -204,8 +200,7 @@ def draw(rows: list[Row], path: Path) -> None:
 
 def run(results: Results) -> str | None:
     """Measure all robots."""
-    with tqdm(total=len(ROBOTS), unit="robot") as bar:
-        rows = measure(tuple(ROBOTS), SAMPLES, SEEDS, bar)
+    rows = measure(tuple(ROBOTS), SAMPLES, SEEDS)
     costs = {name: round(cost_of_error_bars(setting), 3) for name, setting in SETTINGS.items()}
     results.update(samples=SAMPLES, costs=costs, rows=[row._asdict() for row in rows])
     failed = not all(math.isfinite(row.needed) for row in rows)

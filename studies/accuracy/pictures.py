@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.files import save_figure
 from studies.accuracy.rows import Column, front
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from studies.accuracy.rows import Row, Study
-
-Floats = NDArray[np.float64]
 
 (OURS, CHAPTERS), OTHERS = CYCLE[:2], FAINT
 PUBLISHED_LIMIT = 38.65e-3

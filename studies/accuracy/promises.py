@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.accuracy import Certificate, chapters_certificate, measure
 from seastar_gym.accuracy.certificate import CLASSES_VERSION
@@ -32,10 +31,8 @@ from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 from studies.accuracy.error_bars import ROBOTS
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study
 from studies.pages import markdown
-
-Floats = NDArray[np.float64]
 
 CERTIFIED = measure.SAMPLES
 """Sequences per class of a certificate."""

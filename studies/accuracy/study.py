@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.accuracy.chapter import STROKES
 from seastar_gym.accuracy.command import progress_bar
@@ -36,10 +35,8 @@ from studies.accuracy.rows import Figures, Row, figures, medians, promised
 from studies.accuracy.rows import Study as Found
 from studies.accuracy.settings import QUICK, Plan, settings
 from studies.accuracy.tables import as_markdown, store, write_csv
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study
 from studies.pages import show
-
-Floats = NDArray[np.float64]
 
 TIGHT = 1e-9
 """Newton tolerance of the swims that others are compared with."""

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.accuracy import Certificate, Setting, chapter
 from seastar_gym.accuracy.certificate import CLASSES_VERSION
@@ -28,10 +27,8 @@ from seastar_gym.scene import Numerics, Scene, SmaWires
 from seastar_gym.scene.numerics import PRESETS, Fidelity, Resolution
 from seastar_gym.version import __version__
 from studies.accuracy.page import PERIODS, timed
-from studies.frame import Results, Study, rounded
+from studies.frame import Floats, Results, Study, rounded
 from studies.pages import show
-
-Floats = NDArray[np.float64]
 
 SCENE = replace(Scene(), actuator=SmaWires())
 SECONDS = 10

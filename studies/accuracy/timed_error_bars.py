@@ -11,7 +11,6 @@ estimate over true error.
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from seastar_gym.accuracy.measure import swim
@@ -23,8 +22,6 @@ from studies.accuracy.page import PERIODS
 from studies.frame import Results, Study
 from studies.pages import markdown, show
 from studies.style import PERCENT
-
-Floats = NDArray[np.float64]
 
 SAMPLES, SEED = 8, 7
 """Sequences of either kind for each time between decisions, and their seed; the tables of errors have seed 0."""

@@ -16,7 +16,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.accuracy.commands import CLASSES, PROMISED, draw_classes
 from seastar_gym.accuracy.measure import errors, path_lengths, swim
@@ -28,11 +27,9 @@ from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from studies.accuracy.settings import MILLI
 from studies.accuracy.work_precision_page import draw, of_presets, of_settings
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study
 from studies.speed.strokes import repeat
 from studies.speed.terms import SILICONE
-
-Floats = NDArray[np.float64]
 
 PROBLEMS: dict[str, Scene] = {
     "chapter's robot": Scene(),

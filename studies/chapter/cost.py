@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator
+from studies.frame import Floats
 from studies.speed.strokes import repeat
-
-Floats = NDArray[np.float64]
 
 BATCH = 64
 """Robots in the measured batch."""

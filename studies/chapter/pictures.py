@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.files import save_figure
 from seastar_gym.scene import SmaPulse
+from studies.frame import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,8 +23,6 @@ from studies.chapter.cost import Cost
 from studies.chapter.statements import stroke_motion
 from studies.chapter.swims import Swim
 from studies.style import FAINT, INK, MM, MS, new_figure, subplots
-
-Floats = NDArray[np.float64]
 
 LIMB, ACTUATED = "#9aa1ab", "#1f4fd8"
 PLUS, MINUS = "#d62728", "#1f4fd8"

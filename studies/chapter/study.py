@@ -30,8 +30,8 @@ from studies.chapter.statements import (
     stroke_motion,
     write_csv,
 )
-from studies.chapter.swims import CONTINUUM, LIMIT, SETTINGS, THE_CHAPTERS, Floats, Swim, swim
-from studies.frame import Results, Study, rounded
+from studies.chapter.swims import CONTINUUM, LIMIT, SETTINGS, THE_CHAPTERS, Swim, swim
+from studies.frame import Floats, Results, Study, rounded
 from studies.pages import markdown, show
 from studies.style import MM
 

@@ -7,9 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator, SolverStatus
+from studies.frame import Floats
 from studies.style import MS
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

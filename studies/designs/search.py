@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas  # type: ignore[import-untyped]
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from seastar_gym.executors import Executor
@@ -21,8 +20,8 @@ from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.configurations import configuration_with
 from seastar_gym.sweep.result_files import ResultFiles, read_result_file
 from studies.designs.space import ANGLES, LENGTHS, LIMBS, MODULI, RADII, SWIM, TAPERS, Body, run_all
+from studies.frame import Floats
 
-Floats = NDArray[np.float64]
 Row = Mapping[str, Any]
 
 POWERS = {

@@ -34,10 +34,9 @@ from seastar_gym.files import save_figure
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator, State
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study
 from studies.style import CYCLE, MM, subplots
 
-Floats = NDArray[np.float64]
 Gaits = NDArray[np.intp]
 
 SETTLING, MEASURED = 12, 12

@@ -14,10 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import expit
 
-Floats = NDArray[np.float64]
+from studies.frame import Floats
 
 FILE = Path(__file__).with_name("sma_limb_curvature.csv")
 PHASES = np.arange(24) / 24

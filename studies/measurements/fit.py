@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from studies.frame import Floats
 from studies.measurements.curves import MODELS, Curve, curvature, peaks
-
-Floats = NDArray[np.float64]
 
 RANGES: dict[str, tuple[float, float, float]] = {
     "rest_curvature": (100.0, 125.0, 150.0),

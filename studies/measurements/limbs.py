@@ -209,8 +209,6 @@ def run(results: Results) -> None:
     results["strokes_round_the_pentagon"] = study_policies()
 
 
-Floats = NDArray[np.float64]
-
 STUDY = Study(
     "measurements.limbs", run, file="validation/limbs.json", pictures={"limbs.png": draw}, packages=("scipy",)
 )

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.files import save_figure
 from seastar_gym.scene import Contact, Numerics, Scene, Seastar, Strip, Tube
@@ -24,11 +23,9 @@ from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.limb import Limb
 from seastar_gym.scene.section import AnySection, Disc, Section
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study
 from studies.pages import markdown
 from studies.style import INK, subplots
-
-Floats = NDArray[np.float64]
 
 NUMERICS, NODES = Numerics.preset("balanced"), 10
 ROBOTS, ROUNDS, STROKES = 64, 9, 5

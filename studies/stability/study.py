@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from seastar_gym.scene.numerics import SchemeName
@@ -27,8 +26,6 @@ from studies.pages import markdown
 from studies.stability.cases import STEPS, SWEEPS, Sweep, format_value
 from studies.stability.cells import Cell, commands_of, converged_displacements, run_cell, stroke_duration
 from studies.stability.pictures import draw as draw_cells
-
-Floats = NDArray[np.float64]
 
 GROWTH_ROUNDING = 1e-11
 """Relative growth of the energy in a step that is attributed to rounding."""

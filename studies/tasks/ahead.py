@@ -11,8 +11,8 @@ from seastar_gym.controllers.planner import Branching, state_of
 from seastar_gym.envs.commands import unless_strokes
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.simulator import State
+from studies.frame import Floats
 
-Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
 COASTING = 0.5

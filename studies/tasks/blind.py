@@ -13,8 +13,9 @@ from seastar_gym.envs.stations import body_heading
 from seastar_gym.envs.tasks.fail_blind import MOST_DEAD
 from seastar_gym.evaluation.rollout import Info
 from seastar_gym.simulator import Simulator, State
+from studies.frame import Floats
 from studies.tasks.ahead import Ahead, Robots
-from studies.tasks.greedy import Actions, Floats, Floats32, Guess, route
+from studies.tasks.greedy import Actions, Floats32, Guess, route
 
 
 def ends_in_world(robots: Robots, observations: Floats32, state: State) -> tuple[Floats, Floats]:

@@ -31,10 +31,11 @@ from seastar_gym.envs.tasks.sim_to_real import SimToReal
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.evaluation.rollout import Batch, Info
 from seastar_gym.simulator import State
+from studies.frame import Floats
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
 from studies.tasks.blind import BlindPlanner, FailureGuess, LimbsKnown, StateKnown
 from studies.tasks.episodes import Agent
-from studies.tasks.greedy import Actions, Floats, Floats32, Greedy, GreedyOnRoute, Guess, length, route
+from studies.tasks.greedy import Actions, Floats32, Greedy, GreedyOnRoute, Guess, length, route
 from studies.tasks.rounds import BestRound, MostPerMetre, PlannedMostPerMetre
 from studies.tasks.trap import ClearGreedy, ClearPlanner, all_discs, discs_by_the_prior, discs_so_far
 

@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.evaluation.rollout import Info
+from studies.frame import Floats
 from studies.tasks.ahead import Odometer, Robots
 
-Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 Actions = NDArray[np.int64]
 

@@ -6,8 +6,9 @@ from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.rounds import best_round, distances
 from seastar_gym.evaluation.rollout import Info
+from studies.frame import Floats
 from studies.tasks.ahead import Ahead, Robots
-from studies.tasks.greedy import Actions, Floats, Floats32, Greedy, length
+from studies.tasks.greedy import Actions, Floats32, Greedy, length
 
 
 class MostPerMetre(Greedy):

@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from studies.frame import Floats
 from studies.validation.priors import SWEEPS, UNKNOWNS, place_in_range
 from studies.validation.speeds import TRAINED_MATERIALS, Condition
-
-Floats = NDArray[np.float64]
 
 SCATTER = 0.10
 """Standard deviation of the logarithm of a measured speed, one run of several."""

@@ -7,10 +7,9 @@ on a plastic frame. Nothing is taken from the measured speeds.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
-Floats = NDArray[np.float64]
+from studies.frame import Floats
 
 SWEEPS = tuple(np.radians([0.0, 25.0, 50.0, 75.0]).tolist())
 """Angles by which limbs may be swept backwards where they leave the frame [rad], equally likely; sample k has number

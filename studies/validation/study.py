@@ -17,10 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.files import save_figure
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study
 from studies.style import CYCLE, INK, subplots
 from studies.validation import follow, laws, turns
 from studies.validation.inference import (
@@ -41,8 +40,6 @@ from studies.validation.inference import (
 from studies.validation.priors import samples
 from studies.validation.speeds import Condition, read_speeds, training
 from studies.validation.swimmer import ADDED, FULL, LEFT_OUT, VARIANTS, kept_speeds
-
-Floats = NDArray[np.float64]
 
 SAMPLES, OF_VARIANTS, OF_ADDED, FOURS = 512, 128, 64, 100
 """Samples of the full model, of those with parts left out, of those with others: the first of one sequence. Fours."""

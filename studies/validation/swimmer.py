@@ -11,18 +11,17 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.scene import AlongLimb, Limb, MeasuredCurve, Numerics, Scene, Seastar, Stiffening, Strip, Water
 from seastar_gym.scene.actuators.sma_limb import MEASURED
 from seastar_gym.scene.body import Attachment, Body
 from seastar_gym.simulator import Simulator
+from studies.frame import Floats
 from studies.measurements.curves import curvature, read_curves
 from studies.validation.in_turn import LATE, InTurn
 from studies.validation.priors import SWEEPS, of_sweep
 from studies.validation.speeds import Condition
 
-Floats = NDArray[np.float64]
 How = Literal["measured", "fitted", "80 ms", "ramp"]
 
 

@@ -3,16 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.scene import Numerics, Scene, Seastar, Water
 from seastar_gym.simulator import Simulator
+from studies.frame import Floats
 from studies.style import MM
 from studies.verification import exact
 from studies.verification.page import Row, Section, order_row
 from studies.verification.unactuated import HUB, IN_LINE, let_pass, pause
-
-Floats = NDArray[np.float64]
 
 ELASTICA_LOADS = {
     1.0: {"continuum": 0.06, "chapter": 0.11},

@@ -3,17 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator
+from studies.frame import Floats
 from studies.verification import exact
 from studies.verification.page import Row, Section, order_row
 from studies.verification.unactuated import HUB, IN_LINE, pause
-
-Floats = NDArray[np.float64]
 
 FREQUENCY_NODES = (10, 20, 40)
 """Nodes per limb of the vibrating limbs."""

@@ -13,20 +13,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simulator import Simulator, State
-from studies.frame import Results, Study, rounded
+from studies.frame import Floats, Results, Study, rounded
 from studies.pages import markdown
 from studies.speed.strokes import repeat
 from studies.style import COLOURS, FAINT, MS, PERCENT, subplots
 from studies.verification import exact
 from studies.verification.unactuated import HUB, let_pass, pause
-
-Floats = NDArray[np.float64]
 
 MUJOCO = "mujoco"
 ROBOT = Seastar(n_limbs=2)
