@@ -9,10 +9,11 @@ from seastar_gym.accuracy.certificate import CLASSES_VERSION
 from seastar_gym.accuracy.measure import machine, rounded_up
 from seastar_gym.accuracy.setting import physics
 from seastar_gym.scene import Scene
+from seastar_gym.scene.numerics import PRESETS
 from seastar_gym.version import __version__
 from studies.accuracy.cases import STROKES, gaits
 from studies.accuracy.rows import UNSEEN, Column, Figures, Row, Study, fronts, path_front
-from studies.accuracy.settings import Plan, presets
+from studies.accuracy.settings import Plan
 from studies.frame import rounded, write_rows
 from studies.pages import markdown
 
@@ -22,7 +23,7 @@ LARGEST_DOUBT = 3e-4
 
 def summary(found: Study) -> list[tuple[str, Row]]:
     """Presets, by name, and the front of the path error, fastest first."""
-    names = {setting: name for name, setting in presets().items()}
+    names = {setting: name for name, setting in PRESETS.items()}
     chosen = {row.resolution: row for row in path_front(found.rows)}
     chosen.update({row.resolution: row for row in found.rows if row.resolution in names})
     return [(names.get(row.resolution, ""), row) for row in sorted(chosen.values(), key=lambda row: -row.speed)]
@@ -149,11 +150,11 @@ def store(found: Study, path: Path = chapter.STROKES) -> None:
                 "nothing is stored."
             )
     by_resolution = {row.resolution: row for row in found.rows}
-    first = {each: by_resolution[each] for each in presets().values()}
+    first = {each: by_resolution[each] for each in PRESETS.values()}
     rows = first | {row.resolution: row for row in fronts(found.rows)}
     settings = {resolution: as_setting(row) for resolution, row in rows.items()}
     Certificate(
         physics(Scene()), tuple(settings.values()), ("random",), ("random", "repeated"), Plan().n_random,
-        limit_error=rounded_up(settings[presets()["reference"]].space_error / 3.0), classes=CLASSES_VERSION,
+        limit_error=rounded_up(settings[PRESETS["reference"]].space_error / 3.0), classes=CLASSES_VERSION,
         version=__version__, machine=machine(), measured_over=measured_over(Plan()),
     ).save(path)  # fmt: skip

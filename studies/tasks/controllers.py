@@ -33,7 +33,7 @@ from seastar_gym.evaluation.rollout import Batch, Info
 from seastar_gym.simulator import State
 from studies.frame import Floats
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
-from studies.tasks.blind import BlindPlanner, FailureGuess, LimbsKnown, StateKnown
+from studies.tasks.blind import BlindPlanner, LimbsKnown, StateKnown, failure_guess
 from studies.tasks.episodes import Agent
 from studies.tasks.greedy import Actions, Floats32, Greedy, GreedyOnRoute, Guess, length, route
 from studies.tasks.rounds import BestRound, MostPerMetre, PlannedMostPerMetre
@@ -74,11 +74,9 @@ def rewired(states: State, wiring: Floats) -> State:
     )
 
 
-class WiringGuess(Guess):
+def wiring_guess(robots: Robots) -> Guess:
     """Agent that believes in the wiring that has explained its displacements and turns best."""
-
-    def __init__(self, robots: Robots):
-        super().__init__(robots, np.array(list(itertools.product((1.0, -1.0), repeat=robots.scene.robot.n_limbs))))
+    return Guess(robots, np.array(list(itertools.product((1.0, -1.0), repeat=robots.scene.robot.n_limbs))))
 
 
 # Prey
@@ -206,7 +204,7 @@ MAKERS: dict[type, dict[str, Callable[[Robots], Agent]]] = {
     Miswired: {
         "greedy": GreedyOnRoute,
         "planner": lambda robots: WiringPlanner(robots, knows=False),
-        "adaptive": WiringGuess,
+        "adaptive": wiring_guess,
         "informed": lambda robots: WiringPlanner(robots, knows=True),
     },
     Prey: {
@@ -224,7 +222,7 @@ MAKERS: dict[type, dict[str, Callable[[Robots], Agent]]] = {
     FailBlind: {
         "greedy": GreedyOnRoute,
         "planner": BlindPlanner,
-        "adaptive": FailureGuess,
+        "adaptive": failure_guess,
         "informed": LimbsKnown,
     },
     ObstTrap: {

@@ -30,8 +30,7 @@ from studies.frame import Results, Study, require_known
 from studies.tasks import heading
 from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
 from studies.tasks.episodes import swim
-from studies.tasks.page import draw, means, table, verdicts
-from studies.tasks.rows import rows_of
+from studies.tasks.page import draw, means, rows_of, table, verdicts
 
 IDS: dict[str, str] = {id: about[0] for id, about in TASKS.items()} | {heading.ID: "heading"}
 """Name of the challenge of every id."""

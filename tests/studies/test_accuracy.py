@@ -12,7 +12,7 @@ from seastar_gym.accuracy.measure import Errors, Swims, errors, path_lengths, ro
 from seastar_gym.accuracy.measure import swim as swim_commands
 from seastar_gym.accuracy.setting import at
 from seastar_gym.gaits import PAIRS, STRAIGHT
-from seastar_gym.scene.numerics import Resolution
+from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from studies.accuracy import rows as accuracy_rows
 from studies.accuracy import study as accuracy
@@ -29,7 +29,7 @@ from studies.accuracy.cases import (
     symmetric_form,
 )
 from studies.accuracy.rows import Figures, Row, medians
-from studies.accuracy.settings import MILLI, Plan, presets, settings
+from studies.accuracy.settings import MILLI, Plan, settings
 from studies.frame import rounded
 
 TINY = Plan(
@@ -252,7 +252,7 @@ def test_study_knows_its_limit_and_the_doubt_about_it(found):
 def test_presets_and_the_chapters_steps_are_among_the_settings():
     measured = settings(Plan())
     chapter = {Resolution("chapter", 10, Numerics("implicit-euler", 20 * MILLI, 1e-6))}
-    assert {*presets().values()} | chapter <= set(measured)
+    assert {*PRESETS.values()} | chapter <= set(measured)
     assert len(measured) == len(set(measured))
 
 
@@ -266,7 +266,7 @@ def test_tables_and_csv_are_written(found, tmp_path):
     assert float(rows[0]["promise_path"]) == pytest.approx(found.rows[0].promise("path"), rel=1e-4)
     lines = accuracy_tables.as_markdown(found).splitlines()
     assert all(line.count("|") == len(accuracy_tables.COLUMNS) + 1 for line in lines if line.startswith("|"))
-    for name in presets():
+    for name in PRESETS:
         assert any(line.startswith(f"| {name} |") for line in lines)
     assert sum(line.startswith("| ") for line in lines) == 1 + len(accuracy_tables.summary(found))
 
@@ -282,7 +282,7 @@ def test_what_is_stored_can_be_promised(found, tmp_path):
     sure = replace(found, doubt=dict.fromkeys(found.doubt, same(1e-6)))
     accuracy_tables.store(sure, tmp_path / "strokes.json")
     stored = Certificate.load(tmp_path / "strokes.json")
-    assert [each.resolution for each in stored.settings[: len(presets())]] == list(presets().values())
+    assert [each.resolution for each in stored.settings[: len(PRESETS)]] == list(PRESETS.values())
     assert stored.limit_error >= stored.settings[3].space_error / 3.0
     by_resolution = {each.resolution: each for each in found.rows}
     for kept in stored.settings:
@@ -293,7 +293,7 @@ def test_what_is_stored_can_be_promised(found, tmp_path):
         assert path_error == pytest.approx(kept.space_error + kept.time_error, rel=1e-5)
         assert measured.typical.random <= kept.typical["random"] <= 1.11 * path_error
         assert measured.typical.gait <= kept.typical["repeated"] <= kept.errors["repeated"]
-    speeds = [each.speed for each in stored.settings[len(presets()) :]]
+    speeds = [each.speed for each in stored.settings[len(PRESETS) :]]
     assert speeds == sorted(speeds, reverse=True)
 
 
