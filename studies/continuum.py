@@ -113,9 +113,9 @@ def error(hub: Floats, reference: Floats) -> float:
     return float((np.linalg.norm(hub - reference, axis=-1).max(axis=0) / path_lengths(Scene(), reference)).max())
 
 
-def order(errors: Floats, nodes: tuple[int, ...] = NODES) -> float:
+def order(errors: Floats) -> float:
     """Slope of log error over log edge length, for the numbers of nodes in FITTED."""
-    fitted = [nodes.index(n) for n in FITTED]
+    fitted = [NODES.index(n) for n in FITTED]
     return float(np.polyfit(-np.log(np.subtract(FITTED, 1)), np.log(errors[fitted]), 1)[0])
 
 

@@ -49,7 +49,7 @@ PRESETS: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
 BATCHES = (64, 256, 1024, 4096, 16384, 65536, 262144)
 LONGEST = 4.0
 """A batch whose stroke takes longer than this [s] is the largest one, from USUAL robots on."""
-USUAL = 4096
+USUAL, DECIDING = 4096, 65536
 N_ROBOTS, N_STROKES = 64, 3
 """Robots that are compared with the processor's, if a scene has no number of its own, and their strokes."""
 EVERYTHING = "all, a body, bent along, contact"
@@ -239,9 +239,9 @@ def bandwidth() -> float:
     return float(2 * source.nbytes / min(seconds))
 
 
-def decisions(device: str, on_device: bool = False, n_robots: int = 65536) -> dict[str, float]:
+def decisions(device: str, on_device: bool = False) -> dict[str, float]:
     """Decisions per second of the batch environment at "fast" with random actions."""
-    batch = batch_on(device, n_robots, on_device)
+    batch = batch_on(device, DECIDING, on_device)
     batch.reset(seed=0)
     batch.action_space.seed(0)
     actions = [batch.action_space.sample() for _ in range(4)]
@@ -252,7 +252,7 @@ def decisions(device: str, on_device: bool = False, n_robots: int = 65536) -> di
     on_processor(observations[:1])  # waits for the device
     seconds = time.perf_counter() - began
     batch.close()
-    return {"decisions_per_second": rounded(3 * n_robots / seconds), "robots": n_robots}
+    return {"decisions_per_second": rounded(3 * DECIDING / seconds), "robots": DECIDING}
 
 
 def learning(device: str) -> dict[str, float]:

@@ -104,13 +104,3 @@ def timed(periods: tuple[float, ...] = PERIODS) -> str:
         rows.append([f"`{name}`", *(each[k].replace(" %", "") for k in (0, 1) for each in found)])
     columns = [f"{what}, {period:g} s [%]" for what in ("random", "repeated") for period in periods]
     return markdown(["fidelity", *columns], rows)
-
-
-def timed_paths(periods: tuple[float, ...] = PERIODS) -> str:
-    """Shortest, median and longest paths [mm] of commands in time."""
-    stored = [certificate.measured_over["paths"] for certificate in map(timed_certificate, periods) if certificate]
-    kinds = {"random": "random commands", "repeated": "repeated seconds"}
-    rows = [
-        [name, *(", ".join(f"{length:g}" for length in each[kind]) for each in stored)] for kind, name in kinds.items()
-    ]
-    return markdown(["", *(f"every {period:g} s" for period in periods)], rows)

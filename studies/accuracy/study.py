@@ -202,7 +202,7 @@ STUDY = Study(
     out=Path("runs/accuracy"),
     tables={
         name: lambda _, name=name: getattr(page, name)()  # type: ignore[misc]
-        for name in ("errors", "choosing", "presets", "timed", "timed_paths")
+        for name in ("errors", "choosing", "presets", "timed")
     },
     drawn=("accuracy/convergence.png", "accuracy/work_precision.png"),
 )

@@ -59,9 +59,9 @@ class Swim:
         """Hub positions of a robot [m], shape (n, 2)."""
         return self.positions[:, robot, 0]
 
-    def hub_velocity(self, robot: int = 0) -> Floats:
-        """Hub velocities of a robot [m/s], shape (n, 2)."""
-        return self.velocities[:, robot, 0]
+    def hub_velocity(self) -> Floats:
+        """Hub velocities of the first robot [m/s], shape (n, 2)."""
+        return self.velocities[:, 0, 0]
 
     def at(self, time: float) -> int:
         """Index of the first sample that is not before a time [s]."""
@@ -72,11 +72,11 @@ class Swim:
         ends = np.arange(len(self.commands) + 1) * self.scene.actuator.period
         return np.searchsorted(self.time, ends - 1e-9)
 
-    def actuated(self, time: float, robot: int = 0) -> NDArray[np.bool_]:
-        """Mask of a robot's limbs that are rotated at a time [s], shape (n_limbs,)."""
+    def actuated(self, time: float) -> NDArray[np.bool_]:
+        """Mask of the first robot's limbs that are rotated at a time [s], shape (n_limbs,)."""
         stroke, since = divmod(time + 1e-9, self.scene.actuator.period)
         turned = stroke < len(self.commands) and self.scene.actuator.delta_psi(since) > 1e-6
-        active: NDArray[np.bool_] = turned & (self.commands[int(stroke) if turned else 0, robot] != 0.0)
+        active: NDArray[np.bool_] = turned & (self.commands[int(stroke) if turned else 0, 0] != 0.0)
         return active
 
 

@@ -82,9 +82,9 @@ def run_all(cells: Iterable[Batch], folder: Path, executor: Executor, progress: 
 BODIES = {body.label: body for body in itertools.starmap(Body, itertools.product(LIMBS, RADII, TAPERS))}
 
 
-def bodies(some: dict[str, Body]) -> Choices:
-    """Axis of bodies."""
-    return Choices("robot", tuple(body.robot() for body in some.values()), tuple(some))
+def bodies() -> Choices:
+    """Axis of all bodies."""
+    return Choices("robot", tuple(body.robot() for body in BODIES.values()), tuple(BODIES))
 
 
 def all_designs(samples: int = SAMPLES) -> Sweep:
@@ -94,15 +94,15 @@ def all_designs(samples: int = SAMPLES) -> Sweep:
         Range("actuator.peak_angle", *ANGLES),
     )  # fmt: skip
     return Sweep(
-        Scene.preset("fast"), (bodies(BODIES), *ranges), settling=SETTLING, measured=MEASURED, samples=samples,
+        Scene.preset("fast"), (bodies(), *ranges), settling=SETTLING, measured=MEASURED, samples=samples,
         robots=427,
     )  # fmt: skip
 
 
-def at_the_chapters(samples: int = 64) -> Sweep:
+def at_the_chapters() -> Sweep:
     """Sweep over body and modulus, with the chapter's limb length and peak angle."""
     modulus = Range("robot.youngs_modulus", *MODULI, is_log=True)
-    return Sweep(Scene.preset("fast"), (bodies(BODIES), modulus), settling=SETTLING, measured=MEASURED, samples=samples)
+    return Sweep(Scene.preset("fast"), (bodies(), modulus), settling=SETTLING, measured=MEASURED, samples=64)
 
 
 SPREADS = (0.25, 0.5, 1.0, 2.0, 4.0)

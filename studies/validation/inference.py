@@ -175,9 +175,9 @@ def best_known(values: dict[str, Floats], weight: Floats) -> tuple[dict[str, flo
 # How much hangs on which four speeds the model is fitted to: many other fours, of the same simulations.
 
 
-def other_fours(conditions: list[Condition], n: int, seed: int = 0) -> list[list[int]]:
+def other_fours(conditions: list[Condition], n: int) -> list[list[int]]:
     """Indices of n fours of runs, one of each of the same materials, drawn at random."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     by_material = [[k for k, c in enumerate(conditions) if c.liquid_metal == m] for m in TRAINED_MATERIALS]
     return [[int(rng.choice(of_one)) for of_one in by_material] for _ in range(n)]
 

@@ -48,9 +48,9 @@ def of_sweep(values: dict[str, Floats], number: int) -> dict[str, Floats]:
     return {name: column[number :: len(SWEEPS)] for name, column in values.items()}
 
 
-def samples(n: int, seed: int = 0) -> dict[str, Floats]:
+def samples(n: int) -> dict[str, Floats]:
     """Values of every unknown in n robots, by name, from Sobol's sequence."""
-    spread = qmc.Sobol(len(UNKNOWNS), seed=seed).random(n)
+    spread = qmc.Sobol(len(UNKNOWNS), seed=0).random(n)
     return {
         unknown.name: unknown.low * (unknown.high / unknown.low) ** column
         for unknown, column in zip(UNKNOWNS, spread.T, strict=True)
