@@ -19,9 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
-from studies.chapter.cost import Cost
 from studies.chapter.statements import stroke_motion
-from studies.chapter.swims import Swim
+from studies.chapter.swims import Cost, Swim
 from studies.style import FAINT, INK, MM, MS, new_figure, subplots
 
 LIMB, ACTUATED = "#9aa1ab", "#1f4fd8"

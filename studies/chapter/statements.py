@@ -8,8 +8,7 @@ import numpy as np
 
 from seastar_gym import gaits
 from studies.chapter import REAL_TIME_FROM
-from studies.chapter.cost import Cost
-from studies.chapter.swims import Swim
+from studies.chapter.swims import Cost, Swim
 from studies.frame import write_rows
 from studies.pages import markdown
 from studies.style import MM, MS

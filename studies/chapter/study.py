@@ -17,7 +17,6 @@ from seastar_gym import gaits
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene, SmaPulse
 from studies.chapter import pictures
-from studies.chapter.cost import measure_cost
 from studies.chapter.pictures import PENTAGON_TIMES
 from studies.chapter.statements import (
     PAIRS,
@@ -30,7 +29,7 @@ from studies.chapter.statements import (
     stroke_motion,
     write_csv,
 )
-from studies.chapter.swims import CONTINUUM, LIMIT, SETTINGS, THE_CHAPTERS, Swim, swim
+from studies.chapter.swims import CONTINUUM, LIMIT, SETTINGS, THE_CHAPTERS, Swim, measure_cost, swim
 from studies.frame import Floats, Results, Study, rounded
 from studies.pages import markdown, show
 from studies.style import MM

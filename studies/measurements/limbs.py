@@ -29,13 +29,11 @@ from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator, SolverStatus
 from studies.frame import Results, Study
 from studies.measurements.curves import MODELS, PHASES, Curve, read_curves
-from studies.measurements.fit import Fit, fit, predict
-from studies.measurements.pictures import HEATING_SHARE, draw
+from studies.measurements.fit import AIM, HEATING_SHARE, Fit, draw, fit, predict
 from studies.pages import markdown, show
 
 CHOSEN = "delay"
 """The model of `SmaLimb`."""
-AIM = 0.04
 SHARE = 0.9
 """Share of held-out samples that intervals should hold."""
 FITTED = 4

@@ -35,7 +35,7 @@ from seastar_gym.scene.per_robot import numbers_of, unit_of, with_numbers
 from seastar_gym.scene.section import BROADSIDE, broadside
 from seastar_gym.scene.shape import rest_positions
 from studies.verification import exact
-from studies.verification.frequencies import fitted_frequency
+from studies.verification.clamped import fitted_frequency
 from studies.verification.unactuated import let_pass, pause
 from unlike import DIFFERENT, robot_and_star
 

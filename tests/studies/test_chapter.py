@@ -10,7 +10,7 @@ import pytest
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse
 from seastar_gym.gaits import STRAIGHT, pentagon_gait
 from studies import continuum as study
-from studies.chapter import cost, pictures, statements, swims
+from studies.chapter import pictures, statements, swims
 from studies.chapter import study as chapter
 from studies.chapter.study import STUDY
 from studies.chapter.swims import CHAPTER, swim
@@ -159,13 +159,13 @@ def test_kept_strokes_are_the_first_and_the_last(straight):
 
 @pytest.mark.parametrize("robot", [swims.THE_CHAPTERS, Seastar()], ids=["chapter", "continuum"])
 def test_newtons_matrix_becomes_indefinite_where_the_chapter_meets_numerical_issues(robot):
-    assert not cost.needs_regularisation(Scene(robot, numerics=Numerics("implicit-euler", 10e-3)))
-    assert cost.needs_regularisation(Scene(robot, numerics=Numerics("implicit-euler", 20e-3)))
+    assert not swims.needs_regularisation(Scene(robot, numerics=Numerics("implicit-euler", 10e-3)))
+    assert swims.needs_regularisation(Scene(robot, numerics=Numerics("implicit-euler", 20e-3)))
 
 
 def test_cost_is_measured_for_every_step():
     calls = []
-    found = cost.measure_cost(swims.THE_CHAPTERS, np.array([3e-3, 40e-3]), 0.0, lambda: calls.append(1))
+    found = swims.measure_cost(swims.THE_CHAPTERS, np.array([3e-3, 40e-3]), 0.0, lambda: calls.append(1))
     assert len(calls) == 2
     assert found.regularised.tolist() == [False, True]
     assert np.all(found.alone > found.in_batch) and np.all(found.in_batch > 0.0)
