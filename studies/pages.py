@@ -121,8 +121,7 @@ def check(docs: Path, studies: Sequence[Study]) -> int:
 def draw(docs: Path, studies: Sequence[Study]) -> int:
     """Draw the pictures and fill the pages again; returns the exit code."""
     for study in told(docs, studies):
-        for name, picture in study.pictures.items():
-            picture(numbers(docs, study), study.committed(docs, name))
+        study.write(numbers(docs, study), study.committed(docs, study.file).parent)
     fill(docs, studies)
     return 0
 

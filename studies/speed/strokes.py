@@ -16,16 +16,10 @@ NODES_PER_LIMB = (5, 10, 20, 40, 80, 160, 320, 640)
 """Nodes per limb on the curve of cost."""
 
 
-def stroke_durations(scene: Scene, n_robots: int, threads: int, seconds: float) -> list[float]:
-    """Durations of strokes of the straight swim [s], by a batch of robots."""
-    simulator = Simulator(scene, n_robots, threads)
-    commands = np.tile(STRAIGHT, (n_robots, 1))
-    return repeat(lambda: simulator.stroke(commands), seconds)
-
-
 def real_time_factors(scene: Scene, n_robots: int, threads: int, seconds: float) -> list[float]:
     """Real-time factors of a batch in the straight swim: simulated over computing time."""
-    return [n_robots * scene.actuator.period / d for d in stroke_durations(scene, n_robots, threads, seconds)]
+    simulator, commands = Simulator(scene, n_robots, threads), np.tile(STRAIGHT, (n_robots, 1))
+    return [n_robots * scene.actuator.period / d for d in repeat(lambda: simulator.stroke(commands), seconds)]
 
 
 def threads_speedup(scene: Scene, n_robots: int, seconds: float) -> list[float]:
