@@ -110,7 +110,7 @@ SHORT = {
     "heading": "seconds to the last waypoint",
 }
 """What the picture says in their place."""
-OPTIONAL = "RecurrentPPO"
+RECURRENT = "RecurrentPPO"
 """Agent that is not missing where it has not swum: it needs a package of its own."""
 COLUMNS = {
     "greedy": "greedy", "planner": "planner", "adaptive": "adaptive", "informed": "oracle", "PPO": "PPO",
@@ -143,7 +143,7 @@ def table(row: Row, has_cell: Callable[[str, str], bool] = lambda id, agent: Tru
         rows.append([agent, f"{row.mean(agent):.3g}", f"{low:.3g} to {high:.3g}", min(map(len, seeds)), each])
     head = ["agent", "mean", "95 % interval", "episodes", "means of seeds"]
     parts = [f"## {row.id}", f"{UNITS[row.challenge].capitalize()}.", markdown(head, rows, (0, 2, 4))]
-    missing = [agent for agent in ORDER if agent not in (*row.agents, OPTIONAL) and has_cell(row.id, agent)]
+    missing = [agent for agent in ORDER if agent not in (*row.agents, RECURRENT) and has_cell(row.id, agent)]
     if missing:
         parts.append(f"Not swum yet: {'; '.join(missing)}.")
     if {"greedy", "informed"} <= row.agents.keys():
@@ -195,6 +195,7 @@ def _draw_row(axes: Any, row: Row) -> None:
 RULES = ("rest", "greedy", "planner", "adaptive")
 """Agents that neither learn nor are told what is hidden."""
 BUNDLED, MEMORY, TOLD = "bundled", "PPO, memory", "informed"
+"""Agents that swim the policy that the package brings for a task, learn with a memory, and know what is hidden."""
 
 
 def verdicts(rows: Sequence[Row]) -> str:

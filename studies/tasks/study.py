@@ -30,16 +30,13 @@ from studies.frame import Results, Study, require_known
 from studies.tasks import heading
 from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
 from studies.tasks.episodes import swim
-from studies.tasks.page import draw, means, rows_of, table, verdicts
+from studies.tasks.page import BUNDLED, RECURRENT, draw, means, rows_of, table, verdicts
 
 IDS: dict[str, str] = {id: about[0] for id, about in TASKS.items()} | {heading.ID: "heading"}
 """Name of the challenge of every id."""
-RECURRENT = "RecurrentPPO"
 ALL_LEARNERS = {**LEARNERS, RECURRENT: Learner(symmetric=False)}
 """Learners by name. A network with a state of its own cannot have its limbs renamed from one decision to the next, so
 it learns without the symmetry."""
-BUNDLED = "bundled"
-"""Agent that swims the policy that the package brings for a task."""
 AGENTS = (*CONTROLLERS, heading.RULE, *ALL_LEARNERS, BUNDLED)
 DECISIONS, EPISODES = 200_000, 64
 """Length of every training [decisions], and number of held-out episodes."""
