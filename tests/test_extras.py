@@ -132,7 +132,9 @@ def test_an_agent_s_command_without_its_extra_says_how_to_get_it(command, tmp_pa
     assert_says(python(tmp_path, OF_TRAIN, "-m", command, "--help"), "train", OF_TRAIN)
 
 
-@pytest.mark.parametrize("missing", [("tyro",), ("tensorboard",), ("torch", "stable_baselines3"), ("plotly",)])
+@pytest.mark.parametrize(
+    "missing", [("tyro",), ("tensorboard",), ("torch", "stable_baselines3"), ("plotly",)]
+)
 def test_train_without_a_part_of_its_extra_says_how_to_get_it(missing, tmp_path):
     assert_says(python(tmp_path, missing, "train.py", "--help"), "train", missing)
 

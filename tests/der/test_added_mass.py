@@ -19,6 +19,7 @@ OF_AN_EDGE = 1000.0 * 0.7 * np.pi * ROBOT.rod_radius**2 * ROBOT.edge_length
 NOTHING = (Lanes(0.0), (Lanes(0.0), Lanes(0.0)), (Lanes(0.0), Lanes(0.0), Lanes(0.0)))
 
 
+
 def frozen(angle: float = 0.0):
     """Memory of the robot at rest, turned."""
     work = make_work(RODS, 1)
