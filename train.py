@@ -35,11 +35,10 @@ try:
     from agents.training import efficiency
     from agents.training.filming import filmed_beside
     from agents.training.folder import export, held, is_unbegun, recorded, resume_command, write_config
-    from agents.training.interruption import Interruption
     from agents.training.options import Options, config_of, read_options, require_consent
     from agents.training.publishing import publish
     from agents.training.robot import Robot, asked_for, keep, physics, robot_of
-    from agents.training.watch import Watch
+    from agents.training.watch import Interruption, Watch
     from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
     from seastar_gym.command import ended_by_disk
     from seastar_gym.controllers.contract import Policy, actions_of, require_fit

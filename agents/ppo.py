@@ -1,17 +1,15 @@
 """PPO on the native batch: the training environment, the learner, and the policy that it has learned."""
 
-import os
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any
 
 import gymnasium as gym
-import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
 
-from agents.coasting import CoastingProgress, fit_coasting
+from agents.coasting import with_coasting
 from agents.hyperparameters import Hyperparameters
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers import checkpoint
@@ -23,7 +21,6 @@ from seastar_gym.envs.options import Path as SwimPath
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction, observed_mirror
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
-from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.checks import require_count, require_kind, shown
 from seastar_gym.scene.numerics import Fidelity
 
@@ -54,19 +51,11 @@ def make_training_env(
         **{**hyperparameters.options, **options},
     )
     if hyperparameters.coasting:
-        swum = cast(SeastarSwimVectorEnv, env.unwrapped).scene
-        coasting = fit_coasting(swum, hyperparameters.decision_period, np.random.default_rng(0))
-        env = CoastingProgress(env, coasting, hyperparameters.reward)
+        env = with_coasting(env, hyperparameters.reward)
     return BatchVecEnv(VectorSymmetryReduction(env) if hyperparameters.symmetry else env)
 
 
-def make_model(
-    env: BatchVecEnv,
-    hyperparameters: Hyperparameters,
-    seed: int,
-    device: str = "cpu",
-    tensorboard_log: str | os.PathLike[str] | None = None,
-) -> PPO:
+def make_model(env: BatchVecEnv, hyperparameters: Hyperparameters, seed: int, device: str = "cpu") -> PPO:
     """New learner on an environment."""
     require_kind("env", env, BatchVecEnv, "a BatchVecEnv, as make_training_env gives it")
     require_kind("hyperparameters", hyperparameters, Hyperparameters, "Hyperparameters")
@@ -84,7 +73,6 @@ def make_model(
         clip_range=hyperparameters.clip_range,
         ent_coef=hyperparameters.entropy,
         policy_kwargs={"net_arch": list(hyperparameters.hidden)},
-        tensorboard_log=None if tensorboard_log is None else os.fspath(tensorboard_log),
         seed=int(seed),
         device=device,
     )

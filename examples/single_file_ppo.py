@@ -88,16 +88,9 @@ def train(options: Options, quiet: bool = False) -> LearnedPolicy:
     torch.set_num_threads(1)  # two are slower on so small a network
     torch.manual_seed(options.seed)
     envs = gym.make_vec(
-        "SeastarSwim-v0",
-        num_envs=options.num_envs,
-        vectorization_mode="vector_entry_point",
-        path="random",
-        random_heading=True,
-        actions="pairs",
-        fidelity="fast",
-        autoreset_mode="SameStep",
-        threads=options.num_threads,
-    )
+        "SeastarSwim-v0", num_envs=options.num_envs, vectorization_mode="vector_entry_point", path="random",
+        random_heading=True, actions="pairs", fidelity="fast", autoreset_mode="SameStep", threads=options.num_threads,
+    )  # fmt: skip
     scene, n, steps = envs.scene, options.num_envs, options.rollout
     symmetry = Symmetry.of(scene, actions="pairs")
     size, n_actions = envs.single_observation_space.shape[0], int(envs.single_action_space.n)
@@ -106,10 +99,9 @@ def train(options: Options, quiet: bool = False) -> LearnedPolicy:
 
     # The memory. Its rows are the buffers that the batch writes into, and torch sees the same numbers.
     observations = np.zeros((steps + 1, n, size), np.float32)
-    rewards = np.zeros((steps, n), np.float32)
+    rewards, values = np.zeros((steps, n), np.float32), torch.zeros((steps + 1, n))
     terminated, truncated = np.zeros((steps, n), bool), np.zeros((steps, n), bool)
     actions, log_probs = torch.zeros((steps, n), dtype=torch.long), torch.zeros((steps, n))
-    values, advantages = torch.zeros((steps + 1, n)), torch.zeros((steps, n))
 
     # Symmetry: every observation is turned and mirrored until its waypoint is in one sector, and the action back.
     observations[0], elements = symmetry.reduce(envs.reset(seed=options.seed)[0])
@@ -135,41 +127,49 @@ def train(options: Options, quiet: bool = False) -> LearnedPolicy:
                     last, _ = symmetry.reduce(np.stack(list(info["final_obs"][cut])))
                     rewards[step, cut] += options.discount * agent.value(torch.from_numpy(last)).numpy()
             values[steps] = agent.value(torch.from_numpy(observations[steps]))
-            going_on = torch.from_numpy(~(terminated | truncated)).float()
-            advantage = torch.zeros(n)
-            for step in reversed(range(steps)):
-                following = options.discount * going_on[step]
-                error = torch.from_numpy(rewards[step]) + following * values[step + 1] - values[step]
-                advantages[step] = advantage = error + options.gae_lambda * following * advantage
-
-        flat_seen = torch.from_numpy(observations[:steps].reshape(-1, size))
-        flat_actions, flat_log_probs, flat_advantages = actions.flatten(), log_probs.flatten(), advantages.flatten()
-        targets = (advantages + values[:steps]).flatten()
-        for _ in range(options.epochs):
-            for batch in torch.randperm(n * steps).split(options.batch_size):
-                choices = agent.choices(flat_seen[batch])
-                ratio = (choices.log_prob(flat_actions[batch]) - flat_log_probs[batch]).exp()
-                gain = flat_advantages[batch]
-                gain = (gain - gain.mean()) / (gain.std() + 1e-8)
-                clipped = ratio.clamp(1.0 - options.clip_range, 1.0 + options.clip_range)
-                policy_loss = -torch.min(gain * ratio, gain * clipped).mean()
-                value_loss = nn.functional.mse_loss(agent.value(flat_seen[batch]), targets[batch])
-                optimizer.zero_grad()
-                (policy_loss + 0.5 * value_loss).backward()
-                nn.utils.clip_grad_norm_(agent.parameters(), 0.5)
-                optimizer.step()
+        advantages = advantages_of(rewards, terminated | truncated, values, options)
+        memory = torch.from_numpy(observations[:steps]), actions, log_probs, advantages, advantages + values[:steps]
+        improve(agent, optimizer, memory, options)
         observations[0] = observations[steps]
         if not quiet and (update % 8 == 7 or update == updates - 1):
             strokes, seconds = (update + 1) * n * steps, time.perf_counter() - began
             mean = f"mean return {np.mean(finished):.1f}" if finished else "no episode is over yet"
             print(f"{strokes} strokes, {strokes / seconds:.0f} per second, {mean}", flush=True)
     envs.close()
+    return LearnedPolicy(Description("pairs", True, scene, (options.hidden, options.hidden)), weights_of(agent))
 
-    # The policy as plain numbers, which `seastar` swims with numpy alone.
+
+def advantages_of(rewards: np.ndarray, over: np.ndarray, values: torch.Tensor, options: Options) -> torch.Tensor:
+    """Generalised advantage estimates of all steps, shape (steps, n)."""
+    found, advantage, going_on = torch.zeros_like(values[:-1]), 0.0, torch.from_numpy(~over).float()
+    for step in reversed(range(len(found))):
+        following = options.discount * going_on[step]
+        error = torch.from_numpy(rewards[step]) + following * values[step + 1] - values[step]
+        found[step] = advantage = error + options.gae_lambda * following * advantage
+    return found
+
+
+def improve(agent: Agent, optimizer: torch.optim.Adam, memory: tuple[torch.Tensor, ...], options: Options) -> None:
+    """Several passes over a rollout. memory: Observations, actions, their log-probabilities, advantages and targets."""
+    seen, actions, log_probs, advantages, targets = (part.flatten(0, 1) for part in memory)
+    for _ in range(options.epochs):
+        for batch in torch.randperm(len(seen)).split(options.batch_size):
+            ratio = (agent.choices(seen[batch]).log_prob(actions[batch]) - log_probs[batch]).exp()
+            gain = (advantages[batch] - advantages[batch].mean()) / (advantages[batch].std() + 1e-8)
+            clipped = ratio.clamp(1.0 - options.clip_range, 1.0 + options.clip_range)
+            policy_loss = -torch.min(gain * ratio, gain * clipped).mean()
+            value_loss = nn.functional.mse_loss(agent.value(seen[batch]), targets[batch])
+            optimizer.zero_grad()
+            (policy_loss + 0.5 * value_loss).backward()
+            nn.utils.clip_grad_norm_(agent.parameters(), 0.5)
+            optimizer.step()
+
+
+def weights_of(agent: Agent) -> dict[str, np.ndarray]:
+    """The policy as plain numbers, which `seastar` swims with numpy alone."""
     linear = [layer for layer in agent.actor if isinstance(layer, nn.Linear)]
-    weights = {f"{k}.weight": layer.weight.detach().numpy() for k, layer in enumerate(linear)}
-    weights |= {f"{k}.bias": layer.bias.detach().numpy() for k, layer in enumerate(linear)}
-    return LearnedPolicy(Description("pairs", True, scene, (options.hidden, options.hidden)), weights)
+    named = ((f"{k}.{name}", part) for k, layer in enumerate(linear) for name, part in layer.named_parameters())
+    return {name: part.detach().numpy() for name, part in named}
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
 """The command of all studies.
 
-    python -m studies                   lists the studies
-    python -m studies NAME [options]    runs one; `python -m studies.NAME` is the same
-    python -m studies NAME --out OUT    writes into OUT: a folder, or a file as its help says
-    python -m studies [NAME] --check    names pictures and pages in docs/ that are not what the numbers beside them say
-    python -m studies [NAME] --draw     draws and fills them again, in seconds and without running a study
+python -m studies                   lists the studies
+python -m studies NAME [options]    runs one; `python -m studies.NAME` is the same
+python -m studies NAME --out OUT    writes into OUT: a folder, or a file as its help says
+python -m studies [NAME] --check    names pictures and pages in docs/ that are not what the numbers beside them say
+python -m studies [NAME] --draw     draws and fills them again, in seconds and without running a study
 """
 
 import argparse
@@ -94,7 +94,7 @@ def told(study: Study, results: Results, out: Path, file: Path) -> None:
     results.read()
     files = [file, *study.write(results, out)]
     for name, text in study.tables.items():
-        show(f"{name}:\n\n{text(results)}")
+        show(text(results), name)
     print(f"Written: {', '.join(map(str, files))}")
     if file.resolve() == study.committed(DOCS, study.file):
         fill(DOCS, (study,))

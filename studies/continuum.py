@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from seastar_gym.accuracy.measure import path_lengths
@@ -23,9 +22,8 @@ from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene import Contact, Limb, Numerics, Scene, Seastar, SmaPulse, Vortex, Water
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.style import CYCLE, PERCENT, as_percent, subplots
 
 TAU = 5e-3
@@ -66,8 +64,6 @@ def scene(name: str, discretisation: Discretisation, nodes_per_limb: int, step: 
         **PARTS.get(name, {}),
     )
 
-
-Floats = NDArray[np.float64]
 
 NODES = (6, 10, 19, 37)
 REFERENCE_NODES = 73
@@ -117,23 +113,21 @@ def error(hub: Floats, reference: Floats) -> float:
     return float((np.linalg.norm(hub - reference, axis=-1).max(axis=0) / path_lengths(Scene(), reference)).max())
 
 
-def order(errors: Floats, nodes: tuple[int, ...] = NODES) -> float:
+def order(errors: Floats) -> float:
     """Slope of log error over log edge length, for the numbers of nodes in FITTED."""
-    fitted = [nodes.index(n) for n in FITTED]
+    fitted = [NODES.index(n) for n in FITTED]
     return float(np.polyfit(-np.log(np.subtract(FITTED, 1)), np.log(errors[fitted]), 1)[0])
 
 
-def measure(names: tuple[str, ...] = NAMES, bar: Any = None) -> list[Row]:
+def measure(names: tuple[str, ...] = NAMES) -> list[Row]:
     """Rows of scenes, two each and one for lumped added mass."""
     rows = []
-    for name in names:
+    for name in tqdm(names, unit="scene"):
         reference = swim(name, "continuum", REFERENCE_NODES)
         kinds = [(name, discretisation, False) for discretisation in get_args(Discretisation)]
         for label, discretisation, lumped in [*kinds, *([(LUMPED, "continuum", True)] if name == "added mass" else [])]:
             errors = np.array([error(swim(name, discretisation, n, lumped), reference) for n in NODES])
             rows.append(Row(label, discretisation, errors, order(errors)))
-        if bar is not None:
-            bar.update()
     return rows
 
 
@@ -202,8 +196,7 @@ def draw(rows: list[Row], path: Path) -> None:
 
 def run(results: Results) -> str | None:
     """Measure all scenes."""
-    with tqdm(total=len(NAMES), unit="scene") as bar:
-        rows = measure(NAMES, bar)
+    rows = measure()
     results.update(as_data(rows))
     failed = not all(math.isfinite(row.order) for row in rows)
     return "The solver failed in a scene, see the empty errors." if failed else None

@@ -13,7 +13,6 @@ Fit: the radii of all limbs, each its own, from positions of all nodes after eve
 derivatives are differences, and by the gradient of the sum of squares (L-BFGS). Costs are processor time.
 """
 
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -30,11 +29,8 @@ from seastar_gym.identify import Measurement, identify
 from seastar_gym.scene import Contact, Limb, Scene, SmaWires
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.per_robot import with_numbers
-from studies.frame import DOCS, RESULTS, Results, Study
-from studies.pages import markdown
-from studies.results_file import rounded
-
-Floats = NDArray[np.float64]
+from studies.frame import DOCS, RESULTS, Floats, Results, Study, rounded
+from studies.pages import markdown, read
 
 EVERY, RADIUS, WITHIN = 0.2, 0.010, 0.0098
 """Length of a decision [s], radius of a waypoint [m], and the distance from it that is aimed at [m]."""
@@ -43,11 +39,8 @@ MARGIN, LARGEST = 0.001, 0.05
 TRIES, ROUNDS = 20, 6
 """Steps that may fail one after the other, and times that commands at their ends are looked for in each."""
 FIDELITIES: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
-
-
-def read(name: str) -> Any:
-    """Numbers of another study."""
-    return json.loads((DOCS / RESULTS / name).read_text(encoding="utf-8"))
+PENTAGON, WAYPOINTS = (DOCS / RESULTS / name for name in ("gaits/pentagon_reheated.json", "learning/pentagon.json"))
+"""Numbers of other studies."""
 
 
 def wires(fidelity: Fidelity) -> Scene:
@@ -57,7 +50,7 @@ def wires(fidelity: Fidelity) -> Scene:
 
 def found_by_search() -> Floats:
     """Commands of the beam search, shape (n, 5)."""
-    gait = read("gaits/pentagon_reheated.json")["gait"]
+    gait = read(PENTAGON)["gait"]
     commands = np.zeros((len(gait), 5))
     for command, pulses in zip(commands, gait, strict=True):
         for limb, sign in filter(None, pulses.strip("{}").split(",")):
@@ -138,7 +131,7 @@ def again(fidelity: Fidelity, commands: Floats, goals: Floats) -> list[float]:
 def pulses() -> dict[str, Any]:
     """The beam search's pulses, improved."""
     goals, searched, began = (
-        np.array(read("learning/pentagon.json")["waypoints_m"]),
+        np.array(read(WAYPOINTS)["waypoints_m"]),
         found_by_search(),
         time.process_time(),
     )
@@ -278,11 +271,6 @@ CELLS: dict[tuple[str, str], Callable[[], Any]] = {
 }
 
 
-def settings() -> dict[str, float]:
-    """What all numbers have in common."""
-    return {"largest_change": LARGEST, "tries": TRIES, "uneven": UNEVEN, "strokes_fitted": SWUM}
-
-
 def run(results: Results) -> None:
     """Compute what is missing."""
     results.fill(CELLS, str)
@@ -313,6 +301,7 @@ def table_of_fits(results: Mapping[str, Any]) -> str:
 
 
 STUDY = Study(
-    "descent", run, file="gradients/descent.json", settings=settings,
+    "descent", run, file="gradients/descent.json",
+    settings=lambda: {"largest_change": LARGEST, "tries": TRIES, "uneven": UNEVEN, "strokes_fitted": SWUM},
     tables={"descent pulses": table_of_pulses, "descent radii": table_of_radii, "descent fits": table_of_fits},
 )  # fmt: skip

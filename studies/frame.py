@@ -4,14 +4,21 @@ A study is a module with `STUDY = Study(...)`. `python -m studies NAME` runs it,
 its room, whose module is `study`.
 """
 
+import csv
 import json
+import re
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from studies.results_file import keep
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.files import write_atomically
+
+Floats = NDArray[np.float64]
 
 DOCS = Path(__file__).parents[1] / "docs"
 RESULTS = Path("results")
@@ -90,6 +97,12 @@ class Results(dict[str, Any]):
             self["settings"] = dict(settings)
             self.read()
 
+    @property
+    def folder(self) -> Path:
+        """The folder `out`, which is made."""
+        self.out.mkdir(parents=True, exist_ok=True)
+        return self.out
+
     def read(self) -> None:
         """Take what is in the file, if there is one; ValueError if it has other settings."""
         if self.file is None or not self.file.is_file():
@@ -149,3 +162,34 @@ def require_known(kind: str, asked: Collection[str], known: Collection[str]) -> 
 def seed(cell: tuple[str, Any]) -> int:
     """Number of a cell that is named by its seed; 0 for others."""
     return int(cell[0]) if cell[0].isdecimal() else 0
+
+
+# Numbers as JSON that a person can read: one line for every list of numbers.
+
+
+INNERMOST = re.compile(r"\[\n([^\[\]{}]*)\n\s*\]")
+BREAK = re.compile(r"\n\s*")
+
+
+def as_json(results: Mapping[str, Any]) -> str:
+    """Plain data as JSON; ValueError where a number is not finite."""
+    text = json.dumps(results, indent=1, ensure_ascii=False, allow_nan=False)
+    return INNERMOST.sub(lambda found: f"[{BREAK.sub(' ', found[1]).strip()}]", text) + "\n"
+
+
+def keep(results: Mapping[str, Any], file: Path) -> None:
+    """Write plain data into a file, whose folder is made."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(file, as_json(results).encode())
+
+
+def write_rows(file: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write rows below a head as CSV into a file, whose folder is made."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("w", newline="", encoding="utf-8") as stream:
+        csv.writer(stream).writerows([head, *rows])
+
+
+def rounded(value: float, digits: int = 4) -> float:
+    """A number with a few significant digits."""
+    return float(f"{value:.{digits}g}")

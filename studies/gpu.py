@@ -7,9 +7,11 @@ With `--device scalar` the device's code swims on the processor, and nothing els
 
 import multiprocessing
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any, get_args
 
@@ -37,9 +39,8 @@ from seastar_gym.scene import (
 from seastar_gym.scene.numerics import Fidelity, SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study
+from studies.frame import Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.speed.operations import count_operations, numbers_moved
 from studies.speed.terms import scenes as scenes_of_terms
 from studies.style import CYCLE, FAINT, subplots
@@ -48,7 +49,7 @@ PRESETS: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
 BATCHES = (64, 256, 1024, 4096, 16384, 65536, 262144)
 LONGEST = 4.0
 """A batch whose stroke takes longer than this [s] is the largest one, from USUAL robots on."""
-USUAL = 4096
+USUAL, DECIDING = 4096, 65536
 N_ROBOTS, N_STROKES = 64, 3
 """Robots that are compared with the processor's, if a scene has no number of its own, and their strokes."""
 EVERYTHING = "all, a body, bent along, contact"
@@ -193,13 +194,13 @@ def same(one: Any, other: Any) -> bool:
     return bool(np.array_equal(one, other, equal_nan=np.asarray(one).dtype.kind == "f"))
 
 
-def batches(preset: Fidelity, contact: bool, device: str) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Speed of a preset over the size of the batch: steps of robots per second, and seconds of a stroke."""
+def batches(preset: Fidelity, contact: bool, device: str) -> dict[str, dict[str, Any]]:
+    """Speed of a preset by the size of the batch: steps of robots per second, and seconds of a stroke."""
     scene = replace(Scene.preset(preset), contact=Contact() if contact else None)
-    seconds = 0.0
+    row, seconds = dict[str, dict[str, Any]](), 0.0
     for n_robots in BATCHES if device == "cuda" else (USUAL,):
         if seconds > LONGEST and n_robots > USUAL:
-            return
+            break
         simulator = Simulator(scene, n_robots, device=device)
         first, *others = commands_of(scene, n_robots, 3)
         simulator.stroke(first)
@@ -210,10 +211,12 @@ def batches(preset: Fidelity, contact: bool, device: str) -> Iterator[tuple[int,
             taken.append(time.perf_counter() - began)
             done.append((report.steps.sum(), report.newton_iterations.sum()))
         seconds, (steps, iterations) = min(taken), done[int(np.argmin(taken))]
-        yield n_robots, {
+        row[str(n_robots)] = {
             "steps_per_second": rounded(steps / seconds), "seconds": rounded(seconds),
             "iterations_per_step": rounded(iterations / steps), "failed": int(simulator.failed.sum()),
         }  # fmt: skip
+        print(preset, "contact" * contact, device, n_robots, row[str(n_robots)], flush=True)
+    return row
 
 
 def traffic(preset: Fidelity) -> dict[str, float]:
@@ -236,9 +239,9 @@ def bandwidth() -> float:
     return float(2 * source.nbytes / min(seconds))
 
 
-def decisions(device: str, on_device: bool = False, n_robots: int = 65536) -> dict[str, float]:
+def decisions(device: str, on_device: bool = False) -> dict[str, float]:
     """Decisions per second of the batch environment at "fast" with random actions."""
-    batch = batch_on(device, n_robots, on_device)
+    batch = batch_on(device, DECIDING, on_device)
     batch.reset(seed=0)
     batch.action_space.seed(0)
     actions = [batch.action_space.sample() for _ in range(4)]
@@ -249,7 +252,7 @@ def decisions(device: str, on_device: bool = False, n_robots: int = 65536) -> di
     on_processor(observations[:1])  # waits for the device
     seconds = time.perf_counter() - began
     batch.close()
-    return {"decisions_per_second": rounded(3 * n_robots / seconds), "robots": n_robots}
+    return {"decisions_per_second": rounded(3 * DECIDING / seconds), "robots": DECIDING}
 
 
 def learning(device: str) -> dict[str, float]:
@@ -310,27 +313,15 @@ def measure(results: Results) -> None:
     """Speed of the GPU and of the processor beside it."""
     results["bandwidth"] = rounded(bandwidth())
     results["traffic"] = {preset: traffic(preset) for preset in PRESETS}
-    speed = results.setdefault("speed", {})
-    for preset in PRESETS:
-        for contact in (False, True):
-            for device in ("cuda", "cpu"):
-                row = speed.setdefault(f"{preset}{', contact' * contact}", {}).setdefault(device, {})
-                if str(USUAL) in row:
-                    continue
-                for n_robots, found in batches(preset, contact, device):
-                    row[str(n_robots)] = found
-                    print(preset, "contact" * contact, device, n_robots, found, flush=True)
-                results.save()
-    for name, measured in (("environment", decisions), ("learner", learning)):
-        for device in ("cuda", "cpu"):
-            if device not in results.setdefault(name, {}):
-                results[name][device] = measured(device)
-                results.save()
-        print(name, results[name], flush=True)
-    if ON_DEVICE not in results["environment"]:
-        results["environment"][ON_DEVICE] = decisions("cuda", on_device=True)
-        results.save()
-    print(ON_DEVICE, results["environment"][ON_DEVICE], flush=True)
+    devices = ("cuda", "cpu")
+    cells: dict[tuple[str, ...], Callable[[], Any]] = {
+        ("speed", f"{preset}{', contact' * contact}", device): partial(batches, preset, contact, device)
+        for preset, contact, device in product(PRESETS, (False, True), devices)
+    }
+    cells |= {("environment", device): partial(decisions, device) for device in devices}
+    cells |= {("learner", device): partial(learning, device) for device in devices}
+    results.save()
+    results.fill(cells | {("environment", ON_DEVICE): partial(decisions, "cuda", on_device=True)}, str)
 
 
 def share_of_bandwidth(results: Mapping[str, Any], preset: str, n_robots: str) -> float:

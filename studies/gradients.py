@@ -22,7 +22,6 @@ from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.controllers.learned import bundled_file, load
 from seastar_gym.envs.commands import to_commands
@@ -32,12 +31,11 @@ from seastar_gym.gradients import differentiate, record
 from seastar_gym.scene import Contact, Scene, SmaWires, Vortex, Water
 from seastar_gym.scene.per_robot import at, side_by_side, with_numbers
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
+from studies.speed.strokes import repeat
 from studies.style import CYCLE, INK, subplots
 
-Floats = NDArray[np.float64]
 Commands = Callable[[int, int, np.random.Generator], Floats]
 
 STROKES, SWIMS = 100, 32
@@ -212,13 +210,7 @@ UNKNOWNS: dict[str, list[str]] = {
 
 def processor_time(run: Callable[[], Any]) -> float:
     """Shortest processor time of some trials [s], after a first one that may compile."""
-    run()
-    found = []
-    for _ in range(TRIALS):
-        began = time.process_time()
-        run()
-        found.append(time.process_time() - began)
-    return min(found)
+    return min(repeat(run, 0.0, TRIALS, time.process_time))
 
 
 def swim_alone(scene: Scene, commands: Floats) -> None:
@@ -262,11 +254,6 @@ def cost_table(results: Mapping[str, Any]) -> str:
     costs = results["cost"].items()
     rows = [[name, *(f"{found[way]:.2g}" if way in found else "" for way in ways)] for name, found in costs]
     return markdown(["unknowns", *ways], rows)
-
-
-def settings() -> dict[str, float]:
-    """What all numbers have in common."""
-    return {"strokes": STROKES, "swims": SWIMS, "newton_tolerance": NEWTON_TOLERANCE, "timed_strokes": SWUM}
 
 
 def run(results: Results) -> None:
@@ -319,6 +306,9 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
 
 
 STUDY = Study(
-    "gradients", run, file="gradients/gradients.json", settings=settings, pictures={"gradients.png": draw},
+    "gradients", run, file="gradients/gradients.json", pictures={"gradients.png": draw},
     tables={"gradients growth": table, "gradients cost": cost_table},
+    settings=lambda: {
+        "strokes": STROKES, "swims": SWIMS, "newton_tolerance": NEWTON_TOLERANCE, "timed_strokes": SWUM,
+    },
 )  # fmt: skip

@@ -49,9 +49,9 @@ def markdown(head: Sequence[object], rows: Iterable[Sequence[object]], texts: Co
     return "\n".join([first, f"|{rule}|", *others])
 
 
-def show(text: str) -> None:
-    """Print Markdown as tables that a terminal shows."""
-    Console().print(Markdown(text))
+def show(text: str, title: str = "") -> None:
+    """Print Markdown as tables that a terminal shows, below a title."""
+    Console().print(Markdown(f"{title}:\n\n{text}" if title else text))
 
 
 def footer_of(docs: Path, names: str) -> str:
@@ -121,8 +121,7 @@ def check(docs: Path, studies: Sequence[Study]) -> int:
 def draw(docs: Path, studies: Sequence[Study]) -> int:
     """Draw the pictures and fill the pages again; returns the exit code."""
     for study in told(docs, studies):
-        for name, picture in study.pictures.items():
-            picture(numbers(docs, study), study.committed(docs, name))
+        study.write(numbers(docs, study), study.committed(docs, study.file).parent)
     fill(docs, studies)
     return 0
 

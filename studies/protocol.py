@@ -17,7 +17,6 @@ import gymnasium as gym
 import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
-from numpy.typing import NDArray
 from scipy.optimize import curve_fit
 from scipy.stats import t as student
 
@@ -33,15 +32,14 @@ from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.symmetry import VectorFrameStack
 from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.evaluation.swim import TIME_LIMIT
+from seastar_gym.gaits import pair_gait
 from seastar_gym.identify import Measurement, identify
 from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.simulated import SimulatedPlant
 from seastar_gym.plant.swim import PlantSwim
 from seastar_gym.scene.per_robot import with_numbers
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study
 from studies.pages import markdown
-
-Floats = NDArray[np.float64]
 
 PERIOD = 0.2
 """Time between decisions [s]."""
@@ -120,9 +118,7 @@ def written_down(results: Mapping[str, Any]) -> Scene:
 
 def environment(scene: Scene, seed: int, path: str = "pentagon", logs: Path | None = None) -> PlantSwim:
     """The tank on a day, as policies see it."""
-    return PlantSwim(
-        plant(seed), LIMITS, scene=scene, decision_period=PERIOD, actions="pairs", path=path, logs=logs
-    )
+    return PlantSwim(plant(seed), LIMITS, scene=scene, decision_period=PERIOD, actions="pairs", path=path, logs=logs)
 
 
 def track(scene: Scene, folder: Path, seed: int) -> Measurement:
@@ -170,10 +166,8 @@ def fitted(results: Mapping[str, Any]) -> Scene:
 def gait_commands(name: str) -> Floats:
     """Commands of a gait for SECONDS, shape (n, 5)."""
     if "," in name:
-        pair = np.zeros(5)
-        for limb in name.split(","):
-            pair[int(limb[0]) - 1] = 1.0 if limb[1] == "+" else -1.0
-        gait = np.vstack([pair, np.zeros((4, 5))])
+        plus, minus = (int(limb[0]) for limb in name.split(","))
+        gait = np.vstack([pair_gait(plus, minus), np.zeros((4, 5))])
     else:
         gait = SCRIPTED[name](5, PERIOD)
     n = round(SECONDS / PERIOD)

@@ -15,7 +15,7 @@ from continuum_oracle import Continuum
 from oracle import Star, elastic_hessian, inertia_matrix
 from seastar_gym import Numerics, Scene, Seastar, Simulator, Water
 from seastar_gym.model.rods import make_rods
-from studies.verification import drag, exact, frequencies, mujoco, published, waves
+from studies.verification import clamped, drag, exact, mujoco, published, waves
 from studies.verification import page as verification_page
 from studies.verification import study as verification
 from studies.verification.unactuated import IN_LINE, let_pass, pause
@@ -101,14 +101,14 @@ def test_the_limbs_ring_with_the_eigenvalues_of_their_stiffness(name, n):
         alike[limb, np.arange(n - 1)] = 1.0
     stiffness = alike.T @ elastic_hessian(star, star.rest, np.zeros(2)) @ alike
     eigenvalues = eigh(stiffness, alike.T @ inertia_matrix(star) @ alike, eigvals_only=True)
-    ours = [frequencies.ringing_frequency(replace(IN_LINE[name], nodes_per_limb=n), mode) for mode in range(3)]
+    ours = [clamped.ringing_frequency(replace(IN_LINE[name], nodes_per_limb=n), mode) for mode in range(3)]
     np.testing.assert_allclose(ours, np.sqrt(eigenvalues[:3]) / (2.0 * np.pi), rtol=5e-5)
 
 
 def test_a_fitted_frequency_is_that_of_the_signal():
     time = np.linspace(0.0, 12.0, 301)
     signal = 0.3 * np.sin(2.0 * np.pi * 1.037 * time + 0.4) + 1e-4 * np.sin(2.0 * np.pi * 6.2 * time)
-    assert frequencies.fitted_frequency(time, signal, 1.0) == pytest.approx(1.037, rel=1e-6)
+    assert clamped.fitted_frequency(time, signal, 1.0) == pytest.approx(1.037, rel=1e-6)
 
 
 # Drag

@@ -10,7 +10,7 @@ from agents.rllib.options import Options, read_options
 from agents.rllib.training import Round, Watch, train
 from agents.training import efficiency
 from agents.training.folder import held
-from agents.training.interruption import Interruption
+from agents.training.watch import Interruption
 from seastar_gym.command import answered
 from seastar_gym.executors.on_ray import connect
 

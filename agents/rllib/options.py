@@ -9,9 +9,9 @@ import numpy as np
 import tyro
 
 from agents.hyperparameters import Hyperparameters
-from agents.training.options import CONFIG, PATH_HELP, Lengths, faults_of, hyperparameters_of
+from agents.training.options import CONFIG, PATH_HELP, Lengths, config_in, hyperparameters_of, require_same
 from seastar_gym.envs.paths import make_path
-from seastar_gym.files import read_json, write_json
+from seastar_gym.files import write_json
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
 
@@ -70,17 +70,11 @@ def read_options(arguments: Sequence[str] | None) -> Options:
         return options
     saved = saved_options(options.resume)
     options = tyro.cli(Options, prog="python -m agents.rllib", args=arguments, default=saved)
-    changed = [name for name in saved.__dict__ if getattr(options, name) != getattr(saved, name)]
-    if forbidden := sorted(set(changed) - CHANGEABLE):
-        raise ValueError(f"The run in {options.resume} cannot continue with another {', '.join(forbidden)}.")
+    require_same(options, saved, CHANGEABLE)
     return replace(options, out=saved.out)
 
 
 def saved_options(folder: Path) -> Options:
     """Options of the run in a folder."""
-    file = folder / CONFIG
-    if not file.is_file():
-        raise FileNotFoundError(f"There is no run to continue in {folder}: it has no {CONFIG}.")
-    with faults_of(file):
-        found = read_json(file)
+    with config_in(folder) as found:
         return Options(**{**found, "out": folder, "resume": folder, "ppo": hyperparameters_of(found)})

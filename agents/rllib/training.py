@@ -10,15 +10,13 @@ from typing import Any, NamedTuple
 from ray.rllib.algorithms.ppo import PPO
 from ray.rllib.utils.metrics import ENV_RUNNER_RESULTS, NUM_ENV_STEPS_SAMPLED_LIFETIME
 
-from agents.rllib.algorithm import make_algorithm
+from agents.rllib.algorithm import make_algorithm, policy_of
 from agents.rllib.options import Options
-from agents.rllib.policy import policy_of
 from agents.training import efficiency
-from agents.training.folder import recorded
+from agents.training.folder import record
 from seastar_gym.controllers.learned import save
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.swim import swim
-from seastar_gym.files import write_atomically
 
 KEPT = 2
 """Checkpoints that are kept: the last, and the one before it."""
@@ -79,10 +77,7 @@ def keep(done: Round, options: Options, seconds: float) -> None:
     swum = swim("learned", policy, pentagon, max_strokes=options.limit(pentagon.scene))
     save_checkpoint(done.algorithm, folder, done.strokes)
     save(policy, folder / "policy.safetensors", strokes=done.strokes, seed=options.seed)
-    rows = [row for row in recorded(folder) if row[0] < done.strokes]
-    rows.append([done.strokes, swum.strokes, swum.waypoints_reached])
-    write_atomically(folder / "progress.csv", "".join(",".join(map(str, row)) + "\n" for row in rows))
-    efficiency.write(efficiency.read(folder).after(done.strokes, seconds, swum), folder)
+    record(folder, done.strokes, seconds, swum)
     reached = "" if swum.finished else f" (only {swum.waypoints_reached} waypoints)"
     print(f"{done.strokes} strokes trained: the pentagon takes {swum.strokes}{reached}.", flush=True)
 

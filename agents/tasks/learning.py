@@ -4,12 +4,11 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import gymnasium as gym
-import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 
-from agents.coasting import CoastingProgress, fit_coasting
+from agents.coasting import with_coasting
 from agents.distillation import distil
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model
@@ -57,8 +56,7 @@ class Learner(NamedTuple):
         """The batch as the learner sees it."""
         if self.coasting:
             inner: Any = batch.unwrapped
-            coasting = fit_coasting(inner.scene, inner.decision_period, np.random.default_rng(0))
-            batch = CoastingProgress(batch, coasting, inner.challenge.reward)
+            batch = with_coasting(batch, inner.challenge.reward)
         if self.past:
             return VectorFrameStack(batch, self.past)
         return VectorSymmetryReduction(batch) if self.symmetric else batch
@@ -85,16 +83,14 @@ def hyperparameters(task: str, decision_period: float) -> Hyperparameters:
 
 def make_learning_env(id: str, learner: Learner, fidelity: Fidelity, threads: int | None) -> BatchVecEnv:
     """Environment of a training, on the split "train"."""
-    batch = make_batch(
-        id,
-        Hyperparameters().num_envs,
-        split="train",
-        fidelity=fidelity,
-        threads=threads,
-        autoreset_mode=AutoresetMode.SAME_STEP,
-        **learner.arguments(),
-    )
-    return BatchVecEnv(learner.wrap(batch))
+    return BatchVecEnv(learner.wrap(_training_batch(id, fidelity, threads, **learner.arguments())))
+
+
+def _training_batch(id: str, fidelity: Fidelity, threads: int | None, **arguments: Any) -> Batch:
+    return make_batch(
+        id, Hyperparameters().num_envs, split="train", fidelity=fidelity, threads=threads,
+        autoreset_mode=AutoresetMode.SAME_STEP, **arguments,
+    )  # fmt: skip
 
 
 def new_model(id: str, env: BatchVecEnv, seed: int) -> PPO:
@@ -117,9 +113,6 @@ def train(id: str, learner: Learner, seed: int, decisions: int, fidelity: Fideli
 def imitate(id: str, seed: int, decisions: int, fidelity: Fidelity, threads: int | None) -> LearnedPolicy:
     """Policy with memory after so many decisions of learning from the bundled one of waypoints, which sees all."""
     torch.set_num_threads(1)
-    batch = make_batch(
-        id, Hyperparameters().num_envs, split="train", fidelity=fidelity, threads=threads,
-        autoreset_mode=AutoresetMode.SAME_STEP,
-    )  # fmt: skip
+    batch = _training_batch(id, fidelity, threads)
     period = float(batch.unwrapped.decision_period)  # type: ignore[attr-defined]
     return distil(load(bundled_file(period)), VectorFrameStack(batch, PAST), decisions, seed)

@@ -20,10 +20,12 @@ from stable_baselines3 import PPO
 import seastar_gym
 from agents.ppo import policy_of
 from agents.training import efficiency
+from agents.training.efficiency import Efficiency
 from agents.training.options import CONFIG, Options, config_of
 from seastar_gym.controllers.learned import save as save_policy
 from seastar_gym.evaluation.report.charts import read_progress
-from seastar_gym.files import PART, is_left_behind, is_part_of, write_json
+from seastar_gym.evaluation.swim import Swim
+from seastar_gym.files import PART, is_left_behind, is_part_of, write_atomically, write_json
 
 
 def write_config(options: Options, arguments: Sequence[str], folder: Path) -> None:
@@ -118,6 +120,19 @@ def export(model: PPO, folder: Path) -> None:
 def recorded(folder: Path) -> list[list[int]]:
     """Rows of the run's progress.csv; none before the first checkpoint."""
     return read_progress(folder) if (folder / "progress.csv").exists() else []
+
+
+def record(folder: Path, strokes: int, seconds: float, pentagon: Swim) -> Efficiency:
+    """Add how a policy swims round the pentagon to progress.csv and efficiency.json; returns what the training took.
+
+    strokes, seconds: Of training until now, see `Efficiency`.
+    """
+    rows = [row for row in recorded(folder) if row[0] < strokes]
+    rows.append([strokes, pentagon.strokes, pentagon.waypoints_reached])
+    write_atomically(folder / "progress.csv", "".join(",".join(map(str, row)) + "\n" for row in rows))
+    found = efficiency.read(folder).after(strokes, seconds, pentagon)
+    efficiency.write(found, folder)
+    return found
 
 
 def is_unbegun(folder: Path) -> bool:

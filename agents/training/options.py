@@ -1,6 +1,6 @@
 """Options of a training run: from the command line, or from the folder of a run that is continued."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -128,10 +128,15 @@ def read_options(arguments: Sequence[str]) -> Options:
         return replace(options, strokes=32_768, fidelity="fast") if options.quick else options
     saved = replace(saved_options(options.resume), out=options.resume, resume=options.resume)
     options = tyro.cli(Options, prog="python train.py", args=arguments, default=saved)
-    changed = [name for name in saved.__dict__ if getattr(options, name) != getattr(saved, name)]
-    if forbidden := sorted(set(changed) - CHANGEABLE):
-        raise ValueError(f"The run in {options.resume} cannot continue with another {', '.join(forbidden)}.")
+    require_same(options, saved, CHANGEABLE)
     return replace(options, out=options.resume)
+
+
+def require_same(options: Any, saved: Any, changeable: Collection[str]) -> None:
+    """ValueError where a run would continue with another option than those that may change. saved: Those of the run."""
+    changed = [name for name in saved.__dict__ if getattr(options, name) != getattr(saved, name)]
+    if forbidden := sorted(set(changed) - set(changeable)):
+        raise ValueError(f"The run in {options.resume} cannot continue with another {', '.join(forbidden)}.")
 
 
 def saved_options(folder: Path) -> Options:
@@ -146,11 +151,7 @@ def saved_options(folder: Path) -> Options:
 
 def config_of(folder: Path) -> dict[str, Any]:
     """Entries of the config.json of a run: its options, commands, versions and machine."""
-    file = folder / CONFIG
-    if not file.is_file():
-        raise FileNotFoundError(f"There is no run to continue in {folder}: it has no {CONFIG}.")
-    with faults_of(file):
-        config = read_json(file)
+    with config_in(folder) as config:
         commands = config["commands"]
         if not isinstance(commands, list) or not all(isinstance(command, str) for command in commands):
             raise ValueError(f"its commands must be texts, not {shown(commands)}")
@@ -158,6 +159,16 @@ def config_of(folder: Path) -> dict[str, Any]:
             if not isinstance(config[name], dict):
                 raise ValueError(f"its {name} must be names with values, not {shown(config[name])}")
         return dict(config)
+
+
+@contextmanager
+def config_in(folder: Path) -> Iterator[dict[str, Any]]:
+    """Context with what the config.json of a run has, in which a fault of it becomes a ValueError with one sentence."""
+    file = folder / CONFIG
+    if not file.is_file():
+        raise FileNotFoundError(f"There is no run to continue in {folder}: it has no {CONFIG}.")
+    with faults_of(file):
+        yield read_json(file)
 
 
 def hyperparameters_of(options: dict[str, Any]) -> Hyperparameters:

@@ -1,8 +1,10 @@
 """Watch over a training: progress bar, logs, checkpoints, and an orderly stop."""
 
+import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import FrameType
 
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
@@ -11,7 +13,7 @@ from tqdm import tqdm
 from agents.learner_file import save
 from agents.ppo import policy_of
 from agents.training import efficiency
-from agents.training.folder import recorded
+from agents.training.folder import record
 from agents.training.options import Options
 from agents.training.robot import Robot
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
@@ -109,11 +111,27 @@ class Watch(BaseCallback):
         done = swim("learned", policy_of(self.learner), self.pentagon, max_strokes=limit)
         self.learner.logger.record("eval/pentagon_strokes", done.strokes)
         self.learner.logger.record("eval/pentagon_waypoints", done.waypoints_reached)
-        earlier = [row for row in recorded(self.folder) if row[0] < strokes]
-        rows = [*earlier, [strokes, done.strokes, done.waypoints_reached]]
-        text = "".join(",".join(map(str, row)) + "\n" for row in rows)
-        write_atomically(self.folder / "progress.csv", text)
-        seconds = self._before.seconds + sum(self.seconds.values())
-        self.efficiency = self.efficiency.after(strokes, seconds, done)
-        efficiency.write(self.efficiency, self.folder)
+        self.efficiency = record(self.folder, strokes, self._before.seconds + sum(self.seconds.values()), done)
         return done
+
+
+class Interruption:
+    """Context in which a first Ctrl-C (or a termination) asks for an orderly stop; a second one stops at once."""
+
+    SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+    def __enter__(self) -> "Interruption":
+        self.requested = False
+        self._before = {number: signal.signal(number, self._request) for number in self.SIGNALS}
+        return self
+
+    def _request(self, number: int, frame: FrameType | None) -> None:
+        self.requested = True
+        self._restore()
+
+    def _restore(self) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def __exit__(self, *exception: object) -> None:
+        self._restore()

@@ -73,15 +73,16 @@ def require_writable(option: str, file: Path | None) -> None:
 
 
 @contextmanager
-def progress_bar(what: str = "", shown: bool = True) -> Iterator[Progress]:
+def progress_bar(what: str = "") -> Iterator[Progress]:
     """Bar of the share of some work that is done."""
     from tqdm import tqdm
 
     bar_format = "{l_bar}{bar}| {elapsed}<{remaining}"
-    with tqdm(total=100, unit="%", desc=what, disable=not shown, bar_format=bar_format) as bar:
+    with tqdm(total=100, unit="%", desc=what, bar_format=bar_format) as bar:
 
         def progress(share: float) -> None:
-            bar.update(100.0 * share - bar.n)
+            bar.n = min(100.0 * share, 100.0)  # sums of differences may exceed it
+            bar.update(0)
 
         yield progress
 

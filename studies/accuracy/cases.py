@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.gaits import PAIRS, STRAIGHT, pentagon_gait
+from studies.frame import Floats
 
-Floats = NDArray[np.float64]
 Kind = Literal["straight", "pair", "pentagon", "random", "slow", "gait"]
 
 STROKES = 10

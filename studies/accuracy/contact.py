@@ -17,7 +17,6 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.accuracy.commands import CLASSES, draw_classes
 from seastar_gym.accuracy.measure import MANY_NODES, SAMPLES, SHORT, Swims, errors, measure, path_lengths, swim
@@ -28,12 +27,9 @@ from seastar_gym.scene.numerics import DAMPING, PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from studies.accuracy.settings import MILLI
 from studies.accuracy.work_precision import cost, draw_sequences, finite
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.style import PERCENT
-
-Floats = NDArray[np.float64]
 
 KINDS: dict[str, Contact] = {
     "Contact()": Contact(),

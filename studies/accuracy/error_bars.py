@@ -11,7 +11,6 @@ Writes the numbers as JSON and a picture.
 """
 
 import math
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,13 +25,11 @@ from seastar_gym.accuracy.setting import at
 from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar, Water, relaxation_time
 from seastar_gym.scene.numerics import PRESETS, Resolution
-from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.error_bars import factor
-from studies.frame import Results, Study
+from studies.accuracy.work_precision import cost
+from studies.frame import Floats, Results, Study
 from studies.pages import markdown
 from studies.style import CYCLE, FAINT, PERCENT, subplots
-
-Floats = NDArray[np.float64]
 
 ROBOTS: dict[str, Scene] = {
     "the chapter's": Scene(),
@@ -101,10 +98,10 @@ def by_class(covered: NDArray[np.bool_]) -> dict[str, float]:
     return dict(zip(CLASSES, shares.tolist(), strict=True))
 
 
-def measure(names: tuple[str, ...], samples: int, seeds: tuple[int, int], bar: Any = None) -> list[Row]:
+def measure(names: tuple[str, ...], samples: int, seeds: tuple[int, int]) -> list[Row]:
     """Measure error bars of robots of these names at all settings; seeds: of the calibration and of the test."""
     rows = []
-    for name in names:
+    for name in tqdm(names, unit="robot"):
         scene = ROBOTS[name]
         drawn = [draw_classes(samples, scene.robot.n_limbs, seed) for seed in seeds]
         exact = [swim(at(scene, TRUE), commands).hub for commands in drawn]
@@ -116,8 +113,6 @@ def measure(names: tuple[str, ...], samples: int, seeds: tuple[int, int], bar: A
             with np.errstate(divide="ignore"):
                 needed = factor(swum) * float(np.quantile(true / estimate, LEVEL))
             rows.append(judged(name, setting, needed, *held_out))
-        if bar is not None:
-            bar.update()
     return rows
 
 
@@ -132,17 +127,10 @@ def judged(robot: str, setting: str, needed: float, true: Floats, estimate: Floa
     )  # fmt: skip
 
 
-def cost(setting: Resolution, n_robots: int = 64, strokes: int = 4) -> float:
-    """Processor time with error bars over that without, for random commands, each the best of some strokes."""
-    best = []
-    for error_bars in (False, True):
-        simulator, rng, times = Simulator(at(Scene(), setting), n_robots, 1, error_bars), np.random.default_rng(0), []
-        for _ in range(strokes):
-            begin = time.thread_time()
-            simulator.stroke(rng.integers(-1, 2, (n_robots, 5)).astype(float))
-            times.append(time.thread_time() - begin)
-        best.append(min(times))
-    return best[1] / best[0]
+def cost_of_error_bars(setting: Resolution) -> float:
+    """Processor time with error bars over that without, see `cost`, of 64 robots."""
+    without, with_them = (cost(at(Scene(), setting), 64, error_bars) for error_bars in (False, True))
+    return with_them / without
 
 
 def rows_of(results: Mapping[str, Any]) -> list[Row]:
@@ -212,9 +200,8 @@ def draw(rows: list[Row], path: Path) -> None:
 
 def run(results: Results) -> str | None:
     """Measure all robots."""
-    with tqdm(total=len(ROBOTS), unit="robot") as bar:
-        rows = measure(tuple(ROBOTS), SAMPLES, SEEDS, bar)
-    costs = {name: round(cost(setting), 3) for name, setting in SETTINGS.items()}
+    rows = measure(tuple(ROBOTS), SAMPLES, SEEDS)
+    costs = {name: round(cost_of_error_bars(setting), 3) for name, setting in SETTINGS.items()}
     results.update(samples=SAMPLES, costs=costs, rows=[row._asdict() for row in rows])
     failed = not all(math.isfinite(row.needed) for row in rows)
     return "The solver failed on a robot, see the table." if failed else None

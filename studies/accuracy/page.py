@@ -10,7 +10,7 @@ from typing import get_args
 from seastar_gym.accuracy import Setting, chapters_certificate, timed_certificate
 from seastar_gym.scene import Scene, SmaWires
 from seastar_gym.scene.numerics import Fidelity
-from studies.accuracy.tables import two_digits
+from studies.frame import rounded
 from studies.pages import markdown
 
 IN_README: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
@@ -27,7 +27,7 @@ PURPOSES: dict[Fidelity, str] = {
 
 def percent(error: float) -> str:
     """Error in per cent, of two digits."""
-    return f"{two_digits(100 * error):g} %"
+    return f"{rounded(100 * error, 2):g} %"
 
 
 def pair(bound: float, typical: float) -> str:
@@ -104,13 +104,3 @@ def timed(periods: tuple[float, ...] = PERIODS) -> str:
         rows.append([f"`{name}`", *(each[k].replace(" %", "") for k in (0, 1) for each in found)])
     columns = [f"{what}, {period:g} s [%]" for what in ("random", "repeated") for period in periods]
     return markdown(["fidelity", *columns], rows)
-
-
-def timed_paths(periods: tuple[float, ...] = PERIODS) -> str:
-    """Shortest, median and longest paths [mm] of commands in time."""
-    stored = [certificate.measured_over["paths"] for certificate in map(timed_certificate, periods) if certificate]
-    kinds = {"random": "random commands", "repeated": "repeated seconds"}
-    rows = [
-        [name, *(", ".join(f"{length:g}" for length in each[kind]) for each in stored)] for kind, name in kinds.items()
-    ]
-    return markdown(["", *(f"every {period:g} s" for period in periods)], rows)

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.files import save_figure
+from seastar_gym.scene.numerics import PRESETS
 from studies.accuracy.rows import Column, front
-from studies.accuracy.settings import presets
 from studies.style import COLOURS, CYCLE, FAINT, INK, MS, PERCENT, as_numbers, as_percent, subplots
 from studies.verification.published import PUBLISHED_FINALS
 
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from studies.accuracy.rows import Row, Study
-
-Floats = NDArray[np.float64]
 
 (OURS, CHAPTERS), OTHERS = CYCLE[:2], FAINT
 PUBLISHED_LIMIT = 38.65e-3
@@ -104,7 +101,7 @@ def _mark_presets(axes: Axes, rows: Sequence[Row], column: Column, left: bool) -
     from matplotlib.patheffects import withStroke
 
     by_setting = {row.resolution: row for row in rows}
-    for name, setting in presets().items():
+    for name, setting in PRESETS.items():
         row = by_setting[setting]
         x, y = _speed(row, column), PERCENT * row.promise(column)
         colour = CHAPTERS if name == "chapter" else OURS

@@ -21,21 +21,21 @@ from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.accuracy import Certificate, chapters_certificate, measure
 from seastar_gym.accuracy.certificate import CLASSES_VERSION
+from seastar_gym.accuracy.command import progress_bar
 from seastar_gym.accuracy.commands import CLASSES, draw_classes
 from seastar_gym.accuracy.setting import resolved
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 from studies.accuracy.error_bars import ROBOTS
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study
 from studies.pages import markdown
 
-Floats = NDArray[np.float64]
-
+CERTIFIED = measure.SAMPLES
+"""Sequences per class of a certificate."""
 SAMPLES, SEED = 1000, 2_026
 """Fresh sequences per class, and their seed; certificates are made with seed 0."""
 SCREEN = Numerics("implicit-midpoint", 1e-3, 1e-7)
@@ -105,17 +105,24 @@ def exceedances(scene: Scene, checks: Sequence[Check], samples: int, seed: int) 
     }
 
 
+def kept_certificate(file: Path, scene: Scene, samples: int) -> Certificate:
+    """Certificate of a scene: that of a file if it holds, or a new one, which is kept there. samples: Per class."""
+    if file.is_file():
+        certificate = Certificate.load(file)
+        certificate.require_valid(scene)
+        return certificate
+    with progress_bar(file.stem) as progress:
+        certificate = measure.certify(scene, samples, progress=progress)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    certificate.save(file)
+    return certificate
+
+
 def examine(name: str, folder: Path, samples: int) -> dict[str, Any]:
     """Result of a robot; its certificate is read from the folder, or measured and written there."""
     scene, begin = ROBOTS[name], time.perf_counter()
     file = folder / f"{''.join(c if c.isalnum() else '_' for c in name)}.json"
-    if file.is_file():
-        certificate = Certificate.load(file)
-        certificate.require_valid(scene)
-    else:
-        certificate = measure.certify(scene)
-        folder.mkdir(parents=True, exist_ok=True)
-        certificate.save(file)
+    certificate = kept_certificate(file, scene, CERTIFIED)
     checks = certified_checks(certificate) + (table_checks() if scene.is_chapters else [])
     found = exceedances(scene, checks, samples, SEED)
     return {

@@ -3,17 +3,14 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.accuracy.measure import Errors
 from seastar_gym.scene import Numerics
 from seastar_gym.scene.numerics import Resolution
 from studies.accuracy.cases import Cases
-
-Floats = NDArray[np.float64]
 
 NOTICEABLE = 0.03
 """A slower setting joins the front if it reduces the error by at least this fraction."""
@@ -197,11 +194,16 @@ def promised(rows: Sequence[Row]) -> list[Row]:
     return found
 
 
-def front(rows: Iterable[Row], error: Callable[[Row], float], speed: Callable[[Row], float]) -> list[Row]:
+T = TypeVar("T")
+
+
+def front(
+    rows: Iterable[T], error: Callable[[T], float], speed: Callable[[T], float], noticeable: float = NOTICEABLE
+) -> list[T]:
     """Pareto front of error and speed, fastest first; a slower row needs a noticeably smaller error."""
-    chosen: list[Row] = []
+    chosen: list[T] = []
     for row in sorted(rows, key=lambda row: (-speed(row), error(row))):
-        if not chosen or error(row) < (1.0 - NOTICEABLE) * error(chosen[-1]):
+        if not chosen or error(row) < (1.0 - noticeable) * error(chosen[-1]):
             chosen.append(row)
     return [row for row in chosen if math.isfinite(error(row))]
 

@@ -1,10 +1,9 @@
 """Settings that the accuracy study measures, and its size."""
 
 from dataclasses import dataclass
-from typing import get_args
 
 from seastar_gym.scene import Numerics
-from seastar_gym.scene.numerics import DAMPING, PRESETS, Fidelity, Resolution, SchemeName
+from seastar_gym.scene.numerics import DAMPING, PRESETS, Resolution, SchemeName
 from seastar_gym.scene.robot import Discretisation
 
 MILLI = 1e-3
@@ -64,11 +63,6 @@ QUICK = Plan(
 )  # fmt: skip
 
 
-def presets() -> dict[str, Resolution]:
-    """Resolutions of the presets by name."""
-    return {name: PRESETS[name] for name in get_args(Fidelity)}
-
-
 def tolerances(step: float) -> tuple[float, ...]:
     """Newton tolerances that are measured with a time step [s]: short steps bring small updates, so need small ones."""
     if step >= 5 * MILLI:
@@ -86,7 +80,7 @@ def dampings(discretisation: Discretisation, scheme: SchemeName, step: float) ->
 def settings(plan: Plan) -> list[Resolution]:
     """All settings that are measured, and the presets whatever the plan leaves out."""
     found = [Resolution(*mesh, each) for mesh in plan.meshes for each in _numerics(plan, mesh)]
-    return list(dict.fromkeys([*found, *presets().values()]))
+    return list(dict.fromkeys([*found, *PRESETS.values()]))
 
 
 def _numerics(plan: Plan, mesh: Mesh) -> list[Numerics]:

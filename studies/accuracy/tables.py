@@ -1,6 +1,5 @@
 """Tables of the accuracy study, among them the one that comes with the package."""
 
-import csv
 import math
 from pathlib import Path
 from typing import Any, get_args
@@ -10,10 +9,12 @@ from seastar_gym.accuracy.certificate import CLASSES_VERSION
 from seastar_gym.accuracy.measure import machine, rounded_up
 from seastar_gym.accuracy.setting import physics
 from seastar_gym.scene import Scene
+from seastar_gym.scene.numerics import PRESETS
 from seastar_gym.version import __version__
 from studies.accuracy.cases import STROKES, gaits
 from studies.accuracy.rows import UNSEEN, Column, Figures, Row, Study, fronts, path_front
-from studies.accuracy.settings import Plan, presets
+from studies.accuracy.settings import Plan
+from studies.frame import rounded, write_rows
 from studies.pages import markdown
 
 LARGEST_DOUBT = 3e-4
@@ -22,7 +23,7 @@ LARGEST_DOUBT = 3e-4
 
 def summary(found: Study) -> list[tuple[str, Row]]:
     """Presets, by name, and the front of the path error, fastest first."""
-    names = {setting: name for name, setting in presets().items()}
+    names = {setting: name for name, setting in PRESETS.items()}
     chosen = {row.resolution: row for row in path_front(found.rows)}
     chosen.update({row.resolution: row for row in found.rows if row.resolution in names})
     return [(names.get(row.resolution, ""), row) for row in sorted(chosen.values(), key=lambda row: -row.speed)]
@@ -40,8 +41,8 @@ def as_cells(name: str, row: Row) -> tuple[str, ...]:
     total = as_setting(row).errors.values()
     return (
         name, nodes_of(row), row.label, f"{row.resolution.numerics.newton_tolerance:.0e}",
-        *(f"{two_digits(100 * error):g} %" if error else "-" for error in (space, time, *total)),
-        f"{two_digits(row.speed):,.0f}",
+        *(f"{rounded(100 * error, 2):g} %" if error else "-" for error in (space, time, *total)),
+        f"{rounded(row.speed, 2):,.0f}",
     )  # fmt: skip
 
 
@@ -49,14 +50,6 @@ def nodes_of(row: Row) -> str:
     """Nodes per limb, and whose discretisation if not the continuum's."""
     discretisation, nodes = row.mesh
     return str(nodes) if discretisation == "continuum" else f"{nodes}, chapter's"
-
-
-def two_digits(value: float) -> float:
-    """Value rounded to two significant digits."""
-    if not math.isfinite(value):
-        return value
-    unit = 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0.0 else 1.0
-    return float(f"{round(value / unit) * unit:.2g}")
 
 
 def facts(found: Study) -> list[str]:
@@ -86,24 +79,21 @@ def write_csv(found: Study, path: Path) -> None:
     """
     names = [name.replace("heading", "heading_deg") for name in Figures._fields]
     columns = get_args(Column)
-    with path.open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow([
-            "discretisation", "nodes_per_limb", "scheme", "step_s", "newton_tolerance", "path_tolerance", "damping",
-            *(f"space_{name}" for name in names), *(f"time_{name}" for name in names),
-            *(f"promise_{name.replace('heading', 'heading_deg')}" for name in columns), *COSTS,
-        ])  # fmt: skip
-        for row in found.rows:
-            n = row.resolution.numerics
-            adapted = "" if n.path_tolerance is None else n.path_tolerance
-            key = [n.scheme, n.step, n.newton_tolerance, adapted, n.damping]
-            sums = [row.promise(column) for column in columns]
-            costs = [getattr(row, name) for name in COSTS]
-            writer.writerow([*row.mesh, *key, *map(_cell, (*row.space, *row.time, *sums, *costs))])
-
-
-def _cell(value: Any) -> Any:
-    return float(f"{value:.5g}") if isinstance(value, float) else value
+    head = [
+        "discretisation", "nodes_per_limb", "scheme", "step_s", "newton_tolerance", "path_tolerance", "damping",
+        *(f"space_{name}" for name in names), *(f"time_{name}" for name in names),
+        *(f"promise_{name.replace('heading', 'heading_deg')}" for name in columns), *COSTS,
+    ]  # fmt: skip
+    rows = []
+    for row in found.rows:
+        n = row.resolution.numerics
+        adapted = "" if n.path_tolerance is None else n.path_tolerance
+        key = [n.scheme, n.step, n.newton_tolerance, adapted, n.damping]
+        sums = [row.promise(column) for column in columns]
+        costs = [getattr(row, name) for name in COSTS]
+        numbers = (*row.space, *row.time, *sums, *costs)
+        rows.append([*row.mesh, *key, *(rounded(each, 5) if isinstance(each, float) else each for each in numbers)])
+    write_rows(path, head, rows)
 
 
 def as_setting(row: Row) -> Setting:
@@ -116,7 +106,7 @@ def as_setting(row: Row) -> Setting:
             "random": float(f"{space + time:.6g}"), "repeated": rounded_up(row.promise("gait")),
             "small": rounded_up(row.promise("slow")), "straight": rounded_up(row.promise("straight")),
         },
-        typical=as_typical(row), space_error=space, time_error=time, speed=two_digits(row.speed),
+        typical=as_typical(row), space_error=space, time_error=time, speed=rounded(row.speed, 2),
         heading_error=rounded_up(row.promise("heading")), end_error=rounded_up(row.promise("end")),
         path_tolerance=numerics.path_tolerance, discretisation=discretisation, damping=numerics.damping,
     )  # fmt: skip
@@ -160,11 +150,11 @@ def store(found: Study, path: Path = chapter.STROKES) -> None:
                 "nothing is stored."
             )
     by_resolution = {row.resolution: row for row in found.rows}
-    first = {each: by_resolution[each] for each in presets().values()}
+    first = {each: by_resolution[each] for each in PRESETS.values()}
     rows = first | {row.resolution: row for row in fronts(found.rows)}
     settings = {resolution: as_setting(row) for resolution, row in rows.items()}
     Certificate(
         physics(Scene()), tuple(settings.values()), ("random",), ("random", "repeated"), Plan().n_random,
-        limit_error=rounded_up(settings[presets()["reference"]].space_error / 3.0), classes=CLASSES_VERSION,
+        limit_error=rounded_up(settings[PRESETS["reference"]].space_error / 3.0), classes=CLASSES_VERSION,
         version=__version__, machine=machine(), measured_over=measured_over(Plan()),
     ).save(path)  # fmt: skip

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.accuracy import Certificate, Setting, chapter
 from seastar_gym.accuracy.certificate import CLASSES_VERSION
@@ -28,11 +27,8 @@ from seastar_gym.scene import Numerics, Scene, SmaWires
 from seastar_gym.scene.numerics import PRESETS, Fidelity, Resolution
 from seastar_gym.version import __version__
 from studies.accuracy.page import PERIODS, timed
-from studies.accuracy.tables import two_digits
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study, rounded
 from studies.pages import show
-
-Floats = NDArray[np.float64]
 
 SCENE = replace(Scene(), actuator=SmaWires())
 SECONDS = 10
@@ -75,7 +71,7 @@ def paths(period: float, plan: Plan) -> dict[str, list[float]]:
     (swum,) = swim_all([at(SCENE, PRESETS["fast"])], drawn(period, plan), period=period)
     random, repeated = np.split(1e3 * path_lengths(SCENE, swum.hub, 0.0), 2)
     kinds = {"random": random, "repeated": repeated}
-    return {name: [two_digits(float(end)) for end in np.percentile(some, (0, 50, 100))] for name, some in kinds.items()}
+    return {name: [rounded(float(end), 2) for end in np.percentile(some, (0, 50, 100))] for name, some in kinds.items()}
 
 
 def setting(resolution: Resolution, space: Floats, time: Floats) -> Setting:

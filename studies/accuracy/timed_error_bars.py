@@ -11,7 +11,6 @@ estimate over true error.
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from seastar_gym.accuracy.measure import swim
@@ -23,8 +22,6 @@ from studies.accuracy.page import PERIODS
 from studies.frame import Results, Study
 from studies.pages import markdown, show
 from studies.style import PERCENT
-
-Floats = NDArray[np.float64]
 
 SAMPLES, SEED = 8, 7
 """Sequences of either kind for each time between decisions, and their seed; the tables of errors have seed 0."""
@@ -57,8 +54,7 @@ def run(results: Results) -> None:
     """Measure, write and print the table."""
     plan = timed.Plan(samples=SAMPLES)
     text = table({period: measure(period, plan) for period in tqdm(PERIODS, unit="period")})
-    results.out.mkdir(parents=True, exist_ok=True)
-    (results.out / "timed_error_bars.md").write_text(text, encoding="utf-8")
+    (results.folder / "timed_error_bars.md").write_text(text, encoding="utf-8")
     show(text)
 
 

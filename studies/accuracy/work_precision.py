@@ -16,7 +16,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.accuracy.commands import CLASSES, PROMISED, draw_classes
 from seastar_gym.accuracy.measure import errors, path_lengths, swim
@@ -28,10 +27,9 @@ from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from studies.accuracy.settings import MILLI
 from studies.accuracy.work_precision_page import draw, of_presets, of_settings
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study
+from studies.speed.strokes import repeat
 from studies.speed.terms import SILICONE
-
-Floats = NDArray[np.float64]
 
 PROBLEMS: dict[str, Scene] = {
     "chapter's robot": Scene(),
@@ -67,16 +65,14 @@ def draw_sequences(n_limbs: int) -> Floats:
     return np.concatenate([each for name, each in zip(CLASSES, drawn, strict=True) if name in PROMISED], axis=1)
 
 
-def cost(scene: Scene) -> float:
+def cost(scene: Scene, n_robots: int = BATCH, error_bars: bool = False) -> float:
     """Processor time of a stroke [s] per robot of a batch, for random commands after one stroke from rest."""
-    simulator, rng = Simulator(scene, BATCH, threads=1), np.random.default_rng(0)
-    times = []
-    for _ in range(1 + STROKES):
-        commands = rng.integers(-1, 2, (BATCH, scene.robot.n_limbs)).astype(float)
-        begin = time.thread_time()
-        simulator.stroke(commands)
-        times.append(time.thread_time() - begin)
-    return min(times[1:]) / BATCH
+    simulator, rng = Simulator(scene, n_robots, 1, error_bars), np.random.default_rng(0)
+
+    def stroke() -> None:
+        simulator.stroke(rng.integers(-1, 2, (n_robots, scene.robot.n_limbs)).astype(float))
+
+    return min(repeat(stroke, 0.0, STROKES, time.thread_time)) / n_robots
 
 
 def finite(number: float) -> float | None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from seastar_gym.files import save_figure
 from seastar_gym.scene.numerics import Fidelity
 from studies.accuracy.pictures import CHAPTERS, OTHERS, OURS, PUBLISHED, published_error
+from studies.accuracy.rows import front
 from studies.pages import markdown
 from studies.style import INK, MS, PERCENT, as_numbers, as_percent, subplots
 
@@ -38,15 +39,6 @@ def error(row: Row, column: Column = "largest_error") -> float:
 def settled(found: Row) -> bool:
     """Whether the worst sequences of a problem have a limit."""
     return float(found["limit_error"]) < SETTLED
-
-
-def front(rows: Sequence[Row], column: Column) -> list[Row]:
-    """Settings that no other setting beats in both time and error, fastest first."""
-    chosen: list[Row] = []
-    for row in sorted(rows, key=lambda row: float(row["ms_per_stroke"])):
-        if not chosen or error(row, column) < error(chosen[-1], column):
-            chosen.append(row)
-    return chosen
 
 
 def draw(results: Mapping[str, Any], file: Path) -> None:
@@ -83,7 +75,7 @@ def _draw_panel(axes: Axes, rows: Sequence[Row], title: str, column: Column) -> 
         mine = [row for row in rows if row["discretisation"] == discretisation]
         axes.plot([row["ms_per_stroke"] for row in mine], [error(row, column) for row in mine], "o", ms=4, mew=0,
                   alpha=0.5, color=colour)  # fmt: skip
-        best = front(mine, column)
+        best = front(mine, lambda row: error(row, column), lambda row: -float(row["ms_per_stroke"]), 0.0)
         axes.plot([row["ms_per_stroke"] for row in best], [error(row, column) for row in best],
                   drawstyle="steps-post", color=colour, lw=1.5, label=name)  # fmt: skip
     presets = [row for row in rows if row["preset"]]

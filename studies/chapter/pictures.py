@@ -10,21 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.files import save_figure
 from seastar_gym.scene import SmaPulse
+from studies.frame import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
-from studies.chapter.cost import Cost
 from studies.chapter.statements import stroke_motion
-from studies.chapter.swims import Swim
+from studies.chapter.swims import Cost, Swim
 from studies.style import FAINT, INK, MM, MS, new_figure, subplots
-
-Floats = NDArray[np.float64]
 
 LIMB, ACTUATED = "#9aa1ab", "#1f4fd8"
 PLUS, MINUS = "#d62728", "#1f4fd8"
@@ -37,15 +34,15 @@ CHAPTER_PATH: dict[str, Any] = {"color": ORANGE, "linewidth": 1.1, "zorder": 3.6
 PAIR_COLOURS = ("#0072b2", "#009e73", "#cc3d7a", "#8c6d1f")
 
 
-def draw_robot(axes: Axes, swim: Swim, time: float, size: float = 1.0) -> None:
-    """Draw the robot at a time [s] on axes in mm, with actuated limbs bold and blue; size: Scale of the lines."""
+def draw_robot(axes: Axes, swim: Swim, time: float) -> None:
+    """Draw the robot at a time [s] on axes in mm, with actuated limbs bold and blue."""
     n = swim.scene.robot.nodes_per_limb
     nodes, active = MM * swim.positions[swim.at(time), 0], swim.actuated(time)
     for limb in range(swim.scene.robot.n_limbs):
         line = nodes[[0, *range(1 + limb * (n - 1), 1 + (limb + 1) * (n - 1))]]
         colour, width, level = (ACTUATED, 3.2, 4.0) if active[limb] else (LIMB, 1.8, 3.0)
-        axes.plot(*line.T, color=colour, linewidth=size * width, solid_capstyle="round", zorder=level)
-    axes.plot(*nodes[0], marker="o", markersize=size * 4.5, color=INK, zorder=5.0)
+        axes.plot(*line.T, color=colour, linewidth=width, solid_capstyle="round", zorder=level)
+    axes.plot(*nodes[0], marker="o", markersize=4.5, color=INK, zorder=5.0)
 
 
 def draw_pulse(actuator: SmaPulse, file: Path) -> None:
@@ -174,8 +171,12 @@ def signal_curves(swim: Swim, limb: int) -> tuple[Floats, Floats, Floats]:
     return time, np.maximum(rotation, 0.0), np.minimum(rotation, 0.0)
 
 
-def draw_pentagon_signals(swim: Swim, file: Path, zoom: tuple[float, float] = (43.0, 53.0)) -> None:
-    """Fig. 13.7b: the actuation signals of the pentagon. zoom: Interval [s] that is shown in detail."""
+ZOOM = (43.0, 53.0)
+"""Interval of the pentagon that is shown in detail [s]."""
+
+
+def draw_pentagon_signals(swim: Swim, file: Path) -> None:
+    """Fig. 13.7b: the actuation signals of the pentagon."""
     n_limbs, peak = swim.scene.robot.n_limbs, swim.scene.actuator.peak_angle
     figure, panels = subplots(n_limbs, 2, figsize=(9.6, 5.8), sharex="col", sharey=True, width_ratios=[2.0, 1.0])
     for limb, row in enumerate(panels):
@@ -189,9 +190,9 @@ def draw_pentagon_signals(swim: Swim, file: Path, zoom: tuple[float, float] = (4
             axes.set(ylim=(-1.25 * peak, 1.25 * peak))
         row[0].set_ylabel(f"limb {limb + 1}\nδψ [rad]")
         row[0].set_yticks([-peak, 0.0, peak], ["−π/5", "0", "π/5"])
-        row[0].axvspan(*zoom, color="#e3e8ee", linewidth=0, zorder=0.5)
+        row[0].axvspan(*ZOOM, color="#e3e8ee", linewidth=0, zorder=0.5)
     panels[0, 0].set(xlim=(0.0, 250.0), title="red, solid: anti-clockwise (+)     blue, dashed: clockwise (−)")
-    panels[0, 1].set(xlim=zoom, title="the shaded ten seconds")
+    panels[0, 1].set(xlim=ZOOM, title="the shaded ten seconds")
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
     panels[0, 0].set_xticks(range(0, 251, 25))

@@ -1,17 +1,16 @@
 """Statements of the chapter beside computed numbers."""
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from rich.table import Table
 
 from seastar_gym import gaits
 from studies.chapter import REAL_TIME_FROM
-from studies.chapter.cost import Cost
-from studies.chapter.swims import Swim
+from studies.chapter.swims import Cost, Swim
+from studies.frame import write_rows
+from studies.pages import markdown
 from studies.style import MM, MS
 
 PAIRS = {name.replace(",", ", ").replace("-", "⁻").replace("+", "⁺"): command for name, command in gaits.PAIRS.items()}
@@ -133,26 +132,17 @@ def cells(row: Statement) -> tuple[float | None, ...]:
     return (*values, *[None] * (len(COLUMNS) - len(values)))
 
 
-def as_table(statements: Sequence[Statement]) -> Table:
-    """Statements as a table for the terminal."""
-    table = Table(title="Statements of the chapter, and computed values")
-    table.add_column("the chapter", max_width=36)
-    table.add_column("quantity", max_width=30)
-    for column in COLUMNS:
-        table.add_column(column, justify="right", max_width=16)
-    last = ""
+def as_table(statements: Sequence[Statement]) -> str:
+    """Statements as a table in Markdown, each sentence once."""
+    rows, last = [], ""
     for row in statements:
         values = ["" if value is None else f"{value:.4g} {row.unit}".rstrip() for value in cells(row)]
-        if row.sentence != last:
-            table.add_section()
-        table.add_row("" if row.sentence == last else row.sentence, row.quantity, *values)
+        rows.append(["" if row.sentence == last else row.sentence, row.quantity.replace("|", "\\|"), *values])
         last = row.sentence
-    return table
+    return markdown(["the chapter", "quantity", *COLUMNS], rows, (0, 1))
 
 
 def write_csv(statements: Sequence[Statement], file: Path) -> None:
     """Write statements as CSV."""
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(["the chapter", "quantity", "unit", *COLUMNS])
-        writer.writerows([row.sentence, row.quantity, row.unit, *cells(row)] for row in statements)
+    rows = ([row.sentence, row.quantity, row.unit, *cells(row)] for row in statements)
+    write_rows(file, ["the chapter", "quantity", "unit", *COLUMNS], rows)

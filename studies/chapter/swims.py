@@ -1,15 +1,18 @@
-"""Recorded swims: with the chapter's setting, with its ten nodes converged in time, and in the continuum."""
+"""What the figures show: swims with the chapter's setting, with its ten nodes converged in time, and in the continuum;
+and computing time against the time step, as in Fig. 13.9."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator, SolverStatus
+from studies.frame import Floats
+from studies.speed.strokes import repeat
 from studies.style import MS
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -26,13 +29,7 @@ class Setting:
         scheme = self.numerics.scheme.replace("-", " ").replace("euler", "Euler")
         return f"{self.name} ({scheme}, {MS * self.numerics.step:g} ms)"
 
-    def coarser(self, step: float) -> "Setting":
-        """The setting with time steps of at least `step` [s]."""
-        return replace(self, numerics=replace(self.numerics, step=max(step, self.numerics.step)))
 
-
-QUICK = 1e-3
-"""Shortest time steps of a quick run [s]."""
 THE_CHAPTERS = Seastar(discretisation="chapter")
 CONVERGED = Numerics("implicit-midpoint", 0.25e-3)
 CHAPTER = Setting("the chapter's setting", THE_CHAPTERS, Numerics("implicit-euler", 3e-3))
@@ -66,9 +63,9 @@ class Swim:
         """Hub positions of a robot [m], shape (n, 2)."""
         return self.positions[:, robot, 0]
 
-    def hub_velocity(self, robot: int = 0) -> Floats:
-        """Hub velocities of a robot [m/s], shape (n, 2)."""
-        return self.velocities[:, robot, 0]
+    def hub_velocity(self) -> Floats:
+        """Hub velocities of the first robot [m/s], shape (n, 2)."""
+        return self.velocities[:, 0, 0]
 
     def at(self, time: float) -> int:
         """Index of the first sample that is not before a time [s]."""
@@ -79,11 +76,11 @@ class Swim:
         ends = np.arange(len(self.commands) + 1) * self.scene.actuator.period
         return np.searchsorted(self.time, ends - 1e-9)
 
-    def actuated(self, time: float, robot: int = 0) -> NDArray[np.bool_]:
-        """Mask of a robot's limbs that are rotated at a time [s], shape (n_limbs,)."""
+    def actuated(self, time: float) -> NDArray[np.bool_]:
+        """Mask of the first robot's limbs that are rotated at a time [s], shape (n_limbs,)."""
         stroke, since = divmod(time + 1e-9, self.scene.actuator.period)
         turned = stroke < len(self.commands) and self.scene.actuator.delta_psi(since) > 1e-6
-        active: NDArray[np.bool_] = turned & (self.commands[int(stroke) if turned else 0, robot] != 0.0)
+        active: NDArray[np.bool_] = turned & (self.commands[int(stroke) if turned else 0, 0] != 0.0)
         return active
 
 
@@ -101,3 +98,52 @@ def swim(setting: Setting, commands: ArrayLike, samples_per_stroke: int) -> Swim
             raise RuntimeError(SolverStatus.NOT_CONVERGED.sentence)
     times, positions, velocities = (np.array(values) for values in zip(*samples, strict=True))
     return Swim(setting.label, scene, commands, times, positions, velocities)
+
+
+BATCH = 64
+"""Robots in the measured batch."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Computing time over simulated time, for several time steps.
+
+    steps: Time steps [s], shape (n,).
+    alone: Computing time over simulated time of a single robot, shape (n,).
+    in_batch: The same ratio per robot of a batch of n_robots, shape (n,).
+    regularised: Whether Newton's matrix was indefinite in some steps and therefore regularised, shape (n,).
+    """
+
+    steps: Floats
+    alone: Floats
+    in_batch: Floats
+    n_robots: int
+    regularised: NDArray[np.bool_]
+
+
+def computing_seconds(simulator: Simulator, seconds: float) -> float:
+    """Computing time of a stroke of the straight swim [s], the shortest of repeats that take about `seconds`.
+
+    The shortest one counts, because other work of the machine can only add time.
+    """
+    commands = np.tile(STRAIGHT, (simulator.n_robots, 1))
+    return min(repeat(lambda: simulator.stroke(commands), seconds, at_least=3))
+
+
+def needs_regularisation(scene: Scene) -> bool:
+    """Whether Newton's matrix is indefinite in some step of ten strokes of the straight swim."""
+    simulator = Simulator(scene)
+    return any(simulator.stroke(STRAIGHT[None]).regularised[0] > 0 for _ in range(10))
+
+
+def measure_cost(robot: Seastar, steps: Floats, seconds: float, progress: Callable[[], object] = lambda: None) -> Cost:
+    """Measure Fig. 13.9 on one thread; steps: Time steps [s], seconds: Duration of the measurement per point [s]."""
+    alone, in_batch, regularised = [], [], []
+    for step in steps:
+        scene = Scene(robot, numerics=Numerics("implicit-euler", float(step)))
+        period = scene.actuator.period
+        alone.append(computing_seconds(Simulator(scene, 1, threads=1), seconds) / period)
+        in_batch.append(computing_seconds(Simulator(scene, BATCH, threads=1), seconds) / period / BATCH)
+        regularised.append(needs_regularisation(scene))
+        progress()
+    return Cost(steps, np.array(alone), np.array(in_batch), BATCH, np.array(regularised))

@@ -7,22 +7,18 @@ it has its certificate, so that the command goes on with those that are missing.
 """
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from seastar_gym.accuracy import Certificate
-from seastar_gym.accuracy.measure import SAMPLES, certify
-from seastar_gym.scene import Contact, Scene, Seastar, SmaPulse
-from seastar_gym.sweep.batches import Batch
-from seastar_gym.sweep.configurations import Swim, configuration_with
-from seastar_gym.sweep.swimming import swim
-from studies.designs import front, study
+from seastar_gym.accuracy.measure import SAMPLES
+from seastar_gym.scene import Contact, Scene
+from studies.accuracy.promises import kept_certificate
+from studies.designs import front, space, study
 from studies.designs.front import AT_WORK, THRIFTIEST
-from studies.designs.space import MEASURED, SETTLING, Body
+from studies.designs.space import Body, swum
 from studies.frame import DOCS, Results, Study, require_known
 from studies.pages import markdown, numbers
 
@@ -50,39 +46,18 @@ def rows() -> Table:
 def scene_of(row: Table) -> Scene:
     """Scene of a robot as its row describes it: of front.json with contact, and radii of root and tip."""
     is_front = "radius_mm" in row
-    robot = robot_between(row) if is_front else Body(row["n_limbs"], 1e-3 * row["mean_radius_mm"], row["taper"]).robot()
-    robot = replace(robot, limb_length=1e-3 * row["limb_length_mm"], youngs_modulus=1e6 * row["youngs_modulus_MPa"])
-    actuator, contact = SmaPulse(row["peak_angle_rad"]), Contact() if is_front else None
-    return replace(Scene.preset("fast"), robot=robot, actuator=actuator, contact=contact)
-
-
-def robot_between(row: Table) -> Seastar:
-    """Robot of the radii of root and tip that a row of front.json has."""
-    root, tip = (1e-3 * radius for radius in row["radius_mm"])
-    return Body(row["n_limbs"], 0.5 * (root + tip), tip / root).robot()
-
-
-def file_of(name: str, folder: Path, samples: int) -> Path:
-    """File of the certificate of a winner."""
-    return folder / f"{name.replace(' ', '_')}_{samples}.json"
+    if is_front:
+        root, tip = (1e-3 * radius for radius in row["radius_mm"])
+        body = Body(row["n_limbs"], 0.5 * (root + tip), tip / root)
+    else:
+        body = Body(row["n_limbs"], 1e-3 * row["mean_radius_mm"], row["taper"])
+    length, modulus = 1e-3 * row["limb_length_mm"], 1e6 * row["youngs_modulus_MPa"]
+    return space.scene_of(body, length, modulus, row["peak_angle_rad"], Contact() if is_front else None)
 
 
 def certificate_of(name: str, scene: Scene, folder: Path, samples: int) -> Certificate:
     """Certificate of a winner: that of the folder if it holds, or a new one, which is kept there."""
-    file = file_of(name, folder, samples)
-    if file.exists():
-        certificate = Certificate.load(file)
-        certificate.require_valid(scene)
-        return certificate
-    with tqdm(total=100, unit="%", desc=name, bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
-
-        def progress(share: float) -> None:
-            bar.update(100.0 * share - bar.n)
-
-        certificate = certify(scene, samples, progress=progress)
-    folder.mkdir(parents=True, exist_ok=True)
-    certificate.save(file)
-    return certificate
+    return kept_certificate(folder / f"{name.replace(' ', '_')}_{samples}.json", scene, samples)
 
 
 def told(certificate: Certificate) -> Table:
@@ -93,14 +68,12 @@ def told(certificate: Certificate) -> Table:
             each for each in certificate.settings
             if (each.nodes_per_limb, each.step, each.scheme) == (nodes, step, "implicit-midpoint")
         )  # fmt: skip
-        scene = certificate.at(setting)
-        columns = swim(Batch(configuration_with(scene, "straight", Swim(SETTLING, MEASURED), {}), {}, 1))
         found[f"{nodes} nodes, {1e3 * step:g} ms"] = {
             "repeated_percent": round(100 * setting.error((CLASS,)), 3),
             "typical_percent": round(100 * setting.typical_error((CLASS,)), 3),
             "promised_percent": round(100 * setting.error(certificate.promised), 3),
             "energy_growth": setting.energy_growth,
-            "mm_per_s": round(1e3 * float(columns["speed"][0]), 3),
+            "mm_per_s": round(1e3 * swum(certificate.at(setting))["speed"], 3),
         }
     return found
 

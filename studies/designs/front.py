@@ -13,19 +13,15 @@ import numpy as np
 
 from seastar_gym.executors.processes import Processes
 from seastar_gym.files import save_figure
-from seastar_gym.scene import Contact, Scene, SmaPulse
-from seastar_gym.sweep.batches import Batch
-from seastar_gym.sweep.configurations import Swim, configuration_with
-from seastar_gym.sweep.swimming import swim
-from studies.designs.search import BODIES, CHILDREN, GENERATIONS, SPEEDS, Limit, Row, fastest, grown, search, thriftiest
-from studies.designs.space import MEASURED, SETTLING, Body
-from studies.frame import Results, Study
+from seastar_gym.scene import Contact, Scene
+from studies.designs import space
+from studies.designs.search import CHANGED, SIMULATED, SPEEDS, Limit, Row, fastest, grown, search, thriftiest
+from studies.designs.space import MEASURED, Body, swum
+from studies.frame import Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.style import INK, MM, subplots
 
 Table = dict[str, Any]
-SWIM = Swim(SETTLING, MEASURED)
 FACTORS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 """Limits of the work per stroke, over that of the chapter's robot."""
 OWN = Limit(0.0776e-3 * MEASURED, 0.1e-3)
@@ -38,34 +34,30 @@ CHAPTER, AT_WORK, THRIFTIEST, FASTEST = (
 def scene_of(row: Row) -> Scene:
     """Scene of a robot of the search, with contact."""
     body = Body(int(row["n_limbs"]), float(row["radius"]), float(row["taper"]))
-    robot = replace(
-        body.robot(), limb_length=float(row["robot.limb_length"]), youngs_modulus=float(row["robot.youngs_modulus"])
-    )
-    actuator = SmaPulse(float(row["actuator.peak_angle"]))
-    return replace(Scene.preset("fast"), robot=robot, actuator=actuator, contact=Contact())
+    length, modulus, angle = (float(row[name]) for name in CHANGED)
+    return space.scene_of(body, length, modulus, angle, Contact())
 
 
-def swum(scene: Scene, fidelity: str = "reference") -> dict[str, float]:
-    """Columns of a robot's results at a fidelity."""
-    cell = Batch(configuration_with(scene, "straight", SWIM, {"fidelity": (fidelity, fidelity)}), {}, 1)
-    return {name: float(column[0]) for name, column in swim(cell).items()}
+def at_reference(scene: Scene) -> dict[str, float]:
+    """Columns of a robot's results at `reference`."""
+    return swum(scene, fidelity="reference")
 
 
 def sized(row: Row, limit: Limit) -> Row:
     """A robot of the size with which it is within a limit at `reference`, with contact."""
-    found = swum(scene_of(row))
+    found = at_reference(scene_of(row))
     size = min((limit.work / found["work"]) ** 0.2, (limit.moment / found["peak_moment"]) ** 0.2)
     return row if np.isinf(size) else grown(row, size)
 
 
 def as_fast(row: Row, speed: float) -> Row:
     """A robot of the size with which it is as fast as that [m/s] at `reference`, with contact."""
-    return grown(row, speed / swum(scene_of(row))["speed"])
+    return grown(row, speed / at_reference(scene_of(row))["speed"])
 
 
 def told(scene: Scene) -> Table:
     """What a robot is, and what it does and costs at `reference`, with contact."""
-    robot, found = scene.robot, swum(scene)
+    robot, found = scene.robot, at_reference(scene)
     return {
         "n_limbs": robot.n_limbs, "radius_mm": [rounded(MM * radius) for radius in radii(scene)],
         "limb_length_mm": rounded(MM * robot.limb_length), "youngs_modulus_MPa": rounded(1e-6 * robot.youngs_modulus),
@@ -87,7 +79,7 @@ def run(results: Results) -> None:
     """Search, and swim the best again."""
     chapter = replace(Scene.preset("fast"), contact=Contact())
     limits = {factor: Limit(factor * OWN.work) for factor in FACTORS}
-    speed = swum(chapter)["speed"]
+    speed = at_reference(chapter)["speed"]
     table = search((*limits.values(), OWN), results.out, Processes())
     scenes = {
         CHAPTER: chapter,
@@ -95,7 +87,7 @@ def run(results: Results) -> None:
         THRIFTIEST: scene_of(as_fast(thriftiest(table, speed), speed)),
         FASTEST: scene_of(fastest(table)),
     }
-    results["simulated"] = CHILDREN * len(BODIES) * (1 + GENERATIONS)
+    results["simulated"] = SIMULATED
     results["robots"] = {name: told(scene) for name, scene in scenes.items()}
     results["front"] = [told(scene_of(thriftiest(table, speed))) for speed in SPEEDS.tolist()]
     results["by_work"] = [[factor, told(scene_of(fastest(table, limit)))] for factor, limit in limits.items()]
@@ -144,9 +136,7 @@ def draw(results: Table, file: Path) -> None:
     for name, row in results["robots"].items():
         text, place, side = LABELS[name]
         ax.plot(row["mm_per_s"], row["J_per_metre"], "o" if name == CHAPTER else "s", color=INK)
-        ax.annotate(
-            text, (row["mm_per_s"], row["J_per_metre"]), place, textcoords="offset points", ha=side, fontsize=8
-        )
+        ax.annotate(text, (row["mm_per_s"], row["J_per_metre"]), place, textcoords="offset points", ha=side, fontsize=8)
     ax.set(xlabel="speed [mm/s]", ylabel="work per metre [J/m]", xlim=(2.5, 20.0), ylim=(1e-4, 0.5))
     ticks = (3, 5, 10, 20)
     ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])

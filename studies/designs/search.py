@@ -12,18 +12,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas  # type: ignore[import-untyped]
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from seastar_gym.executors import Executor
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.batches import Batch
-from seastar_gym.sweep.configurations import Swim, configuration_with
+from seastar_gym.sweep.configurations import configuration_with
 from seastar_gym.sweep.result_files import ResultFiles, read_result_file
-from seastar_gym.sweep.run import run
-from studies.designs.space import ANGLES, LENGTHS, LIMBS, MEASURED, MODULI, RADII, SETTLING, TAPERS, Body
+from studies.designs.space import ANGLES, LENGTHS, LIMBS, MODULI, RADII, SWIM, TAPERS, Body, run_all
+from studies.frame import Floats
 
-Floats = NDArray[np.float64]
 Row = Mapping[str, Any]
 
 POWERS = {
@@ -45,6 +43,8 @@ SPEEDS = 1e-3 * np.geomspace(1.0, 16.0, 17)
 RADIUS = 1.6e-3
 """Mean radius with which robots are simulated [m]."""
 BODIES = tuple(Body(n_limbs, RADIUS, taper) for n_limbs in LIMBS for taper in TAPERS)
+SIMULATED = CHILDREN * len(BODIES) * (1 + GENERATIONS)
+"""Robots of all generations."""
 
 
 class Limit(NamedTuple):
@@ -123,14 +123,12 @@ def children(rows: list[Row], change: float, draws: np.random.Generator) -> dict
 
 def simulated(numbers: list[dict[str, Floats]], folder: Path, executor: Executor) -> Any:
     """Results of robots that count, numbers of every body's; what is in the folder is not simulated again."""
-    scene, swim = Scene.preset("fast"), Swim(SETTLING, MEASURED)
+    scene = Scene.preset("fast")
     cells = [
-        Batch(configuration_with(scene, "straight", swim, {"robot": (body.robot(), body.label)}), each, CHILDREN)
+        Batch(configuration_with(scene, "straight", SWIM, {"robot": (body.robot(), body.label)}), each, CHILDREN)
         for body, each in zip(BODIES, numbers, strict=True)
     ]
-    tally = run(cells, folder, executor)
-    if tally.problems:
-        raise ValueError(f"{len(tally.problems)} cells have no results: run the command again.")
+    run_all(cells, folder, executor)
     tables = [read_result_file(ResultFiles(folder).file(cell.name)).to_pandas() for cell in cells]
     return counting(pandas.concat([table.assign(**body._asdict()) for body, table in zip(BODIES, tables, strict=True)]))
 

@@ -1,14 +1,22 @@
 """The designs: robots of several numbers of limbs, radii and tapers, with lengths, moduli and peak angles drawn."""
 
 import itertools
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from seastar_gym.scene import Scene, Seastar
+from seastar_gym.executors import Executor
+from seastar_gym.scene import Contact, Scene, Seastar, SmaPulse
 from seastar_gym.scene.limb import Limb
 from seastar_gym.sweep.axes import Choices, Range
+from seastar_gym.sweep.batches import Batch
+from seastar_gym.sweep.configurations import Swim, configuration_with
 from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.run import OnProgress, run
+from seastar_gym.sweep.swimming import swim
 
 LIMBS = (3, 4, 5, 6, 7)
 RADII = (0.8e-3, 1.2e-3, 1.6e-3, 2.0e-3, 2.4e-3, 2.8e-3)
@@ -21,6 +29,7 @@ SAMPLES = 854
 """Designs of every combination of limbs, radius and taper: 102,480 in all."""
 SETTLING, MEASURED = 3, 5
 """Strokes before and during the measurement."""
+SWIM = Swim(SETTLING, MEASURED)
 
 
 class Body(NamedTuple):
@@ -50,12 +59,32 @@ class Body(NamedTuple):
         )
 
 
+def scene_of(body: Body, length: float, modulus: float, peak_angle: float, contact: Contact | None = None) -> Scene:
+    """Scene of a design. length: Of a limb [m]. modulus: Young's [Pa]. peak_angle: [rad]."""
+    robot = replace(body.robot(), limb_length=length, youngs_modulus=modulus)
+    return replace(Scene.preset("fast"), robot=robot, actuator=SmaPulse(peak_angle), contact=contact)
+
+
+def swum(scene: Scene, **choices: str) -> dict[str, float]:
+    """Columns of a robot's results, as of a sweep. choices: Such as the fidelity."""
+    named = {name: (value, value) for name, value in choices.items()}
+    columns = swim(Batch(configuration_with(scene, "straight", SWIM, named), {}, 1))
+    return {name: float(column[0]) for name, column in columns.items()}
+
+
+def run_all(cells: Iterable[Batch], folder: Path, executor: Executor, progress: OnProgress | None = None) -> None:
+    """Simulate what is missing in a folder. ValueError where something has no results."""
+    tally = run(cells, folder, executor, progress)
+    if tally.problems:
+        raise ValueError(f"{len(tally.problems)} cells have no results: run the command again.")
+
+
 BODIES = {body.label: body for body in itertools.starmap(Body, itertools.product(LIMBS, RADII, TAPERS))}
 
 
-def bodies(some: dict[str, Body]) -> Choices:
-    """Axis of bodies."""
-    return Choices("robot", tuple(body.robot() for body in some.values()), tuple(some))
+def bodies() -> Choices:
+    """Axis of all bodies."""
+    return Choices("robot", tuple(body.robot() for body in BODIES.values()), tuple(BODIES))
 
 
 def all_designs(samples: int = SAMPLES) -> Sweep:
@@ -65,15 +94,15 @@ def all_designs(samples: int = SAMPLES) -> Sweep:
         Range("actuator.peak_angle", *ANGLES),
     )  # fmt: skip
     return Sweep(
-        Scene.preset("fast"), (bodies(BODIES), *ranges), settling=SETTLING, measured=MEASURED, samples=samples,
+        Scene.preset("fast"), (bodies(), *ranges), settling=SETTLING, measured=MEASURED, samples=samples,
         robots=427,
     )  # fmt: skip
 
 
-def at_the_chapters(samples: int = 64) -> Sweep:
+def at_the_chapters() -> Sweep:
     """Sweep over body and modulus, with the chapter's limb length and peak angle."""
     modulus = Range("robot.youngs_modulus", *MODULI, is_log=True)
-    return Sweep(Scene.preset("fast"), (bodies(BODIES), modulus), settling=SETTLING, measured=MEASURED, samples=samples)
+    return Sweep(Scene.preset("fast"), (bodies(), modulus), settling=SETTLING, measured=MEASURED, samples=64)
 
 
 SPREADS = (0.25, 0.5, 1.0, 2.0, 4.0)

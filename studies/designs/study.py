@@ -7,32 +7,31 @@ interrupt.
 """
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
 from seastar_gym.executors import Executor
-from seastar_gym.executors.here import Here
 from seastar_gym.executors.processes import Processes
-from seastar_gym.scene import Scene, SmaPulse
-from seastar_gym.sweep.axes import Choices
+from seastar_gym.scene import Scene, Seastar, SmaPulse
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.result_files import ResultFiles, read_results
-from seastar_gym.sweep.run import Progress, run
+from seastar_gym.sweep.result_files import read_results
+from seastar_gym.sweep.run import Progress
+from studies.designs import space
 from studies.designs.pictures import draw, robots, summary
 from studies.designs.search import counting
 from studies.designs.space import (
     BODIES,
     MEASURED,
-    SETTLING,
     SPREADS,
     Body,
     all_designs,
     at_the_chapters,
     inner_half,
     masses,
+    run_all,
+    swum,
 )
 from studies.frame import Results, Study
 from studies.style import MM
@@ -51,9 +50,7 @@ def results(sweep: Sweep, folder: Path, executor: Executor) -> Any:
         def progress(tally: Progress) -> None:
             bar.update(tally.done + tally.kept - bar.n)
 
-        tally = run(sweep.batches(), folder, executor, progress)
-    if tally.problems:
-        raise ValueError(f"{len(tally.problems)} cells have no results: run the command again.")
+        run_all(sweep.batches(), folder, executor, progress)
     table = read_results(folder).to_pandas()
     if "robot" in table and table.robot.isin(BODIES).all():
         for name in Body._fields:
@@ -63,23 +60,17 @@ def results(sweep: Sweep, folder: Path, executor: Executor) -> Any:
 
 def scene_of(row: Any) -> Scene:
     """Scene of a design."""
-    numbers: dict[str, Any] = {
-        name: float(row[f"robot.{name}"]) for name in ("limb_length", "youngs_modulus") if f"robot.{name}" in row
-    }
-    peak = float(row.get("actuator.peak_angle", SmaPulse().peak_angle))
-    return replace(
-        Scene.preset("fast"), robot=replace(BODIES[row["robot"]].robot(), **numbers), actuator=SmaPulse(peak)
-    )  # fmt: skip
+    chapter = {
+        "robot.limb_length": Seastar().limb_length, "robot.youngs_modulus": Seastar().youngs_modulus,
+        "actuator.peak_angle": SmaPulse().peak_angle,
+    }  # fmt: skip
+    length, modulus, angle = (float(row.get(name, number)) for name, number in chapter.items())
+    return space.scene_of(BODIES[row["robot"]], length, modulus, angle)
 
 
-def at_all_fidelities(scene: Scene, folder: Path) -> Table:
+def at_all_fidelities(scene: Scene) -> Table:
     """MEASURES of a robot at CHECKS, and its work per metre at the last [J/m]."""
-    sweep = Sweep(scene, (Choices("fidelity", CHECKS),), settling=SETTLING, measured=MEASURED)
-    run(sweep.batches(), folder, Here())
-    names = [cell.name for cell in sweep.batches()]
-    import pyarrow.parquet
-
-    rows = [pyarrow.parquet.read_table(ResultFiles(folder).file(name)).to_pylist()[0] for name in names]
+    rows = [swum(scene, fidelity=fidelity) for fidelity in CHECKS]
     found: Table = {
         measure: {fidelity: round(factor * row[name], 5) for fidelity, row in zip(CHECKS, rows, strict=True)}
         for measure, (name, factor) in MEASURES.items()
@@ -87,10 +78,10 @@ def at_all_fidelities(scene: Scene, folder: Path) -> Table:
     return {**found, "J_per_metre": round(found["mJ_per_stroke"][CHECKS[-1]] / found["mm_per_s"][CHECKS[-1]], 4)}
 
 
-def winner(row: Any, folder: Path) -> Table:
+def winner(row: Any) -> Table:
     """A design in numbers, its speeds and its work."""
     scene = scene_of(row)
-    body, found = BODIES[row["robot"]], at_all_fidelities(scene, folder)
+    body, found = BODIES[row["robot"]], at_all_fidelities(scene)
     length, speed = scene.robot.limb_length, found["mm_per_s"][CHECKS[-1]]
     return {
         "n_limbs": body.n_limbs, "mean_radius_mm": MM * body.radius, "taper": body.taper,
@@ -119,16 +110,15 @@ def study(folder: Path, executor: Executor) -> tuple[Table, Any]:
     same = results(at_the_chapters(), folder / "chapter", executor)
     same = counting(same)
     mass = results(masses(), folder / "masses", executor)
-    checks = folder / "checks"
     relative = table.speed / table["robot.limb_length"]
     uniform = same[same.taper == 1.0]
     return {
         "designs": len(designs), "failed": len(designs) - len(sound), "count": len(table),
-        "the chapter's": at_all_fidelities(Scene.preset("fast"), checks),
-        "fastest": winner(table.loc[table.speed.idxmax()], checks),
-        "fastest in its lengths": winner(table.loc[relative.idxmax()], checks),
-        "fastest at the chapter's length and angle": winner(same.loc[same.speed.idxmax()], checks),
-        "fastest of them without taper": winner(uniform.loc[uniform.speed.idxmax()], checks),
+        "the chapter's": at_all_fidelities(Scene.preset("fast")),
+        "fastest": winner(table.loc[table.speed.idxmax()]),
+        "fastest in its lengths": winner(table.loc[relative.idxmax()]),
+        "fastest at the chapter's length and angle": winner(same.loc[same.speed.idxmax()]),
+        "fastest of them without taper": winner(uniform.loc[uniform.speed.idxmax()]),
         "speeds_mm_per_s": {name: quantiles(table, name) for name in ("n_limbs", "radius", "taper")},
         "masses": masses_by_taper(mass),
     }, table  # fmt: skip

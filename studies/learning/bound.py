@@ -33,11 +33,10 @@ from seastar_gym.evaluation.many import swim_many
 from seastar_gym.files import save_figure
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.simulator import Simulator, State
-from studies.frame import Results, Study
+from seastar_gym.simulator import Simulator
+from studies.frame import Floats, Results, Study
 from studies.style import CYCLE, MM, subplots
 
-Floats = NDArray[np.float64]
 Gaits = NDArray[np.intp]
 
 SETTLING, MEASURED = 12, 12
@@ -63,12 +62,9 @@ def distinct_gaits(period: int, actions: Actions, n_limbs: int = 5) -> Gaits:
 def measure(scene: Scene, gaits: Gaits, actions: Actions) -> Displacements:
     """Displacements of gaits per stroke, in the body frame."""
     table = command_table(actions, scene.robot.n_limbs)
-    parts = [measure_gaits(scene, table[part], SETTLING, MEASURED) for part in _chunks(gaits)]
+    chunks = (gaits[begin : begin + CHUNK] for begin in range(0, len(gaits), CHUNK))
+    parts = [measure_gaits(scene, table[chunk], SETTLING, MEASURED) for chunk in chunks]
     return Displacements(np.concatenate([part.hub for part in parts]), np.concatenate([part.turn for part in parts]))
-
-
-def _chunks(gaits: Gaits) -> list[Gaits]:
-    return [gaits[begin : begin + CHUNK] for begin in range(0, len(gaits), CHUNK)]
 
 
 def all_directions(hub: Floats, n_limbs: int = 5) -> Floats:
@@ -89,32 +85,24 @@ def mixed_speed(displacements: Floats, directions: Floats) -> Floats:
 def search_path(scene: Scene, waypoints: Floats, actions: Actions, beam: int, max_strokes: int = 400) -> Gaits:
     """Actions of the shortest swim found from rest through all waypoints [m]; empty if none ends within max_strokes."""
     swim_all = Branching(scene, command_table(actions, scene.robot.n_limbs)[:, None])
-    states, actions_so_far, reached = _at_rest(scene), np.zeros((1, 0), np.intp), np.zeros(1, np.intp)
+    states, actions_so_far = Simulator(scene).get_state(), np.zeros((1, 0), np.intp)
+    n_actions, reached = len(swim_all.moves), np.zeros(1, np.intp)
     legs = np.linalg.norm(np.diff(waypoints, axis=0), axis=1)
     way_after = np.append(np.cumsum(legs[::-1])[::-1], 0.0)
     last = len(waypoints) - 1
     for _ in range(max_strokes):
-        states, reached = swim_all(states), np.repeat(reached, len(swim_all.moves))
+        states, reached = swim_all(states), np.repeat(reached, n_actions)
         hub = states.positions[:, 0]
         reached = reached + (np.linalg.norm(waypoints[np.minimum(reached, last)] - hub, axis=1) <= WAYPOINT_RADIUS)
         current, after = np.minimum(reached, last), np.minimum(reached + 1, last)
         to_next = RewardWeights().way_to_next(hub, waypoints[current], waypoints[after], WAYPOINT_RADIUS)
         way = to_next + way_after[after]
         best = np.argsort(way)[:beam]
-        states, actions_so_far = _keep(states, actions_so_far, best, len(swim_all.moves))
-        reached = reached[best]
+        actions_so_far = np.column_stack([actions_so_far[best // n_actions], best % n_actions])
+        states, reached = states.of_robots(best), reached[best]
         if (reached > last).any():
             return actions_so_far[np.argmax(reached > last)]
     return np.zeros(0, np.intp)
-
-
-def _at_rest(scene: Scene) -> State:
-    return Simulator(scene).get_state()
-
-
-def _keep(states: State, so_far: Gaits, chosen: NDArray[np.intp], n_actions: int) -> tuple[State, Gaits]:
-    longer = np.concatenate([so_far[chosen // n_actions], (chosen % n_actions)[:, None]], axis=1)
-    return states.of_robots(chosen), longer
 
 
 MIXED = "best periodic gaits, mixed"
@@ -197,17 +185,19 @@ def run(options: Options, results: Results, beam: int = 300) -> None:
     mixed = mixed_speed(displacements, directions)
     learned = MM * agent_speeds("learned", load_agents(("learned",))["learned"], scene, directions)
     pentagon = search_path(scene, make_path("pentagon", np.random.default_rng(0)), "pairs", beam)
-    results.update({
-        "fidelity": options.fidelity,
-        "fastest_gaits": fastest,
-        "directions_deg": np.degrees(directions).tolist(),
-        "mm_per_stroke": {MIXED: (MM * mixed).tolist(), "learned": learned.tolist()},
-        "pentagon": {
-            "strokes": len(pentagon),
-            "beam": beam,
-            "gait": [name(command) for command in command_table("pairs", scene.robot.n_limbs)[pentagon]],
-        },
-    })
+    results.update(
+        {
+            "fidelity": options.fidelity,
+            "fastest_gaits": fastest,
+            "directions_deg": np.degrees(directions).tolist(),
+            "mm_per_stroke": {MIXED: (MM * mixed).tolist(), "learned": learned.tolist()},
+            "pentagon": {
+                "strokes": len(pentagon),
+                "beam": beam,
+                "gait": [name(command) for command in command_table("pairs", scene.robot.n_limbs)[pentagon]],
+            },
+        }
+    )
     print(json.dumps({key: value for key, value in results.items() if key != "pentagon"}, indent=1))
     print(f"Pentagon: {results['pentagon']['strokes']} strokes. All in {time.perf_counter() - began:.0f} s.")
 

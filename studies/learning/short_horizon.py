@@ -45,11 +45,9 @@ from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.gradients import Record, record
 from seastar_gym.scene import Scene
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 
-Floats = NDArray[np.float64]
 Tensor = torch.Tensor
 Scores = list[list[float]]
 """Of a training: decisions so far, processor time [s] and return."""
@@ -364,11 +362,6 @@ REACHED = 0.8
 """Share of the straight gait's return of which the table tells when it is reached."""
 
 
-def settings() -> dict[str, Any]:
-    """What all numbers have in common."""
-    return {"episode": EPISODE, "held_out": HELD_OUT, "decisions": [FEW, MANY, OF_PAIRS]}
-
-
 def run(results: Results) -> None:
     """Train what is missing, on one thread."""
     torch.set_num_threads(1)
@@ -399,6 +392,7 @@ def table(results: Mapping[str, Any]) -> str:
 
 
 STUDY = Study(
-    "learning.short_horizon", run, file="learning/short_horizon.json", settings=settings,
+    "learning.short_horizon", run, file="learning/short_horizon.json",
+    settings=lambda: {"episode": EPISODE, "held_out": HELD_OUT, "decisions": [FEW, MANY, OF_PAIRS]},
     tables={"short horizon": table}, packages=("torch", "stable_baselines3"),
 )  # fmt: skip

@@ -13,30 +13,27 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
+from numpy.typing import NDArray
 
-from seastar_gym.scene import Scene
+from seastar_gym.controllers.contract import Policy, actions_of
+from seastar_gym.controllers.learned import LearnedPolicy, pretrained
+from seastar_gym.controllers.scripted import scripted
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.swim import Swim, swim
+from seastar_gym.gaits import PAIRS, pair_gait, straight_gait
+from seastar_gym.scene import Scene, SmaLimb, SmaPulse
+from seastar_gym.scene.actuators.actuator import Actuator
 from seastar_gym.scene.actuators.pulse import pulse
+from seastar_gym.scene.actuators.sma_limb import MEASURED
+from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.simulator import Simulator, SolverStatus
 from studies.frame import Results, Study
-from studies.measurements.curves import PHASES, Curve, read_curves
-from studies.measurements.fit import Fit, fit, predict
-from studies.measurements.model import MODELS
-from studies.measurements.pictures import HEATING_SHARE, draw
-from studies.measurements.swims import (
-    FIDELITY,
-    GAITS,
-    STROKES,
-    actuators,
-    distances,
-    policies,
-    round_the_pentagon,
-)
+from studies.measurements.curves import MODELS, PHASES, Curve, read_curves
+from studies.measurements.fit import AIM, HEATING_SHARE, Fit, draw, fit, predict
+from studies.pages import markdown, show
 
 CHOSEN = "delay"
 """The model of `SmaLimb`."""
-AIM = 0.04
 SHARE = 0.9
 """Share of held-out samples that intervals should hold."""
 FITTED = 4
@@ -105,17 +102,7 @@ def summary(figures: dict[str, Any]) -> list[str]:
     return cells
 
 
-def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """Table of texts."""
-    made = Table(title=escape(title))
-    for k, column in enumerate(columns):
-        made.add_column(escape(column), no_wrap=k == 0)
-    for row in rows:
-        made.add_row(*row)
-    return made
-
-
-def print_fits(console: Console, figures: dict[str, Any], curves: dict[int, list[Curve]]) -> None:
+def print_fits(figures: dict[str, Any], curves: dict[int, list[Curve]]) -> None:
     """Tables of the errors of fits and of predictions."""
     rows, predicted = [], []
     for (liquid_metal, one), of_one in zip(figures.items(), curves.values(), strict=True):
@@ -127,23 +114,74 @@ def print_fits(console: Console, figures: dict[str, Any], curves: dict[int, list
                 [f"{liquid_metal} %", name, ", ".join(f"{f:g}" for f in there["fitted_hz"]), f"{there['error']:.3f}",
                  f"{100 * there['coverage']:.0f} %", f"{there['half_width']:.3f}"]
             )  # fmt: skip
-    console.print(table("Root mean square error over the peak", ("material", "Hz", "fit", "ramp"), rows))
+    show(markdown(("material", "Hz", "fit", "ramp"), rows), "Root mean square error over the peak")
     columns = ("material", "held out", "fitted [Hz]", "error", f"within {100 * SHARE:.0f} %", "half width")
-    console.print(table("Predictions, over the peak", columns, predicted))
+    show(markdown(columns, predicted, (0, 1, 2)), "Predictions, over the peak")
 
 
-def study_swims(console: Console) -> dict[str, Any]:
+# How far the chapter's robot swims with measured limbs instead of the ramp of Fig. 13.5b
+
+
+FIDELITY: Fidelity = "accurate"
+STROKES = 20
+"""Strokes from rest, of which the second half is measured: limbs are as warm then as they get."""
+GAITS = {
+    **{name: command[None] for name, command in PAIRS.items()},
+    "{2+,5-}": straight_gait(),
+    "{2+,5-}, {3+,4-}": np.concatenate([straight_gait(), pair_gait(3, 4)]),
+}
+"""The pairs of Fig. 13.8, the straight swim, and the alternation of two pairs; commands of shape (n, n_limbs)."""
+MOST_STROKES = 400
+"""Strokes after which a swim round the pentagon ends."""
+
+
+def actuators() -> dict[str, Actuator]:
+    """The chapter's pulse and every measured limb, at its own period."""
+    limbs = {f"{liquid_metal} %": SmaLimb.preset(liquid_metal) for liquid_metal in MEASURED}
+    return {"pulse": SmaPulse(), **limbs}
+
+
+def distances(actuator: Actuator) -> NDArray[np.float64]:
+    """Distance of the hub per stroke [mm] of every gait, over the second half of the strokes from rest."""
+    simulator = Simulator(replace(Scene.preset(FIDELITY), actuator=actuator), len(GAITS))
+    commands = np.stack([np.resize(gait, (STROKES, gait.shape[1])) for gait in GAITS.values()], axis=1)
+    half = np.zeros((len(GAITS), 2))
+    for stroke, command in enumerate(commands):
+        if stroke == STROKES // 2:
+            half = simulator.hub_position().copy()
+        simulator.stroke(command)
+        if simulator.failed.any():
+            raise RuntimeError(SolverStatus.NOT_CONVERGED.sentence)
+    return np.asarray(1e3 * np.linalg.norm(simulator.hub_position() - half, axis=1) / (STROKES - STROKES // 2))
+
+
+def policies(period: float) -> dict[str, Policy]:
+    """The bundled policy of strokes, trained with the ramp, and the chapter's gait, for strokes so long [s]."""
+    trained = pretrained("strokes")
+    ramp = replace(trained.scene, actuator=SmaPulse(heating_time=0.1 * period, cooling_time=0.9 * period))
+    learned = LearnedPolicy(trained.description._replace(scene=ramp), trained.weights)
+    return {"learned": learned, "pentagon": scripted("pentagon")}
+
+
+def round_the_pentagon(name: str, policy: Policy, scene: Scene) -> Swim:
+    """Swim of a policy that does not see how warm limbs are, as with the ramp there is nothing to see."""
+    actions = actions_of(policy, scene.robot.n_limbs)
+    env = SeastarSwimEnv("pentagon", scene=scene, actions=actions, observe_actuators=False)
+    return swim(name, policy, env, max_strokes=MOST_STROKES)
+
+
+def study_swims() -> dict[str, Any]:
     """Distances per stroke with every actuator; prints them."""
     found = {name: (actuator.period, distances(actuator)) for name, actuator in actuators().items()}
     rows = [[name, f"{period:.3f}", *(f"{mm:.2f}" for mm in far)] for name, (period, far) in found.items()]
     title = f"Distance per stroke [mm], strokes {STROKES // 2 + 1} to {STROKES} from rest, {FIDELITY}"
-    console.print(table(title, ("limb", "period [s]", *GAITS), rows))
+    show(markdown(("limb", "period [s]", *GAITS), rows), title)
     return {
         name: {"period_s": period, "mm_per_stroke": np.round(far, 3).tolist()} for name, (period, far) in found.items()
     }
 
 
-def study_policies(console: Console) -> dict[str, Any]:
+def study_policies() -> dict[str, Any]:
     """Strokes of policies round the pentagon with every actuator, None where they do not arrive; prints them."""
     found: dict[str, Any] = {}
     for limb, actuator in actuators().items():
@@ -151,22 +189,22 @@ def study_policies(console: Console) -> dict[str, Any]:
         swims = [round_the_pentagon(name, policy, scene) for name, policy in policies(actuator.period).items()]
         found[limb] = {one.agent: one.strokes if one.finished else None for one in swims}
     rows = [[limb, *("-" if n is None else str(n) for n in strokes.values())] for limb, strokes in found.items()]
-    console.print(table(f"Strokes round the pentagon, {FIDELITY}", ("limb", "learned", "pentagon"), rows))
+    show(markdown(("limb", "learned", "pentagon"), rows), f"Strokes round the pentagon, {FIDELITY}")
     return found
 
 
 def run(results: Results) -> None:
     """Fit and predict, compare models and swim; prints tables."""
-    console, curves = Console(), read_curves()
+    curves = read_curves()
     _, figures = study_model(CHOSEN, curves)
-    print_fits(console, figures, curves)
+    print_fits(figures, curves)
     results.update(model=CHOSEN, fits=figures)
     all_models = {name: summary(study_model(name, curves)[1]) for name in MODELS}
     columns = ("model", f"curves below {AIM}", "error", "AIC", "between", "beyond")
-    console.print(table("Models", columns, [[name, *cells] for name, cells in all_models.items()]))
+    show(markdown(columns, [[name, *cells] for name, cells in all_models.items()]), "Models")
     results["models"] = {name: dict(zip(columns[1:], cells, strict=True)) for name, cells in all_models.items()}
-    results["gaits"], results["swims"] = list(GAITS), study_swims(console)
-    results["strokes_round_the_pentagon"] = study_policies(console)
+    results["gaits"], results["swims"] = list(GAITS), study_swims()
+    results["strokes_round_the_pentagon"] = study_policies()
 
 
 STUDY = Study(

@@ -8,27 +8,20 @@ other work of the machine affects all of them alike, and the median over strokes
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from seastar_gym import scene
 from seastar_gym.files import save_figure
-from seastar_gym.scene import Contact, Numerics, Scene, Seastar, Strip, Tube
-from seastar_gym.scene.actuators.limited import Limited
-from seastar_gym.scene.actuators.measured import MeasuredCurve
-from seastar_gym.scene.actuators.pulse import SmaPulse
-from seastar_gym.scene.actuators.thermal import ThermalSma
-from seastar_gym.scene.limb import Limb
+from seastar_gym.scene import Numerics, Scene, Strip
 from seastar_gym.scene.section import AnySection, Disc, Section
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study
 from studies.pages import markdown
 from studies.style import INK, subplots
-
-Floats = NDArray[np.float64]
 
 NUMERICS, NODES = Numerics.preset("balanced"), 10
 ROBOTS, ROUNDS, STROKES = 64, 9, 5
@@ -39,83 +32,55 @@ TURN, CORNERS = np.linspace(0.0, 2.0 * np.pi, 60), np.array([[-1.0, 1.0, 1.0, -1
 """Colour of cross sections, how much larger than the robot they are drawn, and how high [mm]; outlines."""
 
 
-@dataclass(frozen=True)
-class Exhibit:
+class Exhibit(NamedTuple):
     """A scene of the gallery.
 
-    code: Arguments that make the scene.
-    command: Command of every limb in every stroke of the picture.
+    code: Arguments that make the scene, as the page has them. command: Of every limb in every stroke of the picture.
+    whole: The arguments where the page leaves something out.
     """
 
     name: str
     code: str
-    scene: Scene
-    command: tuple[float, ...]
+    command: tuple[float, ...] = (0.0, 1.0, 0.0, 0.0, -1.0)
+    whole: str = ""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene, with the nodes and numerics of the gallery."""
+        made: Scene = eval(f"Scene({self.whole or self.code})", vars(scene))
+        return replace(made, robot=replace(made.robot, nodes_per_limb=NODES), numerics=NUMERICS)
 
 
-def exhibits() -> list[Exhibit]:
-    """Scenes of the gallery, the default first."""
-    curve = MeasuredCurve((0.0, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0), (0.0, 0.35, 0.6, 0.5, 0.25, 0.08, 0.0))
-    tapered = (Limb(radius=(2e-3, 1e-3)),) * 5
-    curved = (Limb(natural_curvature=10.0),) * 5
-    lengths = zip((0.0, 1.0, 2.2, 4.1, 5.3), (0.12, 0.08, 0.06, 0.06, 0.08), strict=True)
-    uneven = tuple(Limb(direction=angle, length=length) for angle, length in lengths)
-    straight = (0.0, 1.0, 0.0, 0.0, -1.0)
-
-    def five(**pieces: object) -> Scene:
-        scene = Scene(numerics=NUMERICS, **pieces)  # type: ignore[arg-type]
-        return replace(scene, robot=replace(scene.robot, nodes_per_limb=NODES))
-
-    def of_section(section: Strip | Tube) -> Scene:
-        return five(robot=Seastar(limbs=(Limb(section=section),) * 5))
-
-    return [
-        Exhibit("default", "Scene()", five(), straight),
-        Exhibit(
-            "one limb",
-            "Seastar(1, 10), actuator=SmaPulse(0.0), held_nodes=(0,), loads=((9, 0.0, -1e-3),)",
-            five(robot=Seastar(1, 10), actuator=SmaPulse(0.0), held_nodes=(0,), loads=((9, 0.0, -1e-3),)),
-            (0.0,),
-        ),
-        Exhibit(
-            "two limbs",
-            "Seastar(2)",
-            five(robot=Seastar(2)),
-            (1.0, -1.0),
-        ),
-        Exhibit(
-            "three limbs",
-            "Seastar(3), actuator=SmaPulse(0.4)",
-            five(robot=Seastar(3), actuator=SmaPulse(0.4)),
-            (0.0, 1.0, -1.0),
-        ),
-        Exhibit("eight limbs", "Seastar(8)", five(robot=Seastar(8)), (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0)),
-        Exhibit(
-            "twelve limbs",
-            "Seastar(12), actuator=SmaPulse(0.25)",
-            five(robot=Seastar(12), actuator=SmaPulse(0.25)),
-            (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, -1.0, 0.0),
-        ),
-        Exhibit("tapered limbs", "Seastar(limbs=(Limb(radius=(2e-3, 1e-3)),) * 5)",
-                five(robot=Seastar(limbs=tapered)), straight),
-        Exhibit("strips", "Seastar(limbs=(Limb(section=Strip(width=3e-3, height=8e-3)),) * 5)",
-                of_section(Strip(width=3e-3, height=8e-3)), straight),
-        Exhibit("tubes", "Seastar(limbs=(Limb(section=Tube(outer=3e-3, inner=2e-3)),) * 5)",
-                of_section(Tube(outer=3e-3, inner=2e-3)), straight),
-        Exhibit("a profile", "Seastar(limbs=(Limb(section=Strip(width=(4e-3, 2e-3), height=(4e-3, 12e-3))),) * 5)",
-                of_section(Strip(width=(4e-3, 2e-3), height=(4e-3, 12e-3))), straight),
-        Exhibit("curved limbs", "Seastar(limbs=(Limb(natural_curvature=10.0),) * 5)",
-                five(robot=Seastar(limbs=curved)), straight),
-        Exhibit("uneven limbs", "Seastar(limbs=(Limb(0.0, 0.12), Limb(1.0, 0.08), ..)), actuator=SmaPulse(0.4)",
-                five(robot=Seastar(limbs=uneven), actuator=SmaPulse(0.4)), straight),
-        Exhibit("measured curve", 'actuator=MeasuredCurve.from_csv("curve.csv")', five(actuator=curve), straight),
-        Exhibit("limited rate", "actuator=Limited(SmaPulse(), largest_rate=2.0)",
-                five(actuator=Limited(SmaPulse(), largest_rate=2.0)), straight),
-        Exhibit("thermal", "actuator=ThermalSma()", five(actuator=ThermalSma()), straight),
-        Exhibit("weak limb", "limb_strengths=(1.0, 1.0, 1.0, 1.0, 0.3)",
-                five(limb_strengths=(1.0, 1.0, 1.0, 1.0, 0.3)), straight),
-        Exhibit("contact", "contact=Contact()", five(contact=Contact()), (1.0, -1.0, 0.0, 0.0, 0.0)),
-    ]  # fmt: skip
+CURVE = "actuator=MeasuredCurve((0.0, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0), (0.0, 0.35, 0.6, 0.5, 0.25, 0.08, 0.0))"
+UNEVEN = (
+    "Seastar(limbs=(Limb(0.0, 0.12), Limb(1.0, 0.08), Limb(2.2, 0.06), Limb(4.1, 0.06), Limb(5.3, 0.08))), "
+    "actuator=SmaPulse(0.4)"
+)
+EXHIBITS = (
+    Exhibit("default", ""),
+    Exhibit("one limb", "Seastar(1, 10), actuator=SmaPulse(0.0), held_nodes=(0,), loads=((9, 0.0, -1e-3),)", (0.0,)),
+    Exhibit("two limbs", "Seastar(2)", (1.0, -1.0)),
+    Exhibit("three limbs", "Seastar(3), actuator=SmaPulse(0.4)", (0.0, 1.0, -1.0)),
+    Exhibit("eight limbs", "Seastar(8)", (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0)),
+    Exhibit(
+        "twelve limbs", "Seastar(12), actuator=SmaPulse(0.25)",
+        (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, -1.0, 0.0),
+    ),
+    Exhibit("tapered limbs", "Seastar(limbs=(Limb(radius=(2e-3, 1e-3)),) * 5)"),
+    Exhibit("strips", "Seastar(limbs=(Limb(section=Strip(width=3e-3, height=8e-3)),) * 5)"),
+    Exhibit("tubes", "Seastar(limbs=(Limb(section=Tube(outer=3e-3, inner=2e-3)),) * 5)"),
+    Exhibit("a profile", "Seastar(limbs=(Limb(section=Strip(width=(4e-3, 2e-3), height=(4e-3, 12e-3))),) * 5)"),
+    Exhibit("curved limbs", "Seastar(limbs=(Limb(natural_curvature=10.0),) * 5)"),
+    Exhibit(
+        "uneven limbs", "Seastar(limbs=(Limb(0.0, 0.12), Limb(1.0, 0.08), ..)), actuator=SmaPulse(0.4)", whole=UNEVEN
+    ),
+    Exhibit("measured curve", 'actuator=MeasuredCurve.from_csv("curve.csv")', whole=CURVE),
+    Exhibit("limited rate", "actuator=Limited(SmaPulse(), largest_rate=2.0)"),
+    Exhibit("thermal", "actuator=ThermalSma()"),
+    Exhibit("weak limb", "limb_strengths=(1.0, 1.0, 1.0, 1.0, 0.3)"),
+    Exhibit("contact", "contact=Contact()", (1.0, -1.0, 0.0, 0.0, 0.0)),
+)  # fmt: skip
+"""Scenes of the gallery, the default first."""
 
 
 def measure_costs(shown: Sequence[Exhibit], rounds: int = ROUNDS, n_robots: int = ROBOTS) -> tuple[Floats, Floats]:
@@ -186,9 +151,9 @@ def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
 def table(results: Mapping[str, Any]) -> str:
     """Table of scenes in Markdown: pictures, code and costs."""
     rows = []
-    for exhibit in exhibits():
+    for exhibit in EXHIBITS:
         picture, cost = f"![{exhibit.name}](gallery/{_file_name(exhibit)})", results["scenes"][exhibit.name]["cost"]
-        rows.append([picture, f"**{exhibit.name}**<br>`{exhibit.code}`", f"{cost:.2f}"])
+        rows.append([picture, f"**{exhibit.name}**<br>`{exhibit.code or 'Scene()'}`", f"{cost:.2f}"])
     return markdown(["", "scene", "cost"], rows, (0, 1))
 
 
@@ -199,14 +164,13 @@ def _file_name(exhibit: Exhibit) -> str:
 def draw_all(out: Path, strokes: int = STROKES) -> None:
     """Write the pictures into a folder."""
     out.mkdir(parents=True, exist_ok=True)
-    for exhibit in exhibits():
+    for exhibit in EXHIBITS:
         draw(exhibit, out / _file_name(exhibit), strokes)
 
 
 def measured(rounds: int = ROUNDS, n_robots: int = ROBOTS) -> dict[str, Any]:
     """Costs of all scenes as plain data."""
-    shown = exhibits()
-    found = zip(shown, *measure_costs(shown, rounds, n_robots), strict=True)
+    found = zip(EXHIBITS, *measure_costs(EXHIBITS, rounds, n_robots), strict=True)
     scenes = {one.name: {"cost": round(cost, 3), "iterations_per_step": round(each, 3)} for one, cost, each in found}
     return {"scenes": scenes}
 

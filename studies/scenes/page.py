@@ -25,9 +25,7 @@ from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study
-
-Floats = NDArray[np.float64]
+from studies.frame import Floats, Results, Study
 
 TEMPLATE = Path(__file__).with_name("page.html")
 UNIT = 1e-4

@@ -12,16 +12,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from seastar_gym.files import save_figure
 from seastar_gym.scene.actuators.pulse import SmaPulse
 from seastar_gym.scene.actuators.thermal import ThermalSma
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study
 from studies.style import subplots
-
-Floats = NDArray[np.float64]
 
 TIMES = np.linspace(0.0, 1.0, 501)
 """Times of the samples in a stroke [s]."""
@@ -95,8 +92,7 @@ def draw(actuator: ThermalSma, file: Path) -> None:
 def run(results: Results) -> None:
     """Print the fit and the defaults, and draw the default actuator."""
     print(describe("fitted", fit()), describe("default", ThermalSma()), sep="\n")
-    results.out.mkdir(parents=True, exist_ok=True)
-    draw(ThermalSma(), results.out / "thermal.png")
+    draw(ThermalSma(), results.folder / "thermal.png")
 
 
 STUDY = Study("scenes.thermal", run, out=Path("runs/thermal"))

@@ -13,9 +13,8 @@ import gymnasium as gym
 import numpy as np
 
 import seastar_gym  # noqa: F401, registers the ids
-from studies.frame import Results, Study
+from studies.frame import Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 
 DECISIONS, ROUNDS = 256, 15
 """Decisions of a round, at least, and rounds, of which the median counts."""

@@ -24,12 +24,11 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study
+from studies.frame import Results, Study, rounded
 from studies.pages import markdown
 from studies.provenance import provenance
-from studies.results_file import rounded
 from studies.speed import terms
-from studies.speed.peak import fused_products
+from studies.speed.kernels import fused_products
 from studies.speed.process import FIRST_STROKE, TIMED, process_seconds, step_of_one
 from studies.style import CYCLE, subplots
 

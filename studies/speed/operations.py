@@ -5,7 +5,6 @@ one robot of any scene. It does not depend on the machine, and tests bound it.
 """
 
 from collections import Counter
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -52,18 +51,6 @@ class Constant(Counted):
     __slots__ = ()
 
 
-def _counting_kernels(folder: Path) -> PlainKernels:
-    """Kernels in plain Python on one counting lane; folder: Folder of their source."""
-    return PlainKernels(
-        n_lanes=1,
-        folder=folder,
-        load=_load,
-        store=_store,
-        load_at=lambda rows, row: Counted(numpy_lanes.load_at(rows, row).numbers),
-        splat=Constant,
-    )
-
-
 def _load(rows: Any, row: int) -> Counted:
     _counts["load"] += rows.ndim > 1
     return Counted(numpy_lanes.load(rows, row).numbers)
@@ -75,14 +62,17 @@ def _store(rows: Any, row: int, value: Any) -> None:
 
 
 @np.errstate(all="ignore")
-def count_operations(scene: Scene, folder: Path = FOLDER) -> dict[str, Counter[str]]:
-    """Operations of one robot in the middle of a heating ramp, by part; folder: Folder of the kernels' source.
+def count_operations(scene: Scene) -> dict[str, Counter[str]]:
+    """Operations of one robot in the middle of a heating ramp, by part.
 
     The parts of an iteration are "hub hinges", "limbs" (assembly and elimination), "ring" (elimination and solution for
     the root nodes and the hub) and "substitution" (with the Newton step); "iteration" is their sum. "step" counts the
     operations of a time step outside iterations, for schemes with one stage.
     """
-    counting = _counting_kernels(folder)
+    counting = PlainKernels(
+        n_lanes=1, folder=FOLDER, load=_load, store=_store, splat=Constant,
+        load_at=lambda rows, row: Counted(numpy_lanes.load_at(rows, row).numbers),
+    )  # fmt: skip
     work, rods, scheme, actuation, state, a = _moving_robot(scene, counting)
     h = Counted(scene.numerics.step)
     parts: dict[str, Counter[str]] = {}

@@ -16,16 +16,10 @@ NODES_PER_LIMB = (5, 10, 20, 40, 80, 160, 320, 640)
 """Nodes per limb on the curve of cost."""
 
 
-def stroke_durations(scene: Scene, n_robots: int, threads: int, seconds: float) -> list[float]:
-    """Durations of strokes of the straight swim [s], by a batch of robots."""
-    simulator = Simulator(scene, n_robots, threads)
-    commands = np.tile(STRAIGHT, (n_robots, 1))
-    return repeat(lambda: simulator.stroke(commands), seconds)
-
-
 def real_time_factors(scene: Scene, n_robots: int, threads: int, seconds: float) -> list[float]:
     """Real-time factors of a batch in the straight swim: simulated over computing time."""
-    return [n_robots * scene.actuator.period / d for d in stroke_durations(scene, n_robots, threads, seconds)]
+    simulator, commands = Simulator(scene, n_robots, threads), np.tile(STRAIGHT, (n_robots, 1))
+    return [n_robots * scene.actuator.period / d for d in repeat(lambda: simulator.stroke(commands), seconds)]
 
 
 def threads_speedup(scene: Scene, n_robots: int, seconds: float) -> list[float]:
@@ -69,12 +63,14 @@ def iteration_seconds(scene: Scene, seconds: float) -> list[float]:
 # Timing of repeated runs on this machine.
 
 
-def repeat(run: Callable[[], object], seconds: float, at_least: int = 5) -> list[float]:
+def repeat(
+    run: Callable[[], object], seconds: float, at_least: int = 5, clock: Callable[[], float] = time.perf_counter
+) -> list[float]:
     """Durations of repeated runs [s], after a first run that does not count, for about `seconds` [s]."""
     run()
     durations: list[float] = []
     while len(durations) < at_least or sum(durations) < seconds:
-        start = time.perf_counter()
+        start = clock()
         run()
-        durations.append(time.perf_counter() - start)
+        durations.append(clock() - start)
     return durations

@@ -32,6 +32,7 @@ from studies.pages import markdown
 require_extra("Sweeps", "sweep", "pyarrow")
 
 LENGTHS = Range("robot.limb_length", 0.05, 0.15)
+WARM = 2
 
 
 def nothing(cell: Batch) -> bytes:
@@ -52,12 +53,12 @@ def timed(cell: Batch) -> bytes:
     return str(time.process_time() - begin).encode()
 
 
-def overhead(sweep: Sweep, executor: Executor, warm: int = 2) -> float:
-    """Processor time of this process for a cell that simulates nothing [s]. warm: Cells that do not count."""
+def overhead(sweep: Sweep, executor: Executor) -> float:
+    """Processor time of this process for a cell that simulates nothing [s]; the first WARM do not count."""
     ends: list[float] = []
     with tempfile.TemporaryDirectory() as folder:
         run(sweep.batches(), folder, executor, lambda tally: ends.append(time.process_time()), nothing)
-    return (ends[-1] - ends[warm - 1]) / (len(ends) - warm)
+    return (ends[-1] - ends[WARM - 1]) / (len(ends) - WARM)
 
 
 def seconds_per_cell(sweep: Sweep, executor: Executor) -> float:

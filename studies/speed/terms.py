@@ -5,14 +5,11 @@ two limbs together. Each stroke is compared with the chapter's scene in the same
 machine affects both alike. Prints a table, and writes `terms.csv`.
 """
 
-import csv
 import time
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import AlongLimb, Body, Contact, Limb, Numerics, Scene, Seastar, Stiffening, relaxation_time
@@ -20,7 +17,8 @@ from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent
 from seastar_gym.scene.fluid import Water
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study
+from studies.frame import Results, Study, write_rows
+from studies.pages import markdown, show
 
 PRESSING = np.array([1.0, -1.0, 0.0, 0.0, 0.0])
 """Command that presses limbs 1 and 2 together."""
@@ -71,10 +69,14 @@ def scenes() -> dict[str, Scene]:
         "all of these": Scene(replace(damped, youngs_modulus=np.full(n_robots, 1e6)), everything),
         "all, a body, bent along, contact": Scene(
             replace(
-                damped, youngs_modulus=np.full(n_robots, 1e6), along=AlongLimb(), stiffening=Stiffening(),
+                damped,
+                youngs_modulus=np.full(n_robots, 1e6),
+                along=AlongLimb(),
+                stiffening=Stiffening(),
                 body=Body.rectangle(0.06, 0.03),
             ),
-            everything, contact=Contact(),
+            everything,
+            contact=Contact(),
         ),
     }
     return {name: in_ten_nodes(scene) for name, scene in found.items()}
@@ -136,18 +138,15 @@ def measure(compared: dict[str, Scene], rounds: int, command: np.ndarray = STRAI
     return costs
 
 
-def as_table(costs: list[Cost]) -> Table:
-    """Costs as a table for the terminal."""
-    table = Table(title="Cost of terms, implicit Euler at 3 ms, one core")
-    for header in ("scene", "iterations per step", "µs per robot and iteration", "time per iteration", "per stroke"):
-        table.add_column(header, justify="left" if header == "scene" else "right")
-    for cost in costs:
-        low, high = cost.quartiles
-        table.add_row(
-            cost.name, f"{cost.iterations:.2f}", f"{1e6 * cost.seconds:.3f}",
-            f"x {cost.per_iteration:.2f} ({low:.2f} to {high:.2f})", f"x {cost.per_stroke:.2f}",
-        )  # fmt: skip
-    return table
+def as_table(costs: list[Cost]) -> str:
+    """Costs as a table in Markdown."""
+    rows = [
+        [cost.name, f"{cost.iterations:.2f}", f"{1e6 * cost.seconds:.3f}",
+         "x {:.2f} ({:.2f} to {:.2f})".format(cost.per_iteration, *cost.quartiles), f"x {cost.per_stroke:.2f}"]
+        for cost in costs
+    ]  # fmt: skip
+    head = ["scene", "iterations per step", "µs per robot and iteration", "time per iteration", "per stroke"]
+    return markdown(head, rows)
 
 
 def run(results: Results) -> None:
@@ -156,14 +155,10 @@ def run(results: Results) -> None:
     touching = {THE_CHAPTERS: Scene(), "contact, a pair of limbs pressed together": Scene(contact=Contact())}
     touching = {name: in_ten_nodes(scene) for name, scene in touching.items()}
     costs += measure(touching, ROUNDS, PRESSING)[1:]
-    Console().print(as_table(costs))
-    results.out.mkdir(parents=True, exist_ok=True)
-    rows = [{**asdict(cost), "low": cost.quartiles[0], "high": cost.quartiles[1]} for cost in costs]
+    show(as_table(costs), "Cost of terms, implicit Euler at 3 ms, one core")
+    rows = ([c.name, c.iterations, c.seconds, c.per_iteration, *c.quartiles, c.per_stroke] for c in costs)
     names = ["name", "iterations", "seconds", "per_iteration", "low", "high", "per_stroke"]
-    with (results.out / "terms.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, names, extrasaction="ignore")
-        writer.writeheader()
-        writer.writerows(rows)
+    write_rows(results.out / "terms.csv", names, rows)
 
 
 STUDY = Study("speed.terms", run, out=Path("runs/terms"))

@@ -5,24 +5,21 @@ and `throughput.png`. The real-time factor is the simulated time of all robots o
 medians of several repeats after a warm-up; beside them stands the range of the middle half of the repeats.
 """
 
-import csv
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
-from rich.table import Table
 from tqdm import tqdm
 
 from seastar_gym.accuracy.measure import machine
 from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar
-from studies.frame import Results, Study
+from studies.frame import Results, Study, write_rows
+from studies.pages import markdown, show
+from studies.speed.kernels import part_seconds, peak_gigaflops, peak_speedup
 from studies.speed.operations import count_operations, flops
-from studies.speed.parts import part_seconds
-from studies.speed.peak import peak_gigaflops, peak_speedup
 from studies.speed.process import (
     FIRST_SCENES,
     IMPORT,
@@ -73,7 +70,7 @@ def start_up_figures() -> list[Figure]:
     ]
 
 
-def measure(seconds: float = 1.0, progress: bool = True) -> tuple[list[Figure], dict[str, list[tuple[int, float]]]]:
+def measure(seconds: float = 1.0) -> tuple[list[Figure], dict[str, list[tuple[int, float]]]]:
     """Rows of the table, and the curves of the picture: real-time factor over batch size, and cost over N."""
     chapter = Scene(Seastar(nodes_per_limb=10), numerics=Numerics.preset("chapter"))
     steps = {
@@ -93,7 +90,7 @@ def measure(seconds: float = 1.0, progress: bool = True) -> tuple[list[Figure], 
     }
     figures: list[Figure] = []
     curves: dict[str, list[tuple[int, float]]] = {}
-    bar = tqdm(total=len(steps) + 2, disable=not progress, unit="measurement")
+    bar = tqdm(total=len(steps) + 2, unit="measurement")
     for name, step in steps.items():
         bar.set_description(name)
         figures += step()
@@ -150,27 +147,22 @@ def memory_figures(scene: Scene) -> list[Figure]:
     ]
 
 
-def as_table(figures: list[Figure]) -> Table:
-    """Figures as a table for the terminal."""
-    table = Table(title=f"Implicit Euler, h = 3 ms, N = 10 ({machine()}); the chapter: {CHAPTER:g} x real time")
-    for column, justify in (("what", "left"), ("median", "right"), ("unit", "left"), ("middle half", "right")):
-        table.add_column(column, justify=justify)  # type: ignore[arg-type]
+def as_table(figures: list[Figure]) -> str:
+    """Figures as a table in Markdown."""
+    rows = []
     for figure in figures:
         spread = "" if figure.quartiles is None else f"{figure.quartiles[0]:,.3g} .. {figure.quartiles[1]:,.3g}"
-        table.add_row(figure.what, f"{figure.value:,.4g}", figure.unit, spread)
-    return table
+        rows.append([figure.what, f"{figure.value:,.4g}", figure.unit, spread])
+    return markdown(["what", "median", "unit", "middle half"], rows, (0, 2))
 
 
 def write_csv(figures: list[Figure], curves: dict[str, list[tuple[int, float]]], path: Path) -> None:
     """Write figures and curves as CSV."""
-    with path.open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(["what", "x", "value", "unit", "quartile_1", "quartile_3"])
-        for figure in figures:
-            writer.writerow([figure.what, "", figure.value, figure.unit, *(figure.quartiles or ("", ""))])
-        for name, rows in curves.items():
-            unit = "us" if name.startswith("us") else "x real time"
-            writer.writerows([name, x, value, unit, "", ""] for x, value in rows)
+    rows = [[figure.what, "", figure.value, figure.unit, *(figure.quartiles or ("", ""))] for figure in figures]
+    for name, curve in curves.items():
+        unit = "us" if name.startswith("us") else "x real time"
+        rows += [[name, x, value, unit, "", ""] for x, value in curve]
+    write_rows(path, ["what", "x", "value", "unit", "quartile_1", "quartile_3"], rows)
 
 
 def draw(curves: dict[str, list[tuple[int, float]]], path: Path) -> None:
@@ -197,10 +189,10 @@ def draw(curves: dict[str, list[tuple[int, float]]], path: Path) -> None:
 def run(results: Results) -> None:
     """Measure, write the files and print the table."""
     figures, curves = measure()
-    results.out.mkdir(parents=True, exist_ok=True)
     write_csv(figures, curves, results.out / "throughput.csv")
     draw(curves, results.out / "throughput.png")
-    Console().print(as_table(figures))
+    title = f"Implicit Euler, h = 3 ms, N = 10 ({machine()}); the chapter: {CHAPTER:g} x real time"
+    show(as_table(figures), title)
     print(f"Written: {results.out / 'throughput.csv'}, {results.out / 'throughput.png'}")
 
 

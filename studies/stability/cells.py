@@ -12,16 +12,14 @@ import time
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.scene import Numerics, Scene, SmaPulse, Water
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simulator import Simulator, State, StrokeReport
 from seastar_gym.simulator.pauses import completed
 from seastar_gym.simulator.schedule import step_times
+from studies.frame import Floats
 from studies.stability.cases import Case, Sweep
-
-Floats = NDArray[np.float64]
 
 MOST_STEPS = 2000
 """Largest number of time steps of a stroke."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.files import save_figure
 from studies.chapter import ISSUES_FROM
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from studies.stability.cells import Cell
-
-Floats = NDArray[np.float64]
 
 MARK, EMPTY = "#d62728", "#eceff3"
 NEEDS = ("plain Newton", "regularised matrix or line search", "substeps", "failed")
@@ -37,40 +34,58 @@ FRAME: dict[str, Any] = {"fill": False, "edgecolor": INK, "linewidth": 1.4}
 DASHES: dict[str, Any] = {"color": MARK, "linewidth": 1.6, "linestyle": (0, (4, 2))}
 
 
+class Numbers(NamedTuple):
+    """A positive number of every cell, drawn on a logarithmic scale.
+
+    colours: Name of a map. limits: Ends of the scale. tick: Format. missing: Legend of cells that have none.
+    """
+
+    title: str
+    label: str
+    of: Callable[[Cell], float]
+    colours: str
+    limits: tuple[float, float]
+    tick: str
+    missing: str = ""
+
+
+NUMBERS = {
+    "iterations": Numbers(
+        "Newton iterations per time step", "Newton iterations per time step", lambda cell: cell.iterations,
+        "viridis_r", (1.0, 300.0), "{:g}",
+    ),
+    "error": Numbers(
+        "error of the hub's path against the converged run", "error of the hub's path",
+        lambda cell: 100.0 * cell.error, "magma_r", (0.01, 100.0), "{:g} %", "no converged run",
+    ),
+}  # fmt: skip
+"""What pictures show beside the needs of the solver, by the ends of their names."""
+
+
 def draw(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], scheme: str, file: Path) -> None:
     """Write the picture that a file's name ends with, such as stability_needs.png."""
-    DRAWN[file.stem.rpartition("_")[2]](cells, sweeps, steps, NAMES[scheme], file)
+    numbers = NUMBERS.get(file.stem.rpartition("_")[2])
+    title = f"{NAMES[scheme]}: {'needs of the solver' if numbers is None else numbers.title}"
+    figure, panels, foot = _panels(sweeps, title)
+    if numbers is None:
+        _draw_needs(panels, foot, cells, sweeps, steps)
+    else:
+        _draw_numbers(panels, foot, cells, sweeps, steps, numbers)
+    save_figure(figure, file)
 
 
-def _draw_iterations(
-    cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], name: str, file: Path
+def _draw_needs(
+    panels: list[Axes], foot: Axes, cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float]
 ) -> None:
-    _draw_numbers(
-        cells, sweeps, steps, f"{name}: Newton iterations per time step", file,
-        lambda cell: cell.iterations, "viridis_r", (1.0, 300.0), "{:g}", "Newton iterations per time step",
-    )  # fmt: skip
-
-
-def _draw_error(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], name: str, file: Path) -> None:
-    _draw_numbers(
-        cells, sweeps, steps, f"{name}: error of the hub's path against the converged run", file,
-        lambda cell: 100.0 * cell.error, "magma_r", (0.01, 100.0), "{:g} %",
-        "error of the hub's path", "no converged run",
-    )  # fmt: skip
-
-
-def _draw_needs(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], name: str, file: Path) -> None:
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    figure, panels, foot = _panels(sweeps, f"{name}: needs of the solver")
     for axes, sweep in zip(panels, sweeps, strict=True):
         grid = _grid(cells, sweep, steps, _need)
         axes.pcolormesh(grid, cmap=ListedColormap(NEED_COLOURS), vmin=-0.5, vmax=3.5, edgecolors="white", linewidth=0.5)
         _finish(axes, cells, sweep, steps)
     patches = [Patch(color=colour, label=need) for colour, need in zip(NEED_COLOURS, NEEDS, strict=True)]
     _legend(foot, [*patches, _refused_patch()])
-    save_figure(figure, file)
 
 
 def _need(cell: Cell) -> float:
@@ -81,35 +96,25 @@ def _need(cell: Cell) -> float:
 
 
 def _draw_numbers(
-    cells: Sequence[Cell],
-    sweeps: Sequence[Sweep],
-    steps: Sequence[float],
-    title: str,
-    file: Path,
-    number: Callable[[Cell], float],
-    colours: str,
-    limits: tuple[float, float],
-    tick: str,
-    label: str,
-    missing: str = "",
-) -> None:
-    """Draw maps of a positive number on a logarithmic scale; missing: legend of empty cells that were not refused."""
+    panels: list[Axes], foot: Axes, cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float],
+    numbers: Numbers,
+) -> None:  # fmt: skip
     from matplotlib.colors import LogNorm
     from matplotlib.patches import Patch
 
-    figure, panels, foot = _panels(sweeps, title)
+    low, high = numbers.limits
     for axes, sweep in zip(panels, sweeps, strict=True):
-        grid = np.clip(_grid(cells, sweep, steps, number), *limits)
-        image = axes.pcolormesh(grid, cmap=colours, norm=LogNorm(*limits), edgecolors="white", linewidth=0.5)
+        grid = np.clip(_grid(cells, sweep, steps, numbers.of), low, high)
+        image = axes.pcolormesh(grid, cmap=numbers.colours, norm=LogNorm(low, high), edgecolors="white", linewidth=0.5)
         _finish(axes, cells, sweep, steps)
-    bar = figure.colorbar(image, cax=foot.inset_axes((0.0, 0.55, 0.5, 0.3)), orientation="horizontal", extend="both")
-    ticks = [10.0**k for k in range(round(math.log10(limits[0])), math.floor(math.log10(limits[1])) + 1)]
-    bar.set_ticks(ticks, labels=[tick.format(value) for value in ticks])
-    bar.set_label(label)
+    place = foot.inset_axes((0.0, 0.55, 0.5, 0.3))
+    bar = foot.figure.colorbar(image, cax=place, orientation="horizontal", extend="both")
+    ticks = [10.0**k for k in range(round(math.log10(low)), math.floor(math.log10(high)) + 1)]
+    bar.set_ticks(ticks, labels=[numbers.tick.format(value) for value in ticks])
+    bar.set_label(numbers.label)
     bar.ax.minorticks_off()
-    patches = [Patch(facecolor=EMPTY, label=missing)] if missing else []
+    patches = [Patch(facecolor=EMPTY, label=numbers.missing)] if numbers.missing else []
     _legend(foot, [*patches, _refused_patch()], 0.56)
-    save_figure(figure, file)
 
 
 def _panels(sweeps: Sequence[Sweep], title: str) -> tuple[Figure, list[Axes], Axes]:
@@ -187,7 +192,3 @@ def _legend(foot: Axes, patches: list[Any], left: float = 0.0) -> None:
         handles=[*patches, *marks], loc="upper left", bbox_to_anchor=(left, 1.0), ncols=4 if left == 0.0 else 2,
         fontsize=9, borderaxespad=0.0,
     )  # fmt: skip
-
-
-DRAWN = {"needs": _draw_needs, "iterations": _draw_iterations, "error": _draw_error}
-"""Pictures of the atlas, by the end of their names."""

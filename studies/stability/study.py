@@ -6,7 +6,6 @@ writes all cells as CSV, what pictures and summary show of them as JSON, and thr
 converge, Newton iterations per step, and the error of the hub's path.
 """
 
-import csv
 import itertools
 import math
 import os
@@ -18,20 +17,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from rich.console import Console
 from tqdm import tqdm
 
 from seastar_gym.scene.numerics import SchemeName
 from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
-from studies.frame import Results, Study
+from studies.frame import Results, Study, rounded, write_rows
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.stability.cases import STEPS, SWEEPS, Sweep, format_value
 from studies.stability.cells import Cell, commands_of, converged_displacements, run_cell, stroke_duration
 from studies.stability.pictures import draw as draw_cells
-
-Floats = NDArray[np.float64]
 
 GROWTH_ROUNDING = 1e-11
 """Relative growth of the energy in a step that is attributed to rounding."""
@@ -41,12 +35,11 @@ def atlas(
     sweeps: Sequence[Sweep] = SWEEPS,
     steps: Sequence[float] = STEPS,
     scheme: SchemeName = "implicit-euler",
-    progress: bool = True,
     workers: int | None = None,
 ) -> list[Cell]:
     """Measure all cells of the atlas; returns them in the order of sweeps, values and steps."""
     columns = [(sweep, value) for sweep in sweeps for value in sweep.values]
-    bar = tqdm(total=len(columns) * len(steps), unit="cell", smoothing=0.02, disable=not progress)
+    bar = tqdm(total=len(columns) * len(steps), unit="cell", smoothing=0.02)
 
     def column(sweep: Sweep, value: float | None) -> list[Cell]:
         """Cells of one value at all steps; steps with strokes of the same duration share their converged run."""
@@ -144,11 +137,8 @@ def from_data(results: Mapping[str, Any]) -> list[Cell]:
 def write_csv(cells: Iterable[Cell], file: Path) -> None:
     """Write one line per cell; columns as in `Cell`, in SI units except for the values of sweeps."""
     names = [one.name for one in fields(Cell)]
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(names)
-        for cell in cells:
-            writer.writerow(["vacuum" if n == "value" and cell.value is None else getattr(cell, n) for n in names])
+    rows = (["vacuum" if n == "value" and cell.value is None else getattr(cell, n) for n in names] for cell in cells)
+    write_rows(file, names, rows)
 
 
 @dataclass(frozen=True)
@@ -163,10 +153,9 @@ def run(options: Options, results: Results) -> None:
     """Run the atlas."""
     start = time.perf_counter()
     cells = atlas(SWEEPS, STEPS, options.scheme)
-    results.out.mkdir(parents=True, exist_ok=True)
     write_csv(cells, results.out / "stability.csv")
     results.update(as_data(cells, options.scheme))
-    Console().print(f"{time.perf_counter() - start:.0f} s. Written, too: {results.out / 'stability.csv'}")
+    print(f"{time.perf_counter() - start:.0f} s. Written, too: {results.out / 'stability.csv'}")
 
 
 def sweeps_of(cells: Sequence[Cell]) -> list[Sweep]:

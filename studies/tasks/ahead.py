@@ -11,18 +11,21 @@ from seastar_gym.controllers.planner import Branching, state_of
 from seastar_gym.envs.commands import unless_strokes
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.simulator import State
+from studies.frame import Floats
 
-Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
 COASTING = 0.5
 """Time for which robots in time swim on before they are compared [s], see `seastar_gym.controllers.planner.Budget`."""
+SPEED_IN_STROKES, SPEED_IN_TIME = 0.0043, 0.0075
+"""Speed at which a robot swims any way [m/s]."""
 
 
 class Robots:
     """The robots of a batch, as their controllers know them.
 
-    table: Commands of all actions, shape (n_actions, n_limbs). period: Time between decisions [s].
+    table: Commands of all actions, shape (n_actions, n_limbs). period: Time between decisions [s]. speed: At which they
+    swim any way [m/s].
     """
 
     def __init__(self, batch: Any):
@@ -30,6 +33,7 @@ class Robots:
         self.inner, self.scene, self.n = inner, inner.scene, inner.num_envs
         self.table, self.period = inner.command_table, inner.decision_period
         self.in_strokes = unless_strokes(self.period, self.scene) is None
+        self.speed = SPEED_IN_STROKES if self.in_strokes else SPEED_IN_TIME
         self._numbers = {command.tobytes(): k for k, command in enumerate(self.table + 0.0)}
         self._layout = inner.layout
 

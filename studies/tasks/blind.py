@@ -13,9 +13,9 @@ from seastar_gym.envs.stations import body_heading
 from seastar_gym.envs.tasks.fail_blind import MOST_DEAD
 from seastar_gym.evaluation.rollout import Info
 from seastar_gym.simulator import Simulator, State
+from studies.frame import Floats
 from studies.tasks.ahead import Ahead, Robots
-from studies.tasks.greedy import Actions, Floats, Floats32, route
-from studies.tasks.hypotheses import Guess
+from studies.tasks.greedy import Actions, Floats32, Guess, route
 
 
 def ends_in_world(robots: Robots, observations: Floats32, state: State) -> tuple[Floats, Floats]:
@@ -47,12 +47,10 @@ class BlindPlanner:
         return self._robots.actions_of(commands)
 
 
-class FailureGuess(Guess):
+def failure_guess(robots: Robots) -> Guess:
     """Agent that believes in the dead limbs that have explained its displacements and turns best."""
-
-    def __init__(self, robots: Robots):
-        every = np.array(list(itertools.product((1.0, 0.0), repeat=robots.scene.robot.n_limbs)))
-        super().__init__(robots, every[(every == 0.0).sum(axis=1) <= MOST_DEAD])
+    every = np.array(list(itertools.product((1.0, 0.0), repeat=robots.scene.robot.n_limbs)))
+    return Guess(robots, every[(every == 0.0).sum(axis=1) <= MOST_DEAD])
 
 
 class LimbsKnown:

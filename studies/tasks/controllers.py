@@ -31,11 +31,11 @@ from seastar_gym.envs.tasks.sim_to_real import SimToReal
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.evaluation.rollout import Batch, Info
 from seastar_gym.simulator import State
+from studies.frame import Floats
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
-from studies.tasks.blind import BlindPlanner, FailureGuess, LimbsKnown, StateKnown
+from studies.tasks.blind import BlindPlanner, LimbsKnown, StateKnown, failure_guess
 from studies.tasks.episodes import Agent
-from studies.tasks.greedy import Actions, Floats, Floats32, Greedy, GreedyOnRoute, length, route
-from studies.tasks.hypotheses import Guess
+from studies.tasks.greedy import Actions, Floats32, Greedy, GreedyOnRoute, Guess, length, route
 from studies.tasks.rounds import BestRound, MostPerMetre, PlannedMostPerMetre
 from studies.tasks.trap import ClearGreedy, ClearPlanner, all_discs, discs_by_the_prior, discs_so_far
 
@@ -74,11 +74,9 @@ def rewired(states: State, wiring: Floats) -> State:
     )
 
 
-class WiringGuess(Guess):
+def wiring_guess(robots: Robots) -> Guess:
     """Agent that believes in the wiring that has explained its displacements and turns best."""
-
-    def __init__(self, robots: Robots):
-        super().__init__(robots, np.array(list(itertools.product((1.0, -1.0), repeat=robots.scene.robot.n_limbs))))
+    return Guess(robots, np.array(list(itertools.product((1.0, -1.0), repeat=robots.scene.robot.n_limbs))))
 
 
 # Prey
@@ -96,7 +94,7 @@ class Interceptor:
         self._ahead = Ahead(robots, robots.table)
         self.later = robots.period + (0.0 if robots.in_strokes else self._ahead.coasting)
         challenge: Prey = robots.inner.challenge
-        self._pursuit = Pursuit(SPEED_IN_STROKES if robots.in_strokes else SPEED_IN_TIME, 0.9 * challenge.catch_radius)
+        self._pursuit = Pursuit(robots.speed, 0.9 * challenge.catch_radius)
         self.velocity: Floats | None = None  # at the last decision, in the world [m/s]
 
     def act(self, observations: Floats32, info: Info) -> Actions:
@@ -111,8 +109,6 @@ class Interceptor:
         return np.minimum(self._pursuit.meeting_time(hub, many, SINCE), NEVER + np.maximum(lacking, 0.0))
 
 
-SPEED_IN_STROKES, SPEED_IN_TIME = 0.0043, 0.0075
-"""Speed at which a robot swims any way [m/s]."""
 SINCE = np.arange(0.0, 201.0)
 """Times ahead at which the prey is foreseen [s]."""
 NEVER = 1e3
@@ -208,7 +204,7 @@ MAKERS: dict[type, dict[str, Callable[[Robots], Agent]]] = {
     Miswired: {
         "greedy": GreedyOnRoute,
         "planner": lambda robots: WiringPlanner(robots, knows=False),
-        "adaptive": WiringGuess,
+        "adaptive": wiring_guess,
         "informed": lambda robots: WiringPlanner(robots, knows=True),
     },
     Prey: {
@@ -226,7 +222,7 @@ MAKERS: dict[type, dict[str, Callable[[Robots], Agent]]] = {
     FailBlind: {
         "greedy": GreedyOnRoute,
         "planner": BlindPlanner,
-        "adaptive": FailureGuess,
+        "adaptive": failure_guess,
         "informed": LimbsKnown,
     },
     ObstTrap: {

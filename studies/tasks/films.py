@@ -73,10 +73,9 @@ class Options:
 
 def run(options: Options, results: Results) -> None:
     """Write the films."""
-    results.out.mkdir(parents=True, exist_ok=True)
     for id in options.tasks:
         film = pictures(id)
-        write_gif(film + film[-1:] * REST, results.out / file_name(id), FPS)
+        write_gif(film + film[-1:] * REST, results.folder / file_name(id), FPS)
         print(f"Written: {results.out / file_name(id)}, {len(film)} pictures.", flush=True)
 
 

@@ -55,20 +55,16 @@ class OneByOne:
         return np.array(actions), list(states)
 
 
-def _rest(batch: Any) -> Policy:
-    return scripted("rest", "pairs")
-
-
-def _planner(batch: Any) -> Policy:
-    return Planner(batch.scene, budget=AHEAD, threads=1, decision_period=PERIOD, headings=HEADINGS)
-
-
 def _turn_then_swim(batch: Any) -> Policy:
     swims, wave = learned.load(learned.bundled_file(PERIOD_OF_RULE)), turning_wave(PERIOD_OF_RULE)
     return OneByOne(TurnThenSwim(wave, swims, swims.actions, batch.scene, HEADINGS, PERIOD_OF_RULE))
 
 
-RULES: dict[str, Callable[[Any], Policy]] = {"rest": _rest, "planner": _planner, RULE: _turn_then_swim}
+RULES: dict[str, Callable[[Any], Policy]] = {
+    "rest": lambda batch: scripted("rest", "pairs"),
+    "planner": lambda batch: Planner(batch.scene, budget=AHEAD, threads=1, decision_period=PERIOD, headings=HEADINGS),
+    RULE: _turn_then_swim,
+}
 
 
 def trained(decisions: int, seed: int) -> PPO:

@@ -38,9 +38,8 @@ def picture(id: str, controller: str, strokes: int, instance: int = 0) -> NDArra
 
 def run(results: Results) -> None:
     """Draw the pictures."""
-    results.out.mkdir(parents=True, exist_ok=True)
     for name, shown in SHOWN.items():
-        Image.fromarray(picture(*shown)).save(results.out / f"{name}.png", optimize=True)
+        Image.fromarray(picture(*shown)).save(results.folder / f"{name}.png", optimize=True)
         print(name, flush=True)
 
 

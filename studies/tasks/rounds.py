@@ -6,11 +6,9 @@ from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.rounds import best_round, distances
 from seastar_gym.evaluation.rollout import Info
+from studies.frame import Floats
 from studies.tasks.ahead import Ahead, Robots
-from studies.tasks.greedy import Actions, Floats, Floats32, Greedy, length
-
-SPEED_IN_STROKES, SPEED_IN_TIME = 0.0043, 0.0075
-"""Speed at which a robot swims any way [m/s]."""
+from studies.tasks.greedy import Actions, Floats32, Greedy, length
 
 
 class MostPerMetre(Greedy):
@@ -19,7 +17,7 @@ class MostPerMetre(Greedy):
     def __init__(self, robots: Robots):
         super().__init__(robots)
         self.config: Prizes = robots.inner.challenge
-        self._speed = SPEED_IN_STROKES if robots.in_strokes else SPEED_IN_TIME
+        self._speed = robots.speed
 
     def prizes(self, observations: Floats32) -> tuple[Floats, Floats, Floats]:
         """Places of prizes in the body frames [m], shape (n, 10, 2), their worth, and the ways that are left [m]."""

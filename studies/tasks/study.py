@@ -14,9 +14,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import torch
+from stable_baselines3.common.utils import LinearSchedule
 
 from agents.tasks.command import file_of
+from agents.tasks.learning import LEARNERS, Learner, hyperparameters, make_learning_env, new_model
 from seastar_gym import TASKS
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.learned import load
 from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.evaluation.measures import measure_of_challenge
@@ -26,15 +30,13 @@ from studies.frame import Results, Study, require_known
 from studies.tasks import heading
 from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
 from studies.tasks.episodes import swim
-from studies.tasks.learning import ALL_LEARNERS, evaluate, train
-from studies.tasks.page import draw, means, table
-from studies.tasks.rows import rows_of
-from studies.tasks.verdicts import verdicts
+from studies.tasks.page import BUNDLED, RECURRENT, draw, means, rows_of, table, verdicts
 
 IDS: dict[str, str] = {id: about[0] for id, about in TASKS.items()} | {heading.ID: "heading"}
 """Name of the challenge of every id."""
-BUNDLED = "bundled"
-"""Agent that swims the policy that the package brings for a task."""
+ALL_LEARNERS = {**LEARNERS, RECURRENT: Learner(symmetric=False)}
+"""Learners by name. A network with a state of its own cannot have its limbs renamed from one decision to the next, so
+it learns without the symmetry."""
 AGENTS = (*CONTROLLERS, heading.RULE, *ALL_LEARNERS, BUNDLED)
 DECISIONS, EPISODES = 200_000, 64
 """Length of every training [decisions], and number of held-out episodes."""
@@ -70,6 +72,42 @@ def has_cell(id: str, agent: str) -> bool:
     if learner.coasting:
         return challenge == "sim-to-real"
     return not learner.told_the_way or challenge == "obst-trap"
+
+
+def _recurrent(id: str, env: BatchVecEnv, seed: int) -> Any:
+    from sb3_contrib import RecurrentPPO
+
+    task, _, period, *_ = TASKS[id]
+    chosen = hyperparameters(task, period)
+    return RecurrentPPO(
+        "MlpLstmPolicy",
+        env,
+        n_steps=32,
+        batch_size=1024,
+        n_epochs=chosen.epochs,
+        learning_rate=LinearSchedule(chosen.learning_rate, 0.0, 1.0),
+        gamma=chosen.discount_per_decision,
+        gae_lambda=chosen.gae_lambda,
+        clip_range=chosen.clip_range,
+        policy_kwargs={"net_arch": list(chosen.hidden), "lstm_hidden_size": 64},
+        seed=seed,
+        device="cpu",
+    )
+
+
+def train(id: str, name: str, seed: int, decisions: int, fidelity: Fidelity) -> Any:
+    """A learner after so many decisions of training, a `PPO` or `RecurrentPPO`."""
+    torch.set_num_threads(1)
+    env = make_learning_env(id, ALL_LEARNERS[name], fidelity, None)
+    model = _recurrent(id, env, seed) if name == RECURRENT else new_model(id, env, seed)
+    model.learn(decisions)
+    env.close()
+    return model
+
+
+def evaluate(id: str, name: str, model: Any, n_episodes: int, fidelity: Fidelity) -> Episodes:
+    """Held-out episodes of a learner."""
+    return swim(id, lambda batch: model, n_episodes, fidelity, ALL_LEARNERS[name].wrap)
 
 
 def swum(id: str, agent: str, seed: int) -> Episodes:

@@ -20,8 +20,9 @@ from seastar_gym.envs.tasks.obst_trap import (
     draw_kind,
 )
 from seastar_gym.evaluation.rollout import Info
+from studies.frame import Floats
 from studies.tasks.ahead import Ahead, Robots
-from studies.tasks.greedy import Actions, Floats, Floats32, Greedy, length
+from studies.tasks.greedy import Actions, Floats32, Greedy, length
 
 CLEAR = 0.008
 """Distance from rims below which no decision is to end [m]."""

@@ -11,14 +11,11 @@ with the drag and added mass per length of a strip's elements, explicit steps, a
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studies.frame import Floats
 from studies.validation.priors import SWEEPS
-from studies.validation.simulate import FIRST, STROKES
 from studies.validation.speeds import Condition
-from studies.validation.swimmer import ELASTOMER, FRAME, LIQUID_METAL, TYPICAL, WATER, How, bending
-
-Floats = NDArray[np.float64]
+from studies.validation.swimmer import ELASTOMER, FIRST, FRAME, LIQUID_METAL, STROKES, TYPICAL, WATER, How, bending
 
 LIMBS, ELEMENTS, STEPS = 4, 8, 250
 """Limbs, elements of one, and steps of a period."""

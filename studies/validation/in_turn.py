@@ -7,8 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene import MeasuredCurve
 from seastar_gym.scene.actuators.actuator import ActuatorBase
-
-Floats = NDArray[np.float64]
+from studies.frame import Floats
 
 LATE = 0.5
 """Size of the command of limbs that are late; that of the others is 1."""

@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from studies.frame import Floats
 from studies.validation.priors import SWEEPS, UNKNOWNS, place_in_range
 from studies.validation.speeds import TRAINED_MATERIALS, Condition
-
-Floats = NDArray[np.float64]
 
 SCATTER = 0.10
 """Standard deviation of the logarithm of a measured speed, one run of several."""
@@ -177,9 +175,9 @@ def best_known(values: dict[str, Floats], weight: Floats) -> tuple[dict[str, flo
 # How much hangs on which four speeds the model is fitted to: many other fours, of the same simulations.
 
 
-def other_fours(conditions: list[Condition], n: int, seed: int = 0) -> list[list[int]]:
+def other_fours(conditions: list[Condition], n: int) -> list[list[int]]:
     """Indices of n fours of runs, one of each of the same materials, drawn at random."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     by_material = [[k for k, c in enumerate(conditions) if c.liquid_metal == m] for m in TRAINED_MATERIALS]
     return [[int(rng.choice(of_one)) for of_one in by_material] for _ in range(n)]
 

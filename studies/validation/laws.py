@@ -9,14 +9,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studies.frame import Floats
 from studies.pages import markdown
 from studies.style import PERCENT
 from studies.validation.speeds import Condition
 from studies.validation.swimmer import measured_curve
-
-Floats = NDArray[np.float64]
 
 POWERS_OF_FREQUENCY, POWERS_OF_CHANGE = (0.0, 0.5, 1.0), (0.0, 0.5, 1.0, 2.0)
 ERRORS = "error of 33 speeds [%]", "with other fours [%]: median (5 to 95)"

@@ -7,10 +7,9 @@ on a plastic frame. Nothing is taken from the measured speeds.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
-Floats = NDArray[np.float64]
+from studies.frame import Floats
 
 SWEEPS = tuple(np.radians([0.0, 25.0, 50.0, 75.0]).tolist())
 """Angles by which limbs may be swept backwards where they leave the frame [rad], equally likely; sample k has number
@@ -49,9 +48,9 @@ def of_sweep(values: dict[str, Floats], number: int) -> dict[str, Floats]:
     return {name: column[number :: len(SWEEPS)] for name, column in values.items()}
 
 
-def samples(n: int, seed: int = 0) -> dict[str, Floats]:
+def samples(n: int) -> dict[str, Floats]:
     """Values of every unknown in n robots, by name, from Sobol's sequence."""
-    spread = qmc.Sobol(len(UNKNOWNS), seed=seed).random(n)
+    spread = qmc.Sobol(len(UNKNOWNS), seed=0).random(n)
     return {
         unknown.name: unknown.low * (unknown.high / unknown.low) ** column
         for unknown, column in zip(UNKNOWNS, spread.T, strict=True)

@@ -10,16 +10,17 @@ Speeds are kept in runs/validation, so the study goes on where it was interrupte
 `validation.json` and `validation.png`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from studies.frame import Results, Study
+from seastar_gym.files import save_figure
+from studies.frame import Floats, Results, Study
+from studies.style import CYCLE, INK, subplots
 from studies.validation import follow, laws, turns
 from studies.validation.inference import (
     MODEL,
@@ -36,13 +37,9 @@ from studies.validation.inference import (
     told,
     weights,
 )
-from studies.validation.pictures import draw
 from studies.validation.priors import samples
-from studies.validation.simulate import all_speeds, speeds
 from studies.validation.speeds import Condition, read_speeds, training
-from studies.validation.swimmer import ADDED, FULL, LEFT_OUT, VARIANTS
-
-Floats = NDArray[np.float64]
+from studies.validation.swimmer import ADDED, FULL, LEFT_OUT, VARIANTS, kept_speeds
 
 SAMPLES, OF_VARIANTS, OF_ADDED, FOURS = 512, 128, 64, 100
 """Samples of the full model, of those with parts left out, of those with others: the first of one sequence. Fours."""
@@ -53,9 +50,8 @@ CHECKED, SLOW = 64, 0.01
 
 def simulate(conditions: list[Condition], name: str, n: int, folder: Path) -> Floats:
     """Speeds of n samples of a model [m/s], shape (n, n_conditions)."""
-    place = folder / f"{name.replace(' ', '-')}-{n}"
-    swum = all_speeds(conditions, samples(n), VARIANTS[name], place)
-    return np.stack([of_one for _, of_one in swum], axis=1)
+    place, values = folder / f"{name.replace(' ', '-')}-{n}", samples(n)
+    return np.stack([kept_speeds(place / f"{one.name}.npy", one, values, VARIANTS[name]) for one in conditions], axis=1)
 
 
 def analyse(simulated: Floats, conditions: list[Condition]) -> dict[str, Any]:
@@ -92,10 +88,8 @@ def discretisation(simulated: Floats, conditions: list[Condition], folder: Path)
     """Mean difference of speeds with twice as many edges and steps, over the speed, of samples that swim forward."""
     few, off = samples(CHECKED), []
     for k in training(conditions):
-        file = folder / f"finer-{CHECKED}-{conditions[k].name}.npy"
-        if not file.is_file():
-            np.save(file, speeds(conditions[k], few, FULL, finer=2))
-        finer, coarse = np.load(file), simulated[:CHECKED, k]
+        finer = kept_speeds(folder / f"finer-{CHECKED}-{conditions[k].name}.npy", conditions[k], few, FULL, finer=2)
+        coarse = simulated[:CHECKED, k]
         forward = finer > SLOW
         off.append(np.abs(coarse[forward] / finer[forward] - 1.0))
     return float(np.concatenate(off).mean())
@@ -127,6 +121,40 @@ def as_json(
             for k, condition in enumerate(conditions)
         ],
     }  # fmt: skip
+
+
+COLOURS = {0: CYCLE[0], 10: CYCLE[2], 30: CYCLE[1], 40: CYCLE[3], 50: CYCLE[4]}
+AUTHORS = 0.19
+"""Mean error of the authors' own simulation."""
+TOP = 100.0
+"""Largest predicted speed of the axes [mm/s]."""
+
+
+def draw(results: Mapping[str, Any], file: Path) -> None:
+    """Scatter plot: measured speed over prediction, 90 % intervals, and the speeds that were fitted to as rings."""
+    figure, axes = subplots(figsize=(6.4, 6.4))
+    line = np.array([0.0, TOP])
+    axes.plot(line, line, color=INK, lw=1.0, label="predicted as measured")
+    axes.fill_between(line, (1.0 - AUTHORS) * line, (1.0 + AUTHORS) * line, color="0.93", zorder=0,
+                      label=f"±{100 * AUTHORS:.0f} %: mean error of the\nauthors' own simulation")  # fmt: skip
+    for one in results["speeds_mm_per_s"]:
+        x, y = one["predicted"], one["measured"]
+        colour, used = COLOURS[one["liquid_metal"]], one["identified_from"]
+        axes.errorbar(x, y, xerr=[[x - one["low"]], [one["high"] - x]], color=colour, lw=0.7, alpha=0.35)
+        axes.plot(x, y, "o", ms=8 if used else 5, mfc="white" if used else colour, color=colour, mew=1.6)
+    for material, colour in COLOURS.items():
+        axes.plot([], [], "o", ms=5, color=colour, label=f"{material} % liquid metal in the limbs")
+    axes.plot(
+        [], [], "o", ms=8, mfc="white", mew=1.6, color=INK, label="one of the four speeds that\nthe model is fitted to"
+    )
+    off = 100.0 * results["models"]["full"]["score"]["error"]
+    predicted = sum(not one["identified_from"] for one in results["speeds_mm_per_s"])
+    axes.set(
+        xlim=(0.0, TOP), ylim=(0.0, 92.0), xlabel="predicted speed and its 90 % interval [mm/s]",
+        ylabel="measured speed [mm/s]", title=f"{predicted} predicted speeds, {off:.0f} % off on average",
+    )  # fmt: skip
+    axes.legend(fontsize="small", loc="upper left", ncols=2)
+    save_figure(figure, file)
 
 
 @dataclass(frozen=True)

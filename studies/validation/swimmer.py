@@ -1,4 +1,5 @@
-"""The swimmer as a scene: a frame with four limbs that straighten when heated, for many samples of its unknowns.
+"""The swimmer as a scene: a frame with four limbs that straighten when heated, for many samples of its unknowns; and
+the speeds of all samples, side by side in batches, kept in files.
 
 Limbs leave the frame's sides in two pairs, swept backwards by an unknown angle. At rest they curl backwards with the
 measured curvature; heated, they straighten. The curve is that of a limb that has been heated for ever. Curled forward,
@@ -6,20 +7,21 @@ most samples would swim backwards.
 """
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.scene import AlongLimb, Limb, MeasuredCurve, Numerics, Scene, Seastar, Stiffening, Strip, Water
 from seastar_gym.scene.actuators.sma_limb import MEASURED
 from seastar_gym.scene.body import Attachment, Body
-from studies.measurements.curves import read_curves
-from studies.measurements.model import curvature
-from studies.validation.in_turn import InTurn
+from seastar_gym.simulator import Simulator
+from studies.frame import Floats
+from studies.measurements.curves import curvature, read_curves
+from studies.validation.in_turn import LATE, InTurn
+from studies.validation.priors import SWEEPS, of_sweep
 from studies.validation.speeds import Condition
 
-Floats = NDArray[np.float64]
 How = Literal["measured", "fitted", "80 ms", "ramp"]
 
 
@@ -197,3 +199,42 @@ def polygon(t: Floats, k: Floats) -> list[int]:
             kept.add(middle)
             pieces += [(a, middle), (middle, b)]
     return sorted(kept)
+
+
+STROKES, FIRST = 8, 4
+"""Strokes from rest, and those before the mean begins: speeds are those of strokes 5 to 8."""
+
+
+def speeds(condition: Condition, values: dict[str, Floats], variant: Variant, finer: int = 1) -> Floats:
+    """Mean forward speed of every sample [m/s], NaN where the solver gave up, shape (n_samples,)."""
+    found = np.empty(len(values["limb length"]))
+    for number, sweep in enumerate(SWEEPS):
+        swimmers = of_sweep(values, number)
+        found[number :: len(SWEEPS)] = swum(condition, swimmers, sweep, variant, finer)
+    return found
+
+
+def swum(condition: Condition, values: dict[str, Floats], sweep: float, variant: Variant, finer: int) -> Floats:
+    """Speeds of samples with one sweep [m/s]."""
+    n = len(values["limb length"])
+    simulator = Simulator(scene(condition, values, sweep, variant, finer), n)
+    late = np.where(FRONT, 1.0, LATE) if variant.lag else 1.0
+    command, start = np.tile(late * np.array(SIDES), (n, 1)), np.zeros(n)
+    for stroke in range(STROKES):
+        if stroke == FIRST:
+            start = simulator.hub_position()[:, 0]
+        simulator.stroke(command)
+    way = simulator.hub_position()[:, 0] - start
+    return np.where(simulator.failed, np.nan, way * condition.frequency / (STROKES - FIRST))
+
+
+def kept_speeds(
+    file: Path, condition: Condition, values: dict[str, Floats], variant: Variant, finer: int = 1
+) -> Floats:
+    """Speeds of every sample [m/s] from a file, which is written where there is none."""
+    if not file.is_file():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part = file.with_suffix(".part.npy")
+        np.save(part, speeds(condition, values, variant, finer))
+        part.replace(file)
+    return np.asarray(np.load(file))

@@ -10,18 +10,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.simulator import Simulator
+from studies.frame import Floats, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
 from studies.style import MM, PERCENT
 from studies.validation.inference import predict, score
 from studies.validation.priors import SWEEPS, of_sweep
 from studies.validation.speeds import Condition
 from studies.validation.swimmer import FULL, SIDES, scene
-
-Floats = NDArray[np.float64]
 
 FILE = Path(__file__).with_name("swimmer_turns.csv")
 FREQUENCY, MATERIALS = 0.7, (0, 10, 20, 30)

@@ -1,18 +1,16 @@
 """Motion of a translating robot against exact solutions for quadratic drag."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Numerics, Scene, Seastar, Water
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator, State
+from studies.frame import Floats
 from studies.style import MM
 from studies.verification import exact
 from studies.verification.page import Row, Section
 from studies.verification.unactuated import let_pass, pause
-
-Floats = NDArray[np.float64]
 
 DRAG_NUMERICS = Numerics("sdirk3", 2e-3, newton_tolerance=1e-12)
 

@@ -1,13 +1,12 @@
 """Exact solutions for rods, beams and drag, computed without the simulator."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from seastar_gym.scene import Seastar, Water
-
-Floats = NDArray[np.float64]
+from studies.frame import Floats
 
 
 def bending_stiffness(robot: Seastar) -> float:

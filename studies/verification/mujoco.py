@@ -13,20 +13,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simulator import Simulator, State
-from studies.frame import Results, Study
+from studies.frame import Floats, Results, Study, rounded
 from studies.pages import markdown
-from studies.results_file import rounded
+from studies.speed.strokes import repeat
 from studies.style import COLOURS, FAINT, MS, PERCENT, subplots
 from studies.verification import exact
 from studies.verification.unactuated import HUB, let_pass, pause
-
-Floats = NDArray[np.float64]
 
 MUJOCO = "mujoco"
 ROBOT = Seastar(n_limbs=2)
@@ -130,12 +127,7 @@ class Rod:
 
     def seconds_per_step(self) -> float:
         """Processor time of a step [s], the best of five goes from where the rod is."""
-        goes = []
-        for _ in range(5):
-            began = time.process_time()
-            self.advance(TIMED_STEPS)
-            goes.append((time.process_time() - began) / TIMED_STEPS)
-        return min(goes)
+        return min(repeat(lambda: self.advance(TIMED_STEPS), 0.0, clock=time.process_time)) / TIMED_STEPS
 
 
 def our_scene(nodes: int, duration: float, numerics: Numerics, **others: Any) -> Scene:

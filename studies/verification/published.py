@@ -3,15 +3,13 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.gaits import straight_gait
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator
+from studies.frame import Floats
 from studies.style import MM
 from studies.verification.page import Row, Section
-
-Floats = NDArray[np.float64]
 
 PUBLISHED_SWIM = Path(__file__).resolve().parents[2] / "tests" / "data" / "straight_turning_hub_10ms.csv"
 PUBLISHED_FINALS = {10e-3: 36.2827089e-3, 1e-3: 38.2752941e-3}

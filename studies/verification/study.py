@@ -11,9 +11,8 @@ from tqdm import tqdm
 
 from studies.frame import Results, Study
 from studies.pages import show
+from studies.verification.clamped import elastica, natural_frequencies
 from studies.verification.drag import quadratic_drag
-from studies.verification.elastica import elastica
-from studies.verification.frequencies import natural_frequencies
 from studies.verification.page import Section, as_page, as_table
 from studies.verification.published import published_codes
 from studies.verification.waves import bending_waves

@@ -1,16 +1,14 @@
 """Phase and group speed of bending waves against beam theory."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
+from studies.frame import Floats
 from studies.verification import exact
 from studies.verification.page import Row, Section, order_row
 from studies.verification.unactuated import let_pass, pause
-
-Floats = NDArray[np.float64]
 
 WAVE_NODES = (201, 401, 801)
 """Nodes per limb of the limbs that waves run along."""

@@ -18,10 +18,9 @@ if any(find_spec(name) is None for name in ("ray", "tree", "stable_baselines3"))
 import ray
 
 from agents.hyperparameters import Hyperparameters
-from agents.rllib.algorithm import make_algorithm
+from agents.rllib.algorithm import make_algorithm, policy_of
 from agents.rllib.command import main
 from agents.rllib.options import Options, read_options
-from agents.rllib.policy import policy_of
 from agents.rllib.training import checkpoints, last_checkpoint, save_checkpoint, train
 from agents.training.folder import recorded
 from seastar_gym.controllers.learned import load

@@ -90,7 +90,7 @@ def test_a_policy_of_another_task_is_refused_with_observations_as_long_too():
 
 def test_the_command_trains_compares_seeds_and_writes_a_card(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr("agents.tasks.command.VALIDATION", 4)
-    monkeypatch.setattr("agents.tasks.card.EPISODES", 4)
+    monkeypatch.setattr("agents.tasks.command.EPISODES", 4)
     done = ["--tasks", "SeastarPrey-v0", "--seeds", "0", "1", "--decisions", "8192", "--out", str(tmp_path)]
     assert main([*done, "--num-threads", "1"]) == 0
     policy = load(tmp_path / "prey.safetensors")

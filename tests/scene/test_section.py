@@ -33,7 +33,7 @@ from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.per_robot import numbers_of, unit_of, with_numbers
 from seastar_gym.scene.section import BROADSIDE, broadside
 from studies.verification import exact
-from studies.verification.frequencies import fitted_frequency
+from studies.verification.clamped import fitted_frequency
 from studies.verification.unactuated import let_pass, pause
 from unlike import DIFFERENT, robot_and_star
 

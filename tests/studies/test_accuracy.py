@@ -12,8 +12,7 @@ from seastar_gym.accuracy.measure import Errors, Swims, errors, path_lengths, ro
 from seastar_gym.accuracy.measure import swim as swim_commands
 from seastar_gym.accuracy.setting import at
 from seastar_gym.gaits import PAIRS, STRAIGHT
-from seastar_gym.scene.numerics import Resolution
-from studies.accuracy import convergence
+from seastar_gym.scene.numerics import PRESETS, Resolution
 from studies.accuracy import rows as accuracy_rows
 from studies.accuracy import study as accuracy
 from studies.accuracy import tables as accuracy_tables
@@ -29,7 +28,8 @@ from studies.accuracy.cases import (
     symmetric_form,
 )
 from studies.accuracy.rows import Figures, Row, medians
-from studies.accuracy.settings import MILLI, Plan, presets, settings
+from studies.accuracy.settings import MILLI, Plan, settings
+from studies.frame import rounded
 
 TINY = Plan(
     n_random=2, n_slow=1, n_gaits=1, side=(1, 0), limit=(13, 5 * MILLI), fine=5 * MILLI, opinion=(4, 5 * MILLI),
@@ -125,7 +125,7 @@ def test_figures_leave_gaits_and_slow_swims_out_of_the_path_error():
 @pytest.mark.slow
 def test_limit_is_that_of_the_continuum():
     """34.360 mm after ten strokes straight on, 28.189, 34.360, 39.355 and 32.282 mm of the pairs, to 1e-4."""
-    found = swim(swims(), at(Scene(), convergence.tight(*Plan().limit)))
+    found = swim(swims(), at(Scene(), accuracy.tight(*Plan().limit)))
     distances = np.hypot(*found.hub[-1].T)
     np.testing.assert_allclose(1e3 * distances, [34.360, 28.189, 34.360, 39.355, 32.282], rtol=1e-4)
 
@@ -199,10 +199,10 @@ def test_every_mesh_has_a_front_of_its_own():
 
 
 @pytest.mark.parametrize(
-    "value, rounded, up", [(0.04912, 0.049, 0.05), (17_432.0, 17_000.0, 18_000.0), (0.03, 0.03, 0.03), (0.0, 0.0, 0.0)]
+    "value, nearest, up", [(0.04912, 0.049, 0.05), (17_432.0, 17_000.0, 18_000.0), (0.03, 0.03, 0.03), (0.0, 0.0, 0.0)]
 )
-def test_stored_figures_have_two_digits_and_errors_are_rounded_upwards(value, rounded, up):
-    assert accuracy_tables.two_digits(value) == rounded
+def test_stored_figures_have_two_digits_and_errors_are_rounded_upwards(value, nearest, up):
+    assert rounded(value, 2) == nearest
     assert rounded_up(value) == up
 
 
@@ -211,7 +211,7 @@ def test_stored_figures_have_two_digits_and_errors_are_rounded_upwards(value, ro
 
 @pytest.fixture(scope="module")
 def found():
-    return accuracy.study(TINY, progress=False)
+    return accuracy.study(TINY)
 
 
 def test_study_measures_every_setting_in_time_and_space(found):
@@ -234,7 +234,7 @@ def test_study_knows_its_limit_and_the_doubt_about_it(found):
 def test_presets_and_the_chapters_steps_are_among_the_settings():
     measured = settings(Plan())
     chapter = {Resolution("chapter", 10, Numerics("implicit-euler", 20 * MILLI, 1e-6))}
-    assert {*presets().values()} | chapter <= set(measured)
+    assert {*PRESETS.values()} | chapter <= set(measured)
     assert len(measured) == len(set(measured))
 
 
@@ -248,7 +248,7 @@ def test_tables_and_csv_are_written(found, tmp_path):
     assert float(rows[0]["promise_path"]) == pytest.approx(found.rows[0].promise("path"), rel=1e-4)
     lines = accuracy_tables.as_markdown(found).splitlines()
     assert all(line.count("|") == len(accuracy_tables.COLUMNS) + 1 for line in lines if line.startswith("|"))
-    for name in presets():
+    for name in PRESETS:
         assert any(line.startswith(f"| {name} |") for line in lines)
     assert sum(line.startswith("| ") for line in lines) == 1 + len(accuracy_tables.summary(found))
 
@@ -264,7 +264,7 @@ def test_what_is_stored_can_be_promised(found, tmp_path):
     sure = replace(found, doubt=dict.fromkeys(found.doubt, same(1e-6)))
     accuracy_tables.store(sure, tmp_path / "strokes.json")
     stored = Certificate.load(tmp_path / "strokes.json")
-    assert [each.resolution for each in stored.settings[: len(presets())]] == list(presets().values())
+    assert [each.resolution for each in stored.settings[: len(PRESETS)]] == list(PRESETS.values())
     assert stored.limit_error >= stored.settings[3].space_error / 3.0
     by_resolution = {each.resolution: each for each in found.rows}
     for kept in stored.settings:
@@ -275,7 +275,7 @@ def test_what_is_stored_can_be_promised(found, tmp_path):
         assert path_error == pytest.approx(kept.space_error + kept.time_error, rel=1e-5)
         assert measured.typical.random <= kept.typical["random"] <= 1.11 * path_error
         assert measured.typical.gait <= kept.typical["repeated"] <= kept.errors["repeated"]
-    speeds = [each.speed for each in stored.settings[len(presets()) :]]
+    speeds = [each.speed for each in stored.settings[len(PRESETS) :]]
     assert speeds == sorted(speeds, reverse=True)
 
 

@@ -9,7 +9,7 @@ import pytest
 if find_spec("pyarrow") is None:
     pytest.skip("the extra sweep is not installed", allow_module_level=True)
 
-from seastar_gym.accuracy import Certificate, Setting
+from seastar_gym.accuracy import Certificate, Setting, measure
 from seastar_gym.accuracy.setting import physics
 from seastar_gym.scene import Contact
 from seastar_gym.version import __version__
@@ -57,7 +57,7 @@ def test_a_certificate_is_made_once(tmp_path, monkeypatch):
         progress(1.0)
         return made(scene, samples)
 
-    monkeypatch.setattr(certificates, "certify", certify)
+    monkeypatch.setattr(measure, "certify", certify)
     scene = scene_of(ROWS["fastest"])
     first = certificate_of("fastest", scene, tmp_path, 3)
     assert certificate_of("fastest", scene, tmp_path, 3) == first and calls == [3]
@@ -67,7 +67,7 @@ def test_a_certificate_is_made_once(tmp_path, monkeypatch):
 
 def test_numbers_that_are_there_stay_and_others_are_added_or_made_anew(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(certificates, "certify", lambda scene, samples, progress: made(scene, samples))
+    monkeypatch.setattr(measure, "certify", lambda scene, samples, progress: made(scene, samples))
     monkeypatch.setattr(certificates, "told", lambda certificate: {"samples": certificate.samples})
     monkeypatch.setattr(certificates, "STUDY", replace(certificates.STUDY, tables={}))
 

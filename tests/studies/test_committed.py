@@ -17,8 +17,8 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.tasks import task_ids
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
-from studies.accuracy.tables import two_digits
 from studies.command import all_studies
+from studies.frame import rounded
 from studies.learning.bound import MEASURED, SETTLING
 from studies.pages import BLOCK, check, draw, filled, is_drawn_so, pages, tables, told
 from studies.provenance import FINAL, footer, machine, provenance
@@ -176,7 +176,7 @@ def test_errors_on_a_page_are_those_that_info_tells(page):
             info = SeastarSwimEnv(fidelity=name, decision_period=period).reset(seed=0)[1]
             for kind in ("", "gait_"):
                 typical, bound = info[f"typical_{kind}error"], info[f"{kind or 'path_'}error"]
-                cells.append(f"{two_digits(100 * bound):g} % ({two_digits(100 * typical):g} %)")
+                cells.append(f"{rounded(100 * bound, 2):g} % ({rounded(100 * typical, 2):g} %)")
             speed = info.get("batch_real_time_factor", 0.0) or speed
         assert row.endswith(f"| {' | '.join(cells)} | {speed:,.0f} |"), name
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from seastar_gym.gradients import record
-from studies.descent import EVERY, STUDY, passed, read, smallest_change, when_due, wires
+from studies.descent import EVERY, STUDY, WAYPOINTS, passed, read, smallest_change, when_due, wires
 from studies.frame import DOCS
 
 
@@ -33,6 +33,6 @@ def test_waypoints_are_due_when_the_hub_is_near_them():
 def test_committed_pulses_swim_round_the_pentagon():
     found = json.loads(STUDY.committed(DOCS, STUDY.file).read_text(encoding="utf-8"))["pulses"]["pentagon"]
     hub = record(wires("fast"), np.array(found["commands"]), duration=EVERY).swim.hub
-    reached = passed(hub, np.array(read("learning/pentagon.json")["waypoints_m"]))
+    reached = passed(hub, np.array(read(WAYPOINTS)["waypoints_m"]))
     assert len(reached) == 5
     assert reached[-1] * EVERY == pytest.approx(found["shortest_s"][-1][1])

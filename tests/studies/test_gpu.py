@@ -83,7 +83,7 @@ def test_costs_are_relative_to_the_first_scene():
     assert costs[0].per_iteration == costs[0].per_stroke == 1.0
     assert costs[1].iterations == costs[0].iterations >= 1.0
     assert costs[1].quartiles[0] <= costs[1].per_iteration <= costs[1].quartiles[1]
-    assert as_table(costs).row_count == 2
+    assert len(as_table(costs).splitlines()) == 4
 
 
 def test_every_scene_has_terms_of_its_own():

@@ -12,9 +12,8 @@ from seastar_gym.scene.actuators.sma_limb import FREQUENCIES, MEASURED
 from studies.command import main
 from studies.frame import DOCS
 from studies.measurements import limbs
-from studies.measurements.curves import read_curves
+from studies.measurements.curves import MODELS, curvature, lagging, pulsed, read_curves
 from studies.measurements.fit import fit, predict
-from studies.measurements.model import MODELS, curvature, lagging, pulsed
 from studies.pages import numbers
 from studies.scenes import gallery
 
@@ -95,14 +94,14 @@ def test_the_page_has_the_strokes_of_the_policies_that_were_counted():
 def test_the_gallery_has_a_picture_and_a_cost_of_every_scene(tmp_path):
     gallery.draw_all(tmp_path, strokes=1)
     text = gallery.table(gallery.measured(rounds=1, n_robots=8))
-    for exhibit in gallery.exhibits():
+    for exhibit in gallery.EXHIBITS:
         assert f"**{exhibit.name}**" in text
         picture = tmp_path / f"{exhibit.name.replace(' ', '_')}.png"
         assert picture.stat().st_size > 1000
 
 
 def test_costs_are_relative_to_the_first_scene():
-    shown = gallery.exhibits()[:1] * 2
+    shown = gallery.EXHIBITS[:1] * 2
     costs, per_step = gallery.measure_costs(shown, rounds=1, n_robots=1)
     assert costs[0] == 1.0 and costs[1] > 0.0
     np.testing.assert_array_equal(per_step[0], per_step[1])

@@ -72,8 +72,7 @@ def test_the_table_promises_gaits_and_small_commands_their_own_errors():
 
 
 def test_a_robot_that_is_done_is_not_swum_again(few_settings, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(measure, "SAMPLES", 2)
-    monkeypatch.setattr(measure.certify, "__defaults__", (2, 0, None))
+    monkeypatch.setattr(promises, "CERTIFIED", 2)
     out, folder = tmp_path / "promises.json", tmp_path / "certificates"
 
     def run(samples):

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from studies.command import main
-from studies.results_file import as_json
+from studies.frame import as_json
 from studies.stability import cells as stability_cells
 from studies.stability import study as stability
 from studies.stability.cases import SWEEPS, format_step, format_value
@@ -25,7 +25,7 @@ GRID = tuple(replace(sweep, values=VALUES[sweep.name]) for sweep in SWEEPS if sw
 def cells():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(stability_cells, "REFERENCE_STEPS", 1000)
-        return stability.atlas(GRID, STEPS, progress=False, workers=1)
+        return stability.atlas(GRID, STEPS, workers=1)
 
 
 @pytest.fixture(scope="module")

@@ -19,24 +19,22 @@ from studies.pages import numbers
 from studies.tasks import heading, pictures
 from studies.tasks import study as module
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
-from studies.tasks.blind import FailureGuess, live_commands
+from studies.tasks.blind import failure_guess, live_commands
 from studies.tasks.controllers import (
     CONTROLLERS,
     SINCE,
     Interceptor,
-    WiringGuess,
     make_controller,
     on_a_circle,
     on_its_course,
     straight_on,
+    wiring_guess,
 )
 from studies.tasks.episodes import swim
-from studies.tasks.page import means, table
+from studies.tasks.page import Row, means, rows_of, table, verdicts
 from studies.tasks.rounds import BestRound, MostPerMetre
-from studies.tasks.rows import Row, rows_of
 from studies.tasks.study import Options, has_cell
 from studies.tasks.trap import SEEN, Belief, all_discs, discs_so_far, horseshoes_to, way, with_clearance
-from studies.tasks.verdicts import verdicts
 
 
 def batch(task, n=6, **arguments):
@@ -77,7 +75,7 @@ def test_random_paths_with_random_headings_are_swum_by_rules(monkeypatch):
 
 @pytest.mark.parametrize(
     "task, make, told, known",
-    [("miswired", WiringGuess, "wiring", 12), ("fail-blind", FailureGuess, "limb_strengths", 8)],
+    [("miswired", wiring_guess, "wiring", 12), ("fail-blind", failure_guess, "limb_strengths", 8)],
 )
 def test_what_is_hidden_of_limbs_is_found_by_what_they_do_and_do_not_do(task, make, told, known):
     env = batch(task, actions="joint")

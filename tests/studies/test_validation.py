@@ -12,7 +12,7 @@ from seastar_gym.scene import MeasuredCurve
 from studies.command import main
 from studies.frame import DOCS
 from studies.pages import numbers
-from studies.validation import follow, laws, simulate, study, swimmer, turns
+from studies.validation import follow, laws, study, swimmer, turns
 from studies.validation.in_turn import LATE, InTurn
 from studies.validation.inference import (
     LEVEL,
@@ -28,7 +28,7 @@ from studies.validation.inference import (
 )
 from studies.validation.priors import SWEEPS, UNKNOWNS, place_in_range, samples
 from studies.validation.speeds import read_speeds, training
-from studies.validation.swimmer import FULL, VARIANTS, bending, cross_section, fitted_curve, measured_curve, scene
+from studies.validation.swimmer import VARIANTS, bending, cross_section, fitted_curve, measured_curve, scene
 
 CONDITIONS = read_speeds()
 MEASURED = np.array([condition.speed for condition in CONDITIONS])
@@ -149,24 +149,24 @@ def test_swimmers_whose_limbs_follow_need_no_more_steps(monkeypatch):
 def test_an_interrupted_study_goes_on_where_it_was(tmp_path, monkeypatch):
     swum = []
 
-    def count(condition, values, variant):
+    def count(condition, values, variant, finer):
         swum.append(condition.name)
         if len(swum) == 3:
             raise KeyboardInterrupt
         return np.full(len(values["limb length"]), condition.speed)
 
-    monkeypatch.setattr(simulate, "speeds", count)
+    monkeypatch.setattr(swimmer, "speeds", count)
     with pytest.raises(KeyboardInterrupt):
-        list(simulate.all_speeds(CONDITIONS[:5], samples(8), FULL, tmp_path))
-    found = list(simulate.all_speeds(CONDITIONS[:5], samples(8), FULL, tmp_path))
+        study.simulate(CONDITIONS[:5], "full", 8, tmp_path)
+    found = study.simulate(CONDITIONS[:5], "full", 8, tmp_path)
     assert len(swum) == 6 and swum[2] == swum[3]
-    assert [one[1][0] for one in found] == [condition.speed for condition in CONDITIONS[:5]]
+    assert found[0].tolist() == [condition.speed for condition in CONDITIONS[:5]]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("variant", ["full", "all three"])
 def test_the_swimmer_swims_forward(variant):
-    found = simulate.speeds(CONDITIONS[CHOSEN[1]], samples(8), VARIANTS[variant])
+    found = swimmer.speeds(CONDITIONS[CHOSEN[1]], samples(8), VARIANTS[variant])
     assert np.isfinite(found).all() and np.median(found) > 0.005
 
 
@@ -282,8 +282,7 @@ def test_the_command_writes_its_page(tmp_path, monkeypatch):
     def invented(condition, values, variant, finer=1):
         return made_up(values)[:, CONDITIONS.index(condition)]
 
-    for module in (simulate, study):
-        monkeypatch.setattr(module, "speeds", invented)
+    monkeypatch.setattr(swimmer, "speeds", invented)
     monkeypatch.setattr(follow, "speeds", lambda conditions, values, law: made_up(values))
     monkeypatch.setattr(turns, "swum", lambda letter, second, material, values: np.full((3, 64), 0.1))
     few = partial(study.run, n_samples=64, variants=("ramp",), runs=tmp_path)

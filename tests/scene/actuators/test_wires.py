@@ -17,7 +17,7 @@ from seastar_gym import AlongLimb, Limited, Numerics, Scene, Seastar, Simulator,
 from seastar_gym.scene.actuators.actuator import check_actuator
 from seastar_gym.scene.actuators.pulse import pulse
 from seastar_gym.scene.actuators.sma_limb import MEASURED
-from studies.measurements.model import curvature
+from studies.measurements.curves import curvature
 from studies.scenes import thermal
 
 WIRES = SmaWires()
