@@ -29,9 +29,7 @@ def pair_gait(plus: int, minus: int, n_limbs: int = 5) -> Floats:
     require_limbs(n_limbs)
     are_limbs = all(is_whole_number(limb) and 1 <= limb <= n_limbs for limb in (plus, minus))
     if not are_limbs or plus == minus:
-        raise ValueError(
-            f"A pair needs two different limbs from 1 to {n_limbs}, not {shown(plus)} and {shown(minus)}."
-        )
+        raise ValueError(f"A pair needs two different limbs from 1 to {n_limbs}, not {shown(plus)} and {shown(minus)}.")
     command = np.zeros((1, n_limbs))
     command[0, [plus - 1, minus - 1]] = 1.0, -1.0
     return command

@@ -5,7 +5,7 @@ python -m studies NAME [options]    runs one; `python -m studies.NAME` is the sa
 python -m studies NAME --out OUT    writes into OUT: a folder, or a file as its help says
 python -m studies [NAME] --check    names pictures and pages in docs/ that are not what the numbers beside them say
 python -m studies [NAME] --draw     draws and fills them again, in seconds and without running a study
-"""
+"""  # fmt: skip
 
 import argparse
 import ast

@@ -773,7 +773,14 @@ def pulse(t: float, peak_angle: float = np.pi / 5.0, heating_time: float = 0.1, 
 
 
 def step(
-    star: Star, q: Array, v: Array, t: float, h: float, command: ArrayLike, scheme: str, damping: float = 0.0,
+    star: Star,
+    q: Array,
+    v: Array,
+    t: float,
+    h: float,
+    command: ArrayLike,
+    scheme: str,
+    damping: float = 0.0,
     **pulse_shape: float,
 ) -> tuple[Array, Array]:
     """State at t + h from the state (q, v) at t [s], with delta_psi taken at the times of the stages.

@@ -163,7 +163,10 @@ def test_pages_have_lines_that_certify():
 
 
 PUBLIC_ELSEWHERE = (
-    "seastar_gym.der.", "seastar_gym.simd.", "seastar_gym.envs.seastar_swim", "seastar_gym.envs.tasks.envs",
+    "seastar_gym.der.",
+    "seastar_gym.simd.",
+    "seastar_gym.envs.seastar_swim",
+    "seastar_gym.envs.tasks.envs",
 )
 """Kernels, which equations.md tells, and the environments, whose contracts environments.md has."""
 

@@ -130,9 +130,7 @@ def test_drag_over_mass_is_that_of_every_node():
 
 
 def test_in_either_discretisation_a_robot_translates_alike():
-    np.testing.assert_allclose(
-        drag.coasted(0.1, 1.0, "continuum"), drag.coasted(0.1, 1.0, "chapter"), rtol=1e-10
-    )
+    np.testing.assert_allclose(drag.coasted(0.1, 1.0, "continuum"), drag.coasted(0.1, 1.0, "chapter"), rtol=1e-10)
 
 
 # Waves

@@ -49,7 +49,7 @@ def defined(module: str, name: str) -> tuple[str, Definition | None]:
 def described(node: Definition, module: str, fence: int) -> str:
     """Directive that describes a class with its public methods, or a function, folded under its name."""
     kind = "class" if isinstance(node, ast.ClassDef) else "function"
-    folded = "<details class=\"name\"><summary>{}</summary>\n\n{}\n\n</details>".format
+    folded = '<details class="name"><summary>{}</summary>\n\n{}\n\n</details>'.format
     parts = [markdown(ast.get_docstring(node) or "")]
     if isinstance(node, ast.ClassDef):
         parts += [member(each, fence - 1) for each in node.body if isinstance(each, ast.FunctionDef) and is_told(each)]

@@ -153,9 +153,7 @@ class Certificate:
         """Those of some classes whose commands are repeated."""
         return tuple(name for name in classes if name.startswith(REPEATED))
 
-    def for_error(
-        self, error: float, classes: tuple[str, ...] | None = None, robot: Seastar | None = None
-    ) -> Scene:
+    def for_error(self, error: float, classes: tuple[str, ...] | None = None, robot: Seastar | None = None) -> Scene:
         """The scene at the fastest setting whose error is at most `error`; ValueError for none, and if it has lapsed.
 
         Settings that gather energy over long swims are left out.

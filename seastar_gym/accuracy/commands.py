@@ -40,6 +40,7 @@ def _continuous(rng: np.random.Generator, *shape: int) -> Floats:
 
 def _each(draw: Callable[..., Floats], different: int) -> Draw:
     """Sequences of so many different commands in turn."""
+
     def sequences(rng: np.random.Generator, n: int, n_limbs: int) -> Floats:
         return np.tile(draw(rng, different, n, n_limbs), (STROKES // different, 1, 1))
 

@@ -120,9 +120,7 @@ def certify(scene: Scene, samples: int = SAMPLES, seed: int = 0, progress: Progr
     settings = [Resolution("continuum", nodes, numerics) for nodes in NODES for numerics in NUMERICS]
     report = (lambda share: None) if progress is None else progress
     limit = Resolution("continuum", MANY_NODES, SHORT)
-    swum = measure(
-        scene, settings, limit, lambda *_: SHORT, commands, lambda share: report(SHARE_OF_SWIMS * share)
-    )
+    swum = measure(scene, settings, limit, lambda *_: SHORT, commands, lambda share: report(SHARE_OF_SWIMS * share))
     of_limit = swum.space[-1].path / 3.0  # of second order in the edges, which are half as long as those of most nodes
     found = []
     for k, (each, space, in_time) in enumerate(zip(settings, swum.space, swum.time, strict=True), start=1):

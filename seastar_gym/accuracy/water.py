@@ -22,9 +22,7 @@ def velocity(scene: Scene, places: Floats) -> Floats:
     return np.zeros_like(places) if current is None else velocities_at(current, places)
 
 
-def with_the_water(
-    scene: Scene, n_robots: int, threads: int | None = None, error_bars: bool = False
-) -> Simulator:
+def with_the_water(scene: Scene, n_robots: int, threads: int | None = None, error_bars: bool = False) -> Simulator:
     """Robots at rest in the water: with the hub at the origin, and with the velocity of the water there."""
     simulator = Simulator(scene, n_robots, threads, error_bars)
     if _current(scene) is not None:

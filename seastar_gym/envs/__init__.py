@@ -16,9 +16,7 @@ _ENTRY_POINTS: dict[str, Any] = {
     "vector_entry_point": "seastar_gym.envs.vector:SeastarSwimVectorEnv",
 }
 register(id="SeastarSwim-v0", max_episode_steps=400, **_ENTRY_POINTS)
-register(
-    id="SeastarSwimContinuous-v0", max_episode_steps=400, kwargs={"actions": "continuous"}, **_ENTRY_POINTS
-)
+register(id="SeastarSwimContinuous-v0", max_episode_steps=400, kwargs={"actions": "continuous"}, **_ENTRY_POINTS)
 
 TIMED = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
 """Times between decisions [s] of the timed environments, easy, moderate and hard, by id."""

@@ -122,9 +122,7 @@ def with_options(init: Init) -> Init:
     return init
 
 
-def make_scene(
-    scene: Scene | Plain | None, fidelity: Fidelity | None, decision_period: float | None = None
-) -> Scene:
+def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None, decision_period: float | None = None) -> Scene:
     """Scene with the nodes and numerics that it names, otherwise with those of `fidelity`, see `Scene.at`.
 
     Without a scene, it is the chapter's at the fidelity, with wires for decisions that are not strokes.

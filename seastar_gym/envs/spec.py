@@ -2,7 +2,7 @@
 
     spec = EnvSpec.from_json(env.spec.to_json())
     env = gym.make(spec)
-"""
+"""  # fmt: skip
 
 from dataclasses import fields, replace
 from enum import Enum

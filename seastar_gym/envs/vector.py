@@ -197,9 +197,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         out.take(results)
         return *out, info
 
-    def _step(
-        self, commands: NDArray[np.float64], resting: Flags
-    ) -> tuple[Buffers, Info]:
+    def _step(self, commands: NDArray[np.float64], resting: Flags) -> tuple[Buffers, Info]:
         outcome = self._task.step(commands)
         self._commands = outcome.commands
         if self.render_mode is not None:

@@ -63,7 +63,7 @@ class Window:
         except self._pygame.error as no_display:
             self.is_seen = False
             warnings.warn(
-                f'No window can be opened here ({no_display}), so nobody sees the pictures: render with '
+                f"No window can be opened here ({no_display}), so nobody sees the pictures: render with "
                 'render_mode="rgb_array" instead, or write a film, seastar swim --film swim.mp4.',
                 stacklevel=2,
             )

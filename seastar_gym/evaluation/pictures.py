@@ -34,9 +34,7 @@ ARROWS = 10
 MM = 1000.0
 
 
-def draw_traces(
-    swims: Sequence[Swim], waypoint_radius: float, file: Path, current: AnyCurrent | None = None
-) -> None:
+def draw_traces(swims: Sequence[Swim], waypoint_radius: float, file: Path, current: AnyCurrent | None = None) -> None:
     """Writes a PNG picture of the hubs' ways along the path of the first swim, and of a current of the water.
 
     waypoint_radius: [m].

@@ -5,7 +5,7 @@
     batch = gym.make_vec("SeastarSwim-v0", 64, vectorization_mode="vector_entry_point", actions="pairs")
     found = rollout(batch, load(), seeds=0, record=["time"])
     found.success.mean(), found.last("time")
-"""
+"""  # fmt: skip
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple

@@ -175,9 +175,7 @@ def trajectories(
 
     def simulate(batch: list[int]) -> None:
         asked = measurement.time, measurement.nodes, measurement.commands
-        found[batch] = batch_of_trajectories(
-            *asked, [scenes[k] for k in batch], measurement.command_times, late[batch]
-        )
+        found[batch] = batch_of_trajectories(*asked, [scenes[k] for k in batch], measurement.command_times, late[batch])
 
     with ThreadPoolExecutor(processors()) as pool:
         list(pool.map(simulate, batches.values()))

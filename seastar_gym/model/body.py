@@ -103,9 +103,7 @@ def power_of_two(length: float) -> float:
     return float(2.0 ** np.ceil(np.log2(length)))
 
 
-def weight_moment(
-    robot: Seastar, mesh: Mesh, water: Water, gravity: tuple[float, float], arms: Floats
-) -> Floats:
+def weight_moment(robot: Seastar, mesh: Mesh, water: Water, gravity: tuple[float, float], arms: Floats) -> Floats:
     """Free fall [m/s^2], and the moment of mass less that of displaced fluid about the hub [kg m], (x, y) each."""
     body = robot.body
     assert body is not None

@@ -80,9 +80,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         n_places=len(at_nodes),
         n_points=n_free if on_body is None else n_free + on_body.coefficients.n_arms,
         stretching=stretched,
-        bending=with_joints(
-            bending.coefficients(mesh, gregory=continuum), [limb.joint_stiffness for limb in limbs]
-        ),
+        bending=with_joints(bending.coefficients(mesh, gregory=continuum), [limb.joint_stiffness for limb in limbs]),
         hub=hub.coefficients(hub_angles, turning=robot.hub_hinge == "turning"),
         clamp=clamp.coefficients(mesh, [limb.direction for limb in limbs]) if continuum else None,
         along=limb_actuation(scene, index, mesh.natural_turn),

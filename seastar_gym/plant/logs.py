@@ -4,7 +4,7 @@
                    lay before it: the hub at the origin, limb 1 along +x
     commands.csv   commands of every decision, limb by limb
     poses.csv      time of the picture, time at which it was known [s], x, y [m], heading [rad]: in the tank
-"""
+"""  # fmt: skip
 
 import errno
 import math

@@ -162,4 +162,3 @@ class Body:
 
 def _is_point(value: object) -> bool:
     return isinstance(value, tuple) and len(value) == 2 and all(map(is_finite_number, value))
-

@@ -112,8 +112,6 @@ def is_convex(points: Sequence[tuple[float, float]]) -> bool:
     array = array / (np.abs(array).max() or 1.0)
     edges = np.roll(array, -1, axis=0) - array
     following = np.roll(edges, -1, axis=0)
-    turns = np.arctan2(
-        edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0], (edges * following).sum(axis=1)
-    )
+    turns = np.arctan2(edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0], (edges * following).sum(axis=1))
     inside = array[:, 0] * edges[:, 1] - array[:, 1] * edges[:, 0]
     return bool((turns > 0.0).all() and abs(turns.sum() - 2.0 * np.pi) < 1e-6 and (inside > 0.0).all())

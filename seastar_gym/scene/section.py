@@ -170,9 +170,7 @@ def broadside(height_over_width: float) -> float:
     return float(np.interp(math.log(height_over_width), np.log(ratios), coefficients))
 
 
-def cuts(
-    section: AnySection, moduli: tuple[float, ...], density: float, share: NDArray[np.float64]
-) -> list[Cut]:
+def cuts(section: AnySection, moduli: tuple[float, ...], density: float, share: NDArray[np.float64]) -> list[Cut]:
     """Cuts of one robot's limb at fractions of its length from hub to tip; moduli: Profile of Young's modulus [Pa]."""
     numbers = [getattr(section, field.name) for field in dataclasses.fields(section)]
     places = [[None] * len(share) if number is None else along(as_tuple(number), share) for number in numbers]

@@ -113,9 +113,7 @@ def report_of_pieces(pieces: Sequence[StrokeReport]) -> StrokeReport:
     return StrokeReport(*map(whole, StrokeReport._fields))
 
 
-def make_report(
-    rows: Mapping[str, NDArray[Any]], hub_hinge: str, heating_time: Floats, power: float
-) -> StrokeReport:
+def make_report(rows: Mapping[str, NDArray[Any]], hub_hinge: str, heating_time: Floats, power: float) -> StrokeReport:
     """Report of an interval from the kernels' numbers, shape (n_robots,) each.
 
     power: Electric power of a heated wire [W].

@@ -52,9 +52,7 @@ def step_of_one(id: str, n: int, unwrapped: bool = False) -> tuple[float, float]
     Kernels are the machine code of the strokes and of the observation, as Python calls it. unwrapped: Without
     Gymnasium's wrappers.
     """
-    env: Any = gym.make(
-        f"seastar_gym:{id}", fidelity="fast", max_episode_steps=10**9, path=[[10.0, 0.0], [10.0, 10.0]]
-    )
+    env: Any = gym.make(f"seastar_gym:{id}", fidelity="fast", max_episode_steps=10**9, path=[[10.0, 0.0], [10.0, 10.0]])
     env = env.unwrapped if unwrapped else env
     env.reset(seed=0)
     env.action_space.seed(0)

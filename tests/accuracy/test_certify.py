@@ -347,11 +347,7 @@ def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monk
     ):
         assert command.main(more) == 2
         assert words in capsys.readouterr().err
-    own = (
-        "from seastar_gym import Scene, SmaPulse\n"
-        "class Own(SmaPulse):\n    pass\n"
-        "scene = Scene(actuator=Own())\n"
-    )
+    own = "from seastar_gym import Scene, SmaPulse\nclass Own(SmaPulse):\n    pass\nscene = Scene(actuator=Own())\n"
     (tmp_path / "own.py").write_text(own, encoding="utf-8")
     assert command.main([str(tmp_path / "own.py")]) == 2
     assert "register_part" in capsys.readouterr().err

@@ -51,11 +51,14 @@ def circling(places: np.ndarray) -> np.ndarray:
 
 STREAM = Continuum(tangential_drag_coefficient=0.2, added_mass_coefficient=0.7, current=circling)
 PULL = np.random.default_rng(5).standard_normal((STAR.n_nodes, 2))
-STREAM_RODS = make_rods(Scene(
-    TEN, fluid=Water(tangential_drag_coefficient=0.2, added_mass_coefficient=0.7, current=Vortex(0.4, 0.1, 0.2, 0.06)),
-    actuator=SmaPulse(0.5),
-    loads=tuple((node, *force) for node, force in enumerate(PULL.tolist())),
-))
+STREAM_RODS = make_rods(
+    Scene(
+        TEN,
+        fluid=Water(tangential_drag_coefficient=0.2, added_mass_coefficient=0.7, current=Vortex(0.4, 0.1, 0.2, 0.06)),
+        actuator=SmaPulse(0.5),
+        loads=tuple((node, *force) for node, force in enumerate(PULL.tolist())),
+    )
+)
 FRAME = np.random.default_rng(6).uniform(-1.0, 1.0, (2, N_LANES))
 """Velocity that every lane is seen from [m/s]."""
 SEEN_FROM = Lanes(FRAME[0]), Lanes(FRAME[1])
@@ -251,9 +254,7 @@ TURNS = [
 
 @pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk3"])
 @pytest.mark.parametrize("hub, part, before, after, through", TURNS)
-def test_a_hinge_that_turned_through_its_pole_is_seen_and_the_robot_put_back(
-    hub, part, before, after, through, scheme
-):
+def test_a_hinge_that_turned_through_its_pole_is_seen_and_the_robot_put_back(hub, part, before, after, through, scheme):
     """The last lane holds a robot that nobody asks about."""
     rods, tableau = make_rods(Scene(robot_and_star(hub=hub)[0], actuator=SmaPulse(0.5))), SCHEMES[scheme]
     q, q_1 = (turned_about(STAR.rest, *part, np.radians(angle)) for angle in (before, after))

@@ -192,9 +192,11 @@ def test_stages_where_plain_newton_diverges_end_at_a_minimum_of_the_oracles_pote
 
 GAMMA, NODE, EDGE = 0.01, 5, 4
 ROBOT = Seastar(nodes_per_limb=4, relaxation_time=4e-3)
-EVERYTHING = make_rods(Scene(
-    ROBOT, Water(950.0, 1.3, 0.1, UniformCurrent(0.3, -0.2), 0.8), numerics=Numerics(), loads=((NODE, 1e-3, -2e-3),)
-))
+EVERYTHING = make_rods(
+    Scene(
+        ROBOT, Water(950.0, 1.3, 0.1, UniformCurrent(0.3, -0.2), 0.8), numerics=Numerics(), loads=((NODE, 1e-3, -2e-3),)
+    )
+)
 NOTHING_BUT_LIMBS = make_rods(Scene(Seastar(nodes_per_limb=4, relaxation_time=0.0), None))
 RNG = np.random.default_rng(0)
 EDGES = ROBOT.edge_length * np.array([[0.8], [0.6]]) + 4e-3 * RNG.standard_normal((2, N_LANES))

@@ -61,9 +61,7 @@ def test_drag_across_is_that_of_the_halves_of_a_nodes_edges_by_their_own_radii(n
         0.5 * 950.0 * (1.3 - 0.2) * 2.0 * radii_of_edges()[e] * 0.5 * EDGE * abs(n[e] @ w) * (n[e] @ w) * n[e]
         for e in edges_of(node)
     )
-    _, force, _ = add_cross_flow.plain(
-        RODS, frozen().normals, node, *map(Lanes, w), Lanes(1.0), Lanes(1.0), NOTHING
-    )
+    _, force, _ = add_cross_flow.plain(RODS, frozen().normals, node, *map(Lanes, w), Lanes(1.0), Lanes(1.0), NOTHING)
     np.testing.assert_allclose([x[0] for x in plain(force)], expected, rtol=1e-12)
 
 

@@ -111,9 +111,7 @@ def test_the_memory_of_actuators_is_that_of_the_table(actuator, n):
     assert ("+, -" in row) == (n > 1)
     at = Layout.of(Scene(actuator=actuator))
     assert at.actuators == slice(182, 182 + 5 * n) and (n != 2 or f"has {at.size} numbers" in section("Observation"))
-    assert f"{Layout.of(Scene(actuator=SmaWires()), entries=HEADINGS).size} with headings" in section(
-        "Observation"
-    )
+    assert f"{Layout.of(Scene(actuator=SmaWires()), entries=HEADINGS).size} with headings" in section("Observation")
 
 
 def test_the_reward_has_the_terms_and_weights_of_the_table():
@@ -137,9 +135,7 @@ def test_info_has_the_names_and_types_of_the_table():
                 assert type(info[name]) is TYPES[kind], name
 
 
-@pytest.mark.parametrize(
-    "one, batch", [(SeastarSwimEnv, SeastarSwimVectorEnv), (SeastarTaskEnv, SeastarTaskVectorEnv)]
-)
+@pytest.mark.parametrize("one, batch", [(SeastarSwimEnv, SeastarSwimVectorEnv), (SeastarTaskEnv, SeastarTaskVectorEnv)])
 def test_the_arguments_are_those_of_the_constructors(one, batch):
     assert arguments(one) == list(inspect.signature(one).parameters)
     missing = {"frames_per_stroke"}  # a batch draws the ends of strokes
@@ -317,8 +313,10 @@ ARGUMENTS = {
     "headings": {"headings": HeadingTargets((0.1, 1 / 3, 0.0, 1.0, 2.0)), "fidelity": "fast"},
     "one heading": {"headings": HeadingTargets(0.1, 1 / 3), "fidelity": "fast"},
     "sight": {
-        "sight": Sight(1e2 / 3, Uniform(0.1, 1 / 3), dropout=0.1, sees=np.int64(3)), "decision_period": 0.5,
-        "fidelity": "fast", "action_delay": Uniform(0.0, 1 / 3),
+        "sight": Sight(1e2 / 3, Uniform(0.1, 1 / 3), dropout=0.1, sees=np.int64(3)),
+        "decision_period": 0.5,
+        "fidelity": "fast",
+        "action_delay": Uniform(0.0, 1 / 3),
     },
     "a delay": {"sight": Sight(), "action_delay": np.float64(1.0), "fidelity": "fast"},
     "plain": {

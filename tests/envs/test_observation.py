@@ -270,9 +270,7 @@ def test_velocities_are_of_order_one_after_strokes_of_random_commands():
 
 TIMED = "SeastarSwimTimed-v0"
 PERIOD = 0.5
-BAD = Sight(
-    delay=Uniform(0.05, 0.15), jitter=0.03, dropout=0.2, noise=Uniform(0.0, 2e-3), turn_noise=0.02, sees="pose"
-)
+BAD = Sight(delay=Uniform(0.05, 0.15), jitter=0.03, dropout=0.2, noise=Uniform(0.0, 2e-3), turn_noise=0.02, sees="pose")
 SEEN = ("pose", 1, 3, 9, "nodes")
 SHORT = [[0.004, 0.0], [0.009, 0.0]]
 

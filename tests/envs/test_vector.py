@@ -456,7 +456,7 @@ def test_reset_options_that_mean_nothing_are_refused(options, words):
         *(({"num_envs": value}, "num_envs must be a whole number") for value in (0, 2.5)),
         *(({"max_episode_steps": value}, "max_episode_steps") for value in (0, -1, np.nan, np.inf, 2.5, True, "4")),
         ({"threads": 0}, "threads"),
-        ({"render_mode": "human"}, "The batch draws with render_mode=\"rgb_array\""),
+        ({"render_mode": "human"}, 'The batch draws with render_mode="rgb_array"'),
         ({"autoreset_mode": "sometimes"}, "autoreset_mode must be one of .*sometimes"),
     ],
     ids=str,
@@ -476,9 +476,7 @@ N = 3
 def batches():
     """Two equal batches, whose episodes end after two strokes."""
     made = [
-        gym.make_vec(
-            "SeastarSwim-v0", N, vectorization_mode="vector_entry_point", fidelity="fast", max_episode_steps=2
-        )
+        gym.make_vec("SeastarSwim-v0", N, vectorization_mode="vector_entry_point", fidelity="fast", max_episode_steps=2)
         for _ in range(2)
     ]
     for batch in made:

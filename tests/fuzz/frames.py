@@ -46,9 +46,7 @@ class Frame:
     angle: float = 0.0
 
     def scene(self, scene: Scene) -> Scene:
-        loads = tuple(
-            (self.node(scene, node), *self.vectors(np.array(force)).tolist()) for node, *force in scene.loads
-        )
+        loads = tuple((self.node(scene, node), *self.vectors(np.array(force)).tolist()) for node, *force in scene.loads)
         fluid = scene.fluid
         if isinstance(fluid, Water):
             fluid = replace(fluid, current=self.current(fluid.current))
@@ -77,9 +75,7 @@ class Frame:
         sign = -1.0 if self.mirrored else 1.0
         orientation = None if state.orientation is None else sign * state.orientation + self.angle
         spin = None if state.spin is None else sign * state.spin
-        return State(
-            moved, self.velocities(v), state.time, actuators, commands, state.phase, orientation, spin
-        )
+        return State(moved, self.velocities(v), state.time, actuators, commands, state.phase, orientation, spin)
 
     def case(self, case: Case) -> Case:
         commands = -case.commands[..., swapped(case.scene.robot.n_limbs)] if self.mirrored else case.commands

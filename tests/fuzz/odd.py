@@ -18,7 +18,7 @@ from seastar_gym import (
     Contact,
     DomainRandomization,
     GridCurrent,
-HeadingTargets,
+    HeadingTargets,
     Limb,
     Limited,
     LogUniform,
@@ -184,8 +184,11 @@ ENV_CALLS: Calls = {
     for name, call, arguments in (
         ("reset", env.reset, dict(seed=1, options={"path": "line"})),
         ("reset to path", partial(lambda env, path: env.reset(options={"path": path}), env), dict(path="line")),
-        ("reset by mask", partial(lambda env, mask: env.reset(options={"reset_mask": mask}), env),
-         dict(mask=[True, False])),
+        (
+            "reset by mask",
+            partial(lambda env, mask: env.reset(options={"reset_mask": mask}), env),
+            dict(mask=[True, False]),
+        ),
         ("step", env.step, dict(**{"action" if env is ENV else "actions": np.array(actions)})),
     )
 }

@@ -39,9 +39,7 @@ from unlike import DIFFERENT, robot_and_star
 
 WIDTH, HEIGHT, E = 2e-3, 8e-3, 1e6
 STRIP, TUBE = Strip(WIDTH, HEIGHT), Tube(2e-3, 1.2e-3)
-MEASURED = Section(
-    1.6e-5, None, 5e-3, added_area=3e-5, bending_stiffness=6e-6, mass_per_length=0.03, half_width=1.5e-3
-)
+MEASURED = Section(1.6e-5, None, 5e-3, added_area=3e-5, bending_stiffness=6e-6, mass_per_length=0.03, half_width=1.5e-3)
 SECTIONS = {"strip": STRIP, "tube": TUBE, "measured": MEASURED}
 WATER = Water(added_mass_coefficient=0.9, tangential_drag_coefficient=0.1)
 NUMERICS = Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-10)
@@ -229,9 +227,7 @@ def test_a_clamped_limb_rings_with_the_frequency_of_the_beam(section):
 def test_a_limb_sinks_with_the_speed_at_which_drag_holds_its_weight(section):
     found, water = cut_of(section, 1300.0), Water()
     robot = star(section, n_limbs=1, nodes=10, density=1300.0)
-    simulator = Simulator(
-        Scene(robot, water, SmaPulse(0.0), Numerics("sdirk2", 0.02), gravity=(0.0, -9.81))
-    )
+    simulator = Simulator(Scene(robot, water, SmaPulse(0.0), Numerics("sdirk2", 0.02), gravity=(0.0, -9.81)))
     for _ in range(4):
         simulator.stroke(np.zeros((1, 1)))
     weight = (1300.0 * found.inert - 1000.0 * found.displaced) * 9.81
@@ -249,6 +245,7 @@ def test_strips_touch_at_half_their_width():
 
 CLAMP = (0, 1)
 """Held nodes: the limb is then clamped in the middle of its root edge, see studies/verification/unactuated.py."""
+
 
 @pytest.mark.parametrize("name", DIFFERENT)
 def test_rest_shape_and_coefficients_are_those_of_the_oracle(name):

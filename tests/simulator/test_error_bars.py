@@ -179,9 +179,7 @@ def test_a_pickled_simulator_goes_on_with_its_estimates():
     simulator = swimmers(n_strokes=2)
     copy = pickle.loads(pickle.dumps(simulator))
     for commands in COMMANDS[2:]:
-        np.testing.assert_array_equal(
-            copy.stroke(commands).error_estimate, simulator.stroke(commands).error_estimate
-        )
+        np.testing.assert_array_equal(copy.stroke(commands).error_estimate, simulator.stroke(commands).error_estimate)
     assert_same(copy, simulator)
 
 
@@ -284,9 +282,7 @@ def test_error_bars_is_a_flag(value):
 
 def test_info_has_the_estimate_alone_as_in_the_batch():
     batch = SeastarSwimVectorEnv(3, fidelity="fast", error_bars=True, max_episode_steps=3)
-    singles = [
-        gym.make("SeastarSwim-v0", fidelity="fast", error_bars=True, max_episode_steps=3) for _ in range(3)
-    ]
+    singles = [gym.make("SeastarSwim-v0", fidelity="fast", error_bars=True, max_episode_steps=3) for _ in range(3)]
     rng = np.random.default_rng(1)
     first = batch.reset(seed=5)[1]
     own = [env.reset(seed=5 + k)[1]["error_estimate"] for k, env in enumerate(singles)]

@@ -349,9 +349,7 @@ def test_robots_with_wild_velocities_arrive(scheme, speed):
     assert np.isfinite(simulator.positions).all() and np.isfinite(simulator.velocities).all()
 
 
-@pytest.mark.parametrize(
-    "robot, step", [(Seastar(nodes_per_limb=40), 0.05), (TEN, 0.01), (Seastar(n_limbs=12), 0.02)]
-)
+@pytest.mark.parametrize("robot, step", [(Seastar(nodes_per_limb=40), 0.05), (TEN, 0.01), (Seastar(n_limbs=12), 0.02)])
 def test_scenes_that_defeat_plain_newton_arrive(robot, step):
     commands = np.resize([1.0, -1.0], (1, robot.n_limbs))
     simulator = Simulator(Scene(robot, actuator=SmaPulse(min(np.pi / 5, 1.2)), numerics=Numerics(step=step)))

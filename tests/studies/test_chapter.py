@@ -212,9 +212,7 @@ def test_snapshots_show_actuated_limbs_in_blue(pentagon, tmp_path):
     pictures.draw_pentagon_snapshots(pentagon, pentagon, tmp_path / "blue.png")
     at_rest = replace(pentagon, commands=np.zeros_like(pentagon.commands))
     pictures.draw_pentagon_snapshots(at_rest, at_rest, tmp_path / "grey.png")
-    blue, grey = (
-        pixels_like(picture(tmp_path / f"{name}.png"), pictures.ACTUATED) for name in ("blue", "grey")
-    )
+    blue, grey = (pixels_like(picture(tmp_path / f"{name}.png"), pictures.ACTUATED) for name in ("blue", "grey"))
     assert blue > 10 * grey > 0  # the legend's line stays
 
 

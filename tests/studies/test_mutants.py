@@ -19,13 +19,13 @@ def larger(x: int | None, y):
 def unused(x):
     return x + 1
 '''
-TEST = '''
+TEST = """
 from toy.code import larger
 
 
 def test_larger():
     assert larger(1, 2) and not larger(2, 1)
-'''
+"""
 ROOMS = {"toy": "tests/toy"}
 
 

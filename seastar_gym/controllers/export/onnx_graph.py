@@ -121,9 +121,7 @@ def _element(graph: Graph, policy: LearnedPolicy) -> None:
         nothing = graph.add("Mul", graph.add("ReduceSum", waypoints, np.array([1]), keepdims=0), np.zeros(()))
         graph.add("Cast", nothing, out="element", to=7)  # int64
         return
-    current, after = (
-        graph.add("Slice", waypoints, np.array([k]), np.array([k + 2]), np.array([1])) for k in (0, 2)
-    )
+    current, after = (graph.add("Slice", waypoints, np.array([k]), np.array([k + 2]), np.array([1])) for k in (0, 2))
     at_hub = graph.add("Equal", _length(graph, current), np.zeros(()))
     angles = sectors.axis + sectors.width * np.arange(sectors.n)
     first = np.array([np.cos(angles[0]), np.sin(angles[0])])

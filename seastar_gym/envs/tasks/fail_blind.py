@@ -77,7 +77,6 @@ class FailBlind(Challenge):
         return FailBlindTask(self, options, n_robots, threads, split)
 
 
-
 @dataclass(frozen=True)
 class AnyLimbs:
     """Draws of dead limbs, all sets of so many with the same probability."""

@@ -207,10 +207,17 @@ def speeds_figure(directions: Sequence[float], speeds: Mapping[str, Sequence[flo
         polar={
             "bgcolor": "rgba(0,0,0,0)",
             "radialaxis": {
-                "rangemode": "tozero", "angle": sector / 4, "nticks": 5, "gridcolor": "#dfe3e8", "linecolor": FAINT_INK
+                "rangemode": "tozero",
+                "angle": sector / 4,
+                "nticks": 5,
+                "gridcolor": "#dfe3e8",
+                "linecolor": FAINT_INK,
             },
             "angularaxis": {
-                "ticksuffix": "\u00b0", "dtick": sector / 2, "gridcolor": "#dfe3e8", "linecolor": FAINT_INK
+                "ticksuffix": "\u00b0",
+                "dtick": sector / 2,
+                "gridcolor": "#dfe3e8",
+                "linecolor": FAINT_INK,
             },
         },
         margin={"l": 48, "r": 48, "t": 36, "b": 36},

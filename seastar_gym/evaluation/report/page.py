@@ -200,9 +200,7 @@ PLAYER = """<div id="agents" role="radiogroup" aria-label="agent"></div>
 </div>"""
 
 
-def _recorded(
-    playbacks: Sequence[Playback], waypoints: Any, waypoint_radius: float, current: AnyCurrent | None
-) -> str:
+def _recorded(playbacks: Sequence[Playback], waypoints: Any, waypoint_radius: float, current: AnyCurrent | None) -> str:
     """Recorded swims for the page's player, as JSON; lengths in millimetres."""
     path = 1e3 * np.concatenate([np.zeros((1, 2)), waypoints])
     reach = 1e3 * max(float(np.ptp(playback.frames[0].positions, axis=0).max()) for playback in playbacks) / 2

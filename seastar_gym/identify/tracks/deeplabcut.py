@@ -45,9 +45,7 @@ def read_deeplabcut(
     return Track(frames[:, 0] / rate, points, {})
 
 
-def _columns(
-    file: str | Path, headers: dict[str, tuple[str, ...]], individual: str | None
-) -> dict[str, Sequence[int]]:
+def _columns(file: str | Path, headers: dict[str, tuple[str, ...]], individual: str | None) -> dict[str, Sequence[int]]:
     """Columns of x, y and likelihood of every part of one animal."""
     animals = headers.get("individuals", (None,) * len(headers["coords"]))
     chosen = chosen_individual(file, list(dict.fromkeys(animals)), individual)
