@@ -1,5 +1,6 @@
 """PPO on the native batch: the training environment, the learner, and the policy that it has learned."""
 
+import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -55,7 +56,13 @@ def make_training_env(
     return BatchVecEnv(VectorSymmetryReduction(env) if hyperparameters.symmetry else env)
 
 
-def make_model(env: BatchVecEnv, hyperparameters: Hyperparameters, seed: int, device: str = "cpu") -> PPO:
+def make_model(
+    env: BatchVecEnv,
+    hyperparameters: Hyperparameters,
+    seed: int,
+    device: str = "cpu",
+    tensorboard_log: str | os.PathLike[str] | None = None,
+) -> PPO:
     """New learner on an environment."""
     require_kind("env", env, BatchVecEnv, "a BatchVecEnv, as make_training_env gives it")
     require_kind("hyperparameters", hyperparameters, Hyperparameters, "Hyperparameters")
@@ -73,6 +80,7 @@ def make_model(env: BatchVecEnv, hyperparameters: Hyperparameters, seed: int, de
         clip_range=hyperparameters.clip_range,
         ent_coef=hyperparameters.entropy,
         policy_kwargs={"net_arch": list(hyperparameters.hidden)},
+        tensorboard_log=None if tensorboard_log is None else os.fspath(tensorboard_log),
         seed=int(seed),
         device=device,
     )
