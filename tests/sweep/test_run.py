@@ -110,7 +110,7 @@ def test_a_full_disk_keeps_what_is_there_and_the_same_run_goes_on(sweep, small_d
     assert tally.done == 3 and tally.losses == ATTEMPTS
     assert "no space left on device" in next(iter(tally.problems.values()))
     grow()
-    again = run(sweep.batches(), place, Processes(2), work=works.sized)
+    again = run(sweep.batches(), place, Here(), work=works.sized)
     assert (again.done, again.kept, again.problems) == (1, 3, {})
 
 
