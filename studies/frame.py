@@ -5,6 +5,7 @@ its room, whose module is `study`.
 """
 
 import csv
+import io
 import json
 import re
 import time
@@ -184,10 +185,11 @@ def keep(results: Mapping[str, Any], file: Path) -> None:
 
 
 def write_rows(file: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Write rows below a head as CSV into a file, whose folder is made."""
+    """Write rows below a head as CSV into a file, all at once; its folder is made."""
+    text = io.StringIO()
+    csv.writer(text).writerows([head, *rows])
     file.parent.mkdir(parents=True, exist_ok=True)
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        csv.writer(stream).writerows([head, *rows])
+    write_atomically(file, text.getvalue())
 
 
 def rounded(value: float, digits: int = 4) -> float:

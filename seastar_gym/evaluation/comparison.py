@@ -18,11 +18,12 @@ from seastar_gym.evaluation.films import film
 from seastar_gym.evaluation.pictures import FPS, FRAMES_PER_STROKE, draw_traces
 from seastar_gym.evaluation.playback import Playback, RecordingEnv
 from seastar_gym.evaluation.results import as_text, results, time_series, write_csv
+from seastar_gym.evaluation.rollout import MOST_DECISIONS
 from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, swim
 from seastar_gym.extras import require_extra
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_kind, shown
+from seastar_gym.scene.checks import require_count, require_kind
 
 if TYPE_CHECKING:
     from seastar_gym.evaluation.report.page import Remarks
@@ -68,8 +69,7 @@ def evaluate(
         scene = read(scene, Scene)
         require_kind("scene", scene, Scene, "a Scene")
     max_strokes = decisions_in(TIME_LIMIT, decision_period, scene) if max_strokes is None else max_strokes
-    if max_strokes < 1:
-        raise ValueError(f"max_strokes must be at least 1, not {shown(max_strokes)}.")
+    require_count("max_strokes", max_strokes, 1, MOST_DECISIONS)
     folder = None if out is None else Path(out)
     videos = {} if folder is None or not video else _video_files(agents, folder)
     if folder is not None:

@@ -2,6 +2,7 @@
 
 import argparse
 
+from seastar_gym.command import DEFAULT
 from seastar_gym.executors import Executor
 from seastar_gym.executors.here import Here
 from seastar_gym.executors.processes import Processes
@@ -17,7 +18,7 @@ def add_options(parser: argparse.ArgumentParser, what: str, default: str) -> Non
     parser.add_argument(
         "--executor", choices=("processes", "here", "ray", "slurm", "local"), default=default,
         help=f"where {what} run: processes of this machine, this process, Ray, SLURM arrays, or submitit's stand-in "
-        "for SLURM on this machine (default: %(default)s)",
+        f"for SLURM on this machine {DEFAULT}",
     )  # fmt: skip
     parser.add_argument("--workers", type=int, help=f"{what} at a time (default: one per processor)")
     parser.add_argument("--address", help="Ray: address of the head, HOST:6379 (default: a cluster of this machine)")

@@ -282,7 +282,7 @@ def test_an_environment_draws_as_many_frames_per_stroke_as_asked(frames_per_stro
     ("agents", "more", "complaint"),
     [
         ({}, {}, "at least one agent"),
-        ({"a": scripted("rest")}, {"max_strokes": 0}, "max_strokes must be at least 1"),
+        ({"a": scripted("rest")}, {"max_strokes": 0}, "max_strokes must be a whole number from 1"),
         ({"a": scripted("rest")}, {"scene": 5}, "scene must be a Scene"),
         ({"a b": scripted("rest"), "a/b": scripted("rest")}, {"out": "x"}, "same file name"),
     ],
