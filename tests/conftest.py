@@ -4,6 +4,7 @@ import os
 import shutil
 import signal
 import subprocess
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -22,6 +23,7 @@ settings.load_profile("seastar")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="also run the tests marked slow")
+    parser.addoption("--update", action="store_true", help="write what the tests make into tests/golden")
     parser.addoption("--fuzz-minutes", type=float, default=0.0, help="how long tests/fuzz tries what it draws")
     parser.addoption("--fuzz-seed", type=int, default=0, help="what that long run draws")
     parser.addoption("--fuzz-case", help="one trial of that long run, as it prints it")
@@ -40,6 +42,22 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if item.get_closest_marker("slow"):
             item.add_marker(pytest.mark.skip(reason="slow: runs with --slow"))
+
+
+@pytest.fixture
+def golden(request):
+    """Function that asserts that a text is what a file of tests/golden holds: (name, text). `--update` writes the file."""
+    folder = Path(__file__).parent / "golden" / request.path.stem.removeprefix("test_")
+
+    def assert_as_kept(name: str, text: str) -> None:
+        file = folder / name
+        if request.config.getoption("--update"):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text, encoding="utf-8")
+        assert file.is_file(), f"there is no {file}: look at what --update writes"
+        assert text.splitlines() == file.read_text(encoding="utf-8").splitlines()
+
+    return assert_as_kept
 
 
 @pytest.fixture(scope="module")
