@@ -5,17 +5,20 @@ the GIL and keeps the machine code on disk. Numba's own cache looks at the file 
 in a called file would silently run the old code. Ours lives in a folder named after a digest of every file of the
 package that defines kernels, the versions of numba, llvmlite and numpy and the lane width: whatever changes, the old
 code cannot be found. Every file begins with a digest of the rest: what was cut off or written over is not there, and is
-compiled and written anew. What cannot be written is compiled in every process.
+compiled and written anew. What cannot be written is compiled in every process. Processes that want the same code at
+once wait for the first of them, which compiles it, and load it then.
 """
 
 import contextlib
+import fcntl
 import functools
 import hashlib
 import logging
 import os
 import pickle
 import secrets
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import llvmlite
@@ -32,6 +35,7 @@ from seastar_gym.simd.plain import plain_kernels
 
 PACKAGE = Path(__file__).resolve().parent.parent
 DIGEST_SIZE = hashlib.sha256().digest_size  # bytes
+PATIENCE = 300.0  # s; a process that compiles one kind for longer was stopped, and the others compile for themselves
 
 # error_model="numpy": divisions follow IEEE instead of raising; failure is a status, not an exception.
 STRICT = {"error_model": "numpy", "nogil": True, "pipeline_class": EntryCompiler}
@@ -162,6 +166,28 @@ class _SoundFile(IndexDataCacheFile):
             file.write(hashlib.sha256(content).digest() + content)
 
 
+@contextlib.contextmanager
+def _alone(path: Path) -> Iterator[None]:
+    """Hold a lock file, for one process at a time; whoever ends, even by a kill, lets go. Without where none can be."""
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            file = stack.enter_context(path.open("ab"))
+            stack.callback(fcntl.flock, file, fcntl.LOCK_UN)  # a forked child has the file open, too
+            until = time.monotonic() + PATIENCE
+            while not _has_locked(file) and time.monotonic() < until:
+                time.sleep(0.05)
+        yield
+
+
+def _has_locked(file) -> bool:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
 class _DigestCache(FunctionCache):
     class _impl_class(FunctionCache._impl_class):  # noqa: N801 - numba's own name
         _locator_classes = (_DigestLocator,)
@@ -170,19 +196,44 @@ class _DigestCache(FunctionCache):
         super().__init__(py_func)
         stamp = self._impl.locator.get_source_stamp()
         self._cache_file = _SoundFile(self._cache_path, self._impl.filename_base, stamp)
+        self._turn = contextlib.ExitStack()
+
+    def _lock(self, of=""):
+        return _alone(Path(self._cache_path) / f"{self._impl.filename_base}{of}.lock")
 
     def load_overload(self, sig, target_context):
-        return super().load_overload(sig, target_context) or _say_that_it_compiles("once: later runs find the code")
+        found = super().load_overload(sig, target_context)
+        if found is None:
+            self._turn.enter_context(self._lock("." + hashlib.sha256(str(sig).encode()).hexdigest()[:16]))
+            found = super().load_overload(sig, target_context)  # another process may have left it meanwhile
+        return found or _say_that_it_compiles("once: later runs find the code")
 
     def save_overload(self, sig, data):
         # OSError: the disk is full, or the folder is gone or no longer ours.
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError), self._lock():  # the index is read, and written with one line more
             super().save_overload(sig, data)
+
+    def end_turn(self):
+        """Let other processes look for what this one wanted."""
+        self._turn.close()
 
 
 class _NoCache(NullCache):
     def load_overload(self, sig, target_context):
         return _say_that_it_compiles("in every process, as no folder for the code can be written: set NUMBA_CACHE_DIR")
+
+    def end_turn(self):
+        """Nobody waits."""
+
+
+class EntryPoint(CPUDispatcher):
+    """A function that Python calls, each kind of which one process compiles while others wait for it."""
+
+    def compile(self, sig):
+        try:
+            return super().compile(sig)
+        finally:
+            self._cache.end_turn()
 
 
 def kept_code(name: str, make: Callable[[], bytes]) -> bytes:
@@ -221,6 +272,7 @@ def entry_point(function):
     if numba.config.DISABLE_JIT:
         return np.errstate(all="ignore")(function)
     compiled = numba.njit(**STRICT)(function)
+    compiled.__class__ = EntryPoint
     try:
         compiled._cache = _DigestCache(function)
     except RuntimeError:  # no folder can be written (a read-only home)
