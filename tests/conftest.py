@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+import core
+
 # A shell that starts the tests in the background has them, and what they start, ignore Ctrl-C, which they are about.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -23,10 +25,17 @@ settings.load_profile("seastar")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="also run the tests marked slow")
+    parser.addoption("--all", action="store_true", help="run all tests, not only the core: see core.py")
+    parser.addoption("--core", action="store_true", help="run the core of the files that are named, too")
+    parser.addoption("--record", action="store_true", help="write what the tests take into times.json")
     parser.addoption("--update", action="store_true", help="write what the tests make into tests/golden")
     parser.addoption("--fuzz-minutes", type=float, default=0.0, help="how long tests/fuzz tries what it draws")
     parser.addoption("--fuzz-seed", type=int, default=0, help="what that long run draws")
     parser.addoption("--fuzz-case", help="one trial of that long run, as it prints it")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    core.register(config)
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -46,7 +55,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture
 def golden(request):
-    """Function that asserts that a text is what a file of tests/golden holds: (name, text). `--update` writes the file."""
+    """Function (name, text) that asserts that a text is what a file of tests/golden holds; `--update` writes it."""
     folder = Path(__file__).parent / "golden" / request.path.stem.removeprefix("test_")
 
     def assert_as_kept(name: str, text: str) -> None:

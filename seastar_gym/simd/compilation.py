@@ -148,15 +148,9 @@ class _SoundFile(IndexDataCacheFile):
         self._save(self._data_path(name), data)
 
     def _load(self, path):
+        content = _sound(Path(path))
         try:
-            file = Path(path).read_bytes()
-        except OSError:
-            return None
-        digest, content = file[:DIGEST_SIZE], file[DIGEST_SIZE:]
-        if digest != hashlib.sha256(content).digest():
-            return None
-        try:
-            return pickle.loads(content)
+            return None if content is None else pickle.loads(content)
         except ImportError:  # another signature's code may name modules that are not here
             return None
 
@@ -198,19 +192,28 @@ class _DigestCache(FunctionCache):
         self._cache_file = _SoundFile(self._cache_path, self._impl.filename_base, stamp)
         self._turn = contextlib.ExitStack()
 
-    def _lock(self, of=""):
-        return _alone(Path(self._cache_path) / f"{self._impl.filename_base}{of}.lock")
+        self.is_of_package = PACKAGE in Path(py_func.__code__.co_filename).resolve().parents
+
+    def kind(self, sig):
+        """Name of the code for arguments of these types."""
+        return f"{self._impl.filename_base}.{hashlib.sha256(str(sig).encode()).hexdigest()[:16]}"
+
+    def _lock(self, name):
+        return _alone(Path(self._cache_path) / f"{name}.lock")
 
     def load_overload(self, sig, target_context):
         found = super().load_overload(sig, target_context)
         if found is None:
-            self._turn.enter_context(self._lock("." + hashlib.sha256(str(sig).encode()).hexdigest()[:16]))
+            self._turn.enter_context(self._lock(self.kind(sig)))
             found = super().load_overload(sig, target_context)  # another process may have left it meanwhile
         return found or _say_that_it_compiles("once: later runs find the code")
 
     def save_overload(self, sig, data):
         # OSError: the disk is full, or the folder is gone or no longer ours.
-        with contextlib.suppress(OSError), self._lock():  # the index is read, and written with one line more
+        with (
+            contextlib.suppress(OSError),
+            self._lock(self._impl.filename_base),
+        ):  # the index is read, and written with one line more
             super().save_overload(sig, data)
 
     def end_turn(self):
@@ -239,24 +242,37 @@ class EntryPoint(CPUDispatcher):
 def kept_code(name: str, make: Callable[[], bytes]) -> bytes:
     """Code by name from the disk, beside that of entry points; else what `make` returns, which is left there."""
     path = Path(_DigestLocator(kept_code, __file__).get_cache_path()) / name
+    code = _sound(path)
+    if code is None:
+        with _alone(path.with_name(f"{name}.lock")):
+            code = _sound(path)  # another process may have left it meanwhile
+            if code is None:
+                _say_that_it_compiles("once: later runs find the code")
+                code = make()
+                _leave(path, code)
+    return code
+
+
+def _sound(path: Path) -> bytes | None:
+    """Content of a file that begins with its digest; None if it is damaged or not there."""
     try:
         kept = path.read_bytes()
     except OSError:
-        kept = b""
+        return None
     digest, code = kept[:DIGEST_SIZE], kept[DIGEST_SIZE:]
-    if digest == hashlib.sha256(code).digest():
-        return code
-    _say_that_it_compiles("once: later runs find the code")
-    code = make()
+    return code if digest == hashlib.sha256(code).digest() else None
+
+
+def _leave(path: Path, code: bytes) -> None:
+    """Write a file whole, behind its digest; nothing where none can be written."""
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(f".{name}.{os.getpid()}.{secrets.token_hex(4)}")
+        part = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}")
         try:
             part.write_bytes(hashlib.sha256(code).digest() + code)
             part.replace(path)
         finally:
             part.unlink(missing_ok=True)
-    return code
 
 
 @functools.cache
