@@ -18,7 +18,6 @@ from typing import Any, ClassVar, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 
-from seastar_gym import renamed
 from seastar_gym.scene.checks import as_typed, shown
 from seastar_gym.scene.number import PerRobot, Unnamed
 
@@ -140,8 +139,8 @@ def _read(value: object, where: str, depth: int = 0) -> Any:
             return value
         case list():
             return tuple(_read(one, f"{where}[{k}]", depth + 1) for k, one in enumerate(value))
-        case {"kind": str(kind), **fields} if (kind := renamed.KINDS.get(kind, kind)) in KINDS:
-            return _read_part(kind, renamed.fields(kind, fields), where, depth)
+        case {"kind": str(kind), **fields} if kind in KINDS:
+            return _read_part(kind, fields, where, depth)
         case {"kind": str(kind), "items": list(items), **others} if kind in COLLECTIONS and not others:
             return _made(COLLECTIONS[kind], where, _read(items, where, depth + 1))
         case {"kind": kind}:

@@ -281,8 +281,6 @@ def test_a_bundled_policy_has_a_name():
     for name, file in by_name().items():
         assert Description.from_facts(json.loads(file.with_suffix(".json").read_text())).scene == pretrained(name).scene
     assert pretrained().decision_period == 1.0 and pretrained("timed-0.2s").decision_period == 0.2
-    with pytest.warns(DeprecationWarning, match="The policy seastar-0.2s is called timed-0.2s now"):
-        assert pretrained("seastar-0.2s").decision_period == 0.2
     for wrong in ("timed-0.3s", 0.2):
         with assert_refused("There is no bundled policy", "take one of strokes, timed-0.2s, timed-0.5s, fail-blind"):
             pretrained(wrong)

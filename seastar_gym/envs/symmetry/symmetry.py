@@ -7,7 +7,6 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym import renamed
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, as_array, choices
 from seastar_gym.envs.layout import HEADINGS, Layout
 from seastar_gym.envs.symmetry.group import (
@@ -236,7 +235,6 @@ def _vector_order(group: Group, shows_limbs: bool, stations: int) -> NDArray[np.
     return read_only(np.concatenate([places, n_places + places, others], axis=1))
 
 
-@renamed.methods
 class FrameStack:
     """What a controller with memory sees: the present observation, and what was most telling of the last ones.
 
