@@ -144,7 +144,7 @@ def saved_options(folder: Path) -> Options:
     with faults_of(folder / CONFIG):
         here: dict[str, Any] = {"out": folder, "resume": None, "ppo": hyperparameters_of(options), "seeds": ()}
         here |= {"publish": False, "publish_anyway": False}
-        here |= {name: Path(options[name]) for name in ("scene", "intervals") if options.get(name) is not None}
+        here |= {name: Path(options[name]) for name in ("scene", "intervals") if options[name] is not None}
         return Options(**{**options, **here})
 
 

@@ -4,10 +4,9 @@
     assert Scene.from_dict(data) == scene  # to the last bit
 
 A part of a scene is a dict of its `kind` and its constructor's arguments. Those that nobody named, so that a fidelity
-chooses them, are None. Arguments that are left out have their defaults, so that scenes written before a new term was
-added can be read. A tuple is a list, and numbers of each robot are a kind of their own. The outermost dict also has the
-`version` of this form. What could not be read back is refused when it is written. Reading constructs parts of
-registered classes only: it evaluates no text and imports nothing.
+chooses them, are None. Arguments that are left out have their defaults. A tuple is a list, and numbers of each robot
+are a kind of their own. The outermost dict also has the `version` of this form. What could not be read back is refused
+when it is written. Reading constructs parts of registered classes only: it evaluates no text and imports nothing.
 """
 
 import inspect
