@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 FENCED = re.compile(r"^```(\S*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\]\((?!\w+:)([^)#\s]*)(#[^)\s]+)?\)")
-CERTIFY = re.compile(r"(?:-m seastar_gym\.certify|seastar certify)((?: [\w./-]+)+)")
+CERTIFY = re.compile(r"seastar certify((?: [\w./-]+)+)")
 LONGEST = 3  # steps of an episode
 
 

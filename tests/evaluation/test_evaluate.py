@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from agents.evaluate import main
 from declared import assert_declared_as_recorded
 from refusals import assert_told
 from seastar_gym import TASKS, Scene, Seastar, SmaPulse, UniformCurrent
+from seastar_gym.cli.evaluate import main
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, save
 from seastar_gym.controllers.registry import load_agents
@@ -342,8 +342,8 @@ def ragged_path(folder):
         (lambda folder: ["--max-strokes", "0"], "--max-strokes must be a whole number from 1"),
         (lambda folder: ["--waypoint-radius", "-1"], "--waypoint-radius must be"),
         (lambda folder: ["--fidelity", "fast", "balanced"], "Several fidelities are for --sets"),
-        (lambda folder: ["--sets", "nominal"], "needs a folder, --out, and a path, no --sets"),
-        (lambda folder: ["--sets", "nominal", "--no-video", "--swims", "0"], "--swims must be"),
+        (lambda folder: ["--sets", "nominal", "--video"], "needs a folder, --out, and a path, no --sets"),
+        (lambda folder: ["--sets", "nominal", "--swims", "0"], "--swims must be"),
     ],
 )
 def test_bad_input_is_answered_with_one_sentence(tmp_path, capsys, arguments, complaint):

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from agents.evaluate import main
 from refusals import assert_refused, assert_told
+from seastar_gym.cli.evaluate import main
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.comparison import evaluate
@@ -295,7 +295,7 @@ def test_command_line_writes_the_report_with_the_curves_of_runs(tmp_path, capsys
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert '"name":"run"' in page and '"name":"learned"' not in page and "agent straight: 1" in page
     assert "python train.py" in page
-    assert "seastar evaluate --video --out runs/evaluate --agents learned straight" in page
+    assert "seastar evaluate --agents learned straight" in page
 
 
 def test_a_folder_without_a_run_is_answered_with_one_sentence(tmp_path, capsys):
