@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from gymnasium.spaces import Box, Discrete
 
-from declared import assert_declared_as_recorded
 from refusals import assert_refused
 from seastar_gym import HeadingTargets, Numerics, RewardWeights, Scene, Seastar
 from seastar_gym.cli.main import main
@@ -237,10 +236,6 @@ def test_help_tells_the_names_of_all_agents(capsys):
     text = " ".join(capsys.readouterr().out.replace("│", " ").split()).replace("- ", "-")  # names are parted at hyphens
     assert ", ".join(AGENTS) in text and ", ".join(GAITS) in text
     assert "usage: seastar evaluate" in text and ", ".join(PATHS) in text
-
-
-def test_defaults_and_constants_are_declared_as_recorded():
-    assert_declared_as_recorded("seastar_gym.controllers")
 
 
 @pytest.mark.parametrize("n_limbs, names", [(5, ("learned", "pentagon")), (4, ("greedy", "straight"))])

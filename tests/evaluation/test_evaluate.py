@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from declared import assert_declared_as_recorded
 from refusals import assert_told
 from seastar_gym import TASKS, Scene, Seastar, SmaPulse, UniformCurrent
 from seastar_gym.cli.evaluate import main
@@ -55,10 +54,6 @@ def made_up_swim(hub, waypoint_index, waypoints=((0.1, 0.0), (0.1, 0.1)), limbs_
         energy=np.full(len(hub) - 1, 1.5),
         solver_message=None,
     )
-
-
-def test_defaults_and_constants_are_declared_as_recorded():
-    assert_declared_as_recorded("seastar_gym.evaluation")
 
 
 # Measures of a swim
