@@ -334,7 +334,7 @@ def ragged_path(folder):
         (lambda folder: ["--agents", "rest", "rest"], "'rest' is named twice"),
         (lambda folder: ["--path", "hexagon"], "Unknown path 'hexagon'"),
         (lambda folder: ["--path", ragged_path(folder)], "ragged.csv, line 2: every line must have x and y"),
-        (lambda folder: ["--max-strokes", "0"], "--max-strokes must be a whole number from 1"),
+        (lambda folder: ["--seconds", "0"], "--seconds must be"),
         (lambda folder: ["--waypoint-radius", "-1"], "--waypoint-radius must be"),
         (lambda folder: ["--fidelity", "fast", "balanced"], "Several fidelities are for --sets"),
         (lambda folder: ["--sets", "nominal", "--video"], "needs a folder, --out, and a path, no --sets"),
@@ -350,7 +350,7 @@ def test_bad_input_is_answered_with_one_sentence(tmp_path, capsys, arguments, co
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("arguments", [["--fidelity", "none"], ["--sets"], ["--max-strokes", "2", "--seconds", "3"]])
+@pytest.mark.parametrize("arguments", [["--fidelity", "none"], ["--sets"]])
 def test_options_that_are_none_end_with_the_usage(arguments, capsys):
     with pytest.raises(SystemExit) as refusal:
         main(arguments)
