@@ -59,7 +59,7 @@ PICTURE = (
     "try: env = gymnasium.make('SeastarSwim-v0', render_mode='rgb_array'); env.reset(seed=0); env.render()\n"
     "except ImportError as missing: raise SystemExit(str(missing))"
 )
-SWEEP = "-m", "seastar_gym.cli", "sweep", "robot.limb_length=0.08:0.1:3", "--out", "runs/never"
+SWEEP = "-m", "seastar_gym.cli", "sweep", "robot.limb_length=0.08:0.1:3", "--out", os.devnull
 WITHOUT = [
     ("studies", OF_STUDIES, ("-m", "studies", "--help")),
     *(("train", OF_TRAIN, ("-m", command, "--help")) for command in ("agents.cards", "agents.rllib", "agents.tasks")),
@@ -67,8 +67,6 @@ WITHOUT = [
       for missing in (("tyro",), ("tensorboard",), ("torch", "stable_baselines3"), ("plotly",))),
     ("sweep", ("pyarrow",), SWEEP),
     ("search", ("optuna", "sqlalchemy"), (*SWEEP, "--optuna", "2")),
-    ("ray", ("ray",), (*SWEEP, "--executor", "ray")),
-    ("slurm", ("submitit",), (*SWEEP, "--executor", "slurm")),
     ("studies", ("matplotlib",), ("-m", "seastar_gym.cli", "identify", "--synthetic", "--picture", "fit.png")),
     ("render", ("pygame",), ("-c", PICTURE)),
 ]  # fmt: skip
@@ -78,6 +76,13 @@ WITHOUT = [
 @pytest.mark.parametrize("extra, missing, command", WITHOUT)
 def test_a_command_without_its_extra_says_how_to_get_it(extra, missing, command, tmp_path):
     assert_says(python(tmp_path, missing, *command), extra, missing)
+
+
+@pytest.mark.parametrize("extra, module", [("ray", "ray"), ("slurm", "submitit")])
+def test_an_executor_without_its_extra_says_how_to_get_it(extra, module, tmp_path):
+    done = python(tmp_path, (module,), *SWEEP, "--executor", extra)  # which has counted designs, and begun a bar
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].endswith(f'need {module}: pip install "seastar-gym[{extra}]".')
 
 
 def test_sweeps_need_no_optuna(tmp_path):
