@@ -1,4 +1,4 @@
-"""Training and reports: PPO on the native batch, and the pages that compare agents for SeastarSwim-v0.
+"""Training: PPO on the native batch, imitation, RLlib on several machines, and cards of the policies.
 
 Controllers, evaluation and the adapter of Stable-Baselines3 are in the package, in `seastar_gym`.
 """

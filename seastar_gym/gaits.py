@@ -7,7 +7,6 @@ anti-clockwise. In time, a stroke is a decision, and the share is that of a puls
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym import renamed
 from seastar_gym.scene.checks import (
     as_finite,
     is_whole_number,
@@ -71,8 +70,6 @@ LAG, THRIFTY_LAG = 0.6, 0.5
 """Best time from one pair of the lagged gait to the other [s], for full pulses and for those of the thrifty gait."""
 THRIFTY_LEVEL = 0.6
 """Share of a full pulse in the thrifty gait."""
-__getattr__ = renamed.names_of(__name__)
-
 MOST_DECISIONS = 1_000_000
 """Most strokes of a side of the pentagon, and most numbers of strokes that are written as decisions."""
 SHORTEST = 1e-3

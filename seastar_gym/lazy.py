@@ -8,8 +8,6 @@ from importlib.util import find_spec
 from types import ModuleType
 from typing import Any
 
-from seastar_gym import renamed
-
 
 def lazily(package: str) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
     """`__all__`, `__getattr__` and `__dir__` of a package, whose modules are its attributes, too.
@@ -31,7 +29,7 @@ def lazily(package: str) -> tuple[list[str], Callable[[str], Any], Callable[[], 
         elif not name.startswith("_") and find_spec(f"{package}.{name}"):
             found = import_module(f"{package}.{name}")
         else:
-            return renamed.attribute(package, name)
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
         setattr(module, name, found)
         return found
 

@@ -3,11 +3,9 @@
 import ast
 import doctest
 import importlib
-import importlib.util
 import json
 import re
 import shlex
-import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -27,7 +25,7 @@ ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 FENCED = re.compile(r"^```(\S*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\]\((?!\w+:)([^)#\s]*)(#[^)\s]+)?\)")
-CERTIFY = re.compile(r"(?:-m seastar_gym\.certify|seastar certify)((?: [\w./-]+)+)")
+CERTIFY = re.compile(r"seastar certify((?: [\w./-]+)+)")
 LONGEST = 3  # steps of an episode
 
 
@@ -221,18 +219,6 @@ def test_links_lead_to_headings(page):
     assert [(target.name, anchor) for target, anchor in named if anchor not in anchors(target)] == []
 
 
-def words(text: str) -> int:
-    """Words and numbers of prose and tables; not the rules of tables, no comments, no code."""
-    shown = re.sub(r"<!--.*?-->", "", FENCED.sub("", text), flags=re.DOTALL)
-    return sum(any(map(str.isalnum, word)) for word in shown.split())
-
-
-def test_the_guide_is_no_longer_than_a_reader_s_patience():
-    pages = PAGES[1:]
-    assert len(pages) <= 28
-    assert sum(words(page.read_text(encoding="utf-8")) for page in pages) <= 25_000
-
-
 SAID = re.compile(r"docs/(\w+\.md)")
 
 
@@ -259,44 +245,3 @@ def test_every_page_is_named_once_in_the_contents():
     named = [line for part in contents for line in part.splitlines() if line and not line.startswith(":")]
     assert len(named) == len(set(named)) > 20
     assert all((ROOT / "docs" / f"{name}.md").is_file() for name in named)
-
-
-# Fifteen questions find their page by the search of the guide, which answers them; `.ci/run` asks them, too.
-
-
-SPEC = importlib.util.spec_from_file_location("search", ROOT / ".ci" / "search.py")
-search = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(search)
-
-
-@pytest.mark.parametrize("question", search.QUESTIONS)
-def test_the_page_answers_the_question(question):
-    page, answer = search.QUESTIONS[question]
-    assert answer in (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
-
-
-def test_a_heading_and_words_of_the_title_count_and_rare_pages_come_last(monkeypatch):
-    monkeypatch.setattr(search, "stemmed", lambda question: set(question.split()))
-    index = {
-        "docnames": ["a", "b", "changelog"], "titles": ["Apples", "Change the drag", "Drag"],
-        "alltitles": {"Apples": [[0, None]], "Change the drag": [[1, None]], "Drag": [[0, "drag"], [2, None]]},
-        "terms": {"drag": [0, 1, 2], "apple": 0}, "titleterms": {"drag": [0, 1, 2], "chang": 1},
-    }  # fmt: skip
-    assert search.results(index, "drag", "changelog") == ["b", "a", "changelog"]
-    assert search.results(index, "drag apple", "changelog") == ["a"]
-    assert search.results(index, "pears", "changelog") == []
-
-
-def test_every_question_finds_its_page(tmp_path, capsys):
-    for name in ("sphinx", "myst_parser", "furo"):
-        pytest.importorskip(name, reason="the guide is built with the extra docs")
-    subprocess.run([sys.executable, "-m", "sphinx", "-q", ROOT / "docs", tmp_path], check=True)
-    assert search.main(tmp_path) == 0, capsys.readouterr().out
-
-
-def test_a_question_that_nothing_answers_is_named(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(search, "stemmed", lambda question: set(question.split()))
-    empty = {"docnames": [], "titles": [], "alltitles": {}, "terms": {}, "titleterms": {}}
-    (tmp_path / "searchindex.js").write_text(f"Search.setIndex({json.dumps(empty)})", encoding="utf-8")
-    assert search.main(tmp_path) == 1
-    assert "'cite' finds nothing, not index." in capsys.readouterr().out

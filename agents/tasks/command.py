@@ -1,4 +1,4 @@
-"""Trains the policy of every task for the box, and writes its card.
+"""Trains the bundled policy of every task, and writes its card.
 
     python -m agents.tasks
 
@@ -49,7 +49,7 @@ FAR_SEED = 10**6
 
 @dataclass(frozen=True)
 class Options:
-    """Train the policy of every task for the box, and write its card."""
+    """Train the bundled policy of every task, and write its card."""
 
     tasks: tuple[str, ...] = tuple(RECIPES)
     """Environments."""

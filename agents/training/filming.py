@@ -11,7 +11,7 @@ from pathlib import Path
 
 import seastar_gym
 from agents.training.options import Options
-from agents.training.robot import physics, robot_of
+from agents.training.robot import physics
 from seastar_gym.processors import processors
 
 LOWEST = 19
@@ -32,9 +32,7 @@ def filmed_beside(gait: str | None, options: Options, folder: Path) -> Iterator[
         yield lambda: None
         return
     with tempfile.TemporaryDirectory(prefix="seastar-film-", ignore_cleanup_errors=True) as place:
-        limit = options.limit(robot_of(options, folder).scene)
-        process = _begun(["--agents", gait, *physics(options, folder.resolve()), "--max-strokes", str(limit), "--video",
-                          "--out", place])  # fmt: skip
+        process = _begun(["--agents", gait, *physics(options, folder.resolve()), "--video", "--out", place])
 
         def film() -> Path | None:
             file = Path(place, f"{gait}.mp4")

@@ -10,7 +10,7 @@ import numpy as np
 import tyro
 
 from agents.hyperparameters import Hyperparameters
-from seastar_gym import RewardWeights, renamed
+from seastar_gym import RewardWeights
 from seastar_gym.controllers.learned import reason_of
 from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.paths import PATHS, make_path
@@ -122,7 +122,6 @@ CHANGEABLE = {
 
 def read_options(arguments: Sequence[str]) -> Options:
     """Options of the command line; with --resume, those of the run where the command line has no others."""
-    arguments = renamed.options(arguments)
     options = tyro.cli(Options, prog="python train.py", args=arguments)
     if options.resume is None:
         return replace(options, strokes=32_768, fidelity="fast") if options.quick else options
@@ -141,11 +140,11 @@ def require_same(options: Any, saved: Any, changeable: Collection[str]) -> None:
 
 def saved_options(folder: Path) -> Options:
     """Options of the run in a folder, without --publish, which has to be asked for again."""
-    options = renamed.fields("Options", config_of(folder)["options"])
+    options = config_of(folder)["options"]
     with faults_of(folder / CONFIG):
         here: dict[str, Any] = {"out": folder, "resume": None, "ppo": hyperparameters_of(options), "seeds": ()}
         here |= {"publish": False, "publish_anyway": False}
-        here |= {name: Path(options[name]) for name in ("scene", "intervals") if options.get(name) is not None}
+        here |= {name: Path(options[name]) for name in ("scene", "intervals") if options[name] is not None}
         return Options(**{**options, **here})
 
 

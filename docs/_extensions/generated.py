@@ -1,4 +1,4 @@
-"""What pages do not say themselves: references from docstrings, the changelog, new pages.
+"""What pages do not say themselves: references from docstrings, new pages.
 
 A page has a line `<!-- site: NAME words -->`, which GitHub does not show, and the site has what the function NAME of
 GENERATORS makes of the words, in Markdown.
@@ -13,16 +13,7 @@ from reference import names, public
 from sphinx.application import Sphinx
 
 DOCS = Path(__file__).resolve().parents[1]
-VERSION = re.compile(r"^## (.*)$", re.MULTILINE)
 MARKER = re.compile(r"^<!-- site: (\w+) ?(.*?) -->$", re.MULTILINE)
-
-
-def changelog() -> str:
-    """CHANGELOG.md without its title, its links from here, every version folded under its name."""
-    text = (DOCS.parent / "CHANGELOG.md").read_text(encoding="utf-8").partition("\n")[2].replace("](docs/", "](")
-    first, *rest = VERSION.split(re.sub(r"^###+ (.*)$", r"**\1**", text, flags=re.MULTILINE))
-    parts = zip(rest[::2], rest[1::2], strict=True)
-    return first + "".join(f"<details><summary>{name}</summary>\n{told}\n</details>\n\n" for name, told in parts)
 
 
 def more_pages() -> str:
@@ -33,7 +24,6 @@ def more_pages() -> str:
 
 
 GENERATORS: dict[str, Callable[..., str]] = {
-    "changelog": changelog,
     "more_pages": more_pages,
     "names": names,
     "public": public,

@@ -1,6 +1,6 @@
 """What speed costs a scene in accuracy: settings with their measured errors, and the certificates that hold them.
 
-`certify(scene)` and `python -m seastar_gym.certify` measure them of any scene (measure.py, command.py); those of the
+`certify(scene)` and `seastar certify` measure them of any scene (measure.py, command.py); those of the
 chapter's robot come with the package (chapter.py).
 """
 

@@ -1,4 +1,4 @@
-"""`Certificate`: measured errors of one scene, written by `python -m seastar_gym.certify`.
+"""`Certificate`: measured errors of one scene, written by `seastar certify`.
 
 A certificate is a JSON file. It lapses where the scene's physics or the version of the package differ: then it is
 refused with a sentence. The file has a digest of its content, so that errors stay those of their scene.
@@ -134,7 +134,7 @@ class Certificate:
             own = "the chapter's robot in the chapter's water" if self.scene.is_chapters else "another scene"
             raise ValueError(
                 f"The certificate is of {own}, which differs in more than numerics and nodes per limb: certify this "
-                "one with python -m seastar_gym.certify."
+                "one with seastar certify."
             )
 
     def of(self, scene: Scene) -> Setting | None:

@@ -1,4 +1,4 @@
-"""Measures what speed costs a scene in accuracy: `python -m seastar_gym.certify my_scene.py --error 0.01`.
+"""Measures what speed costs a scene in accuracy: `seastar certify my_scene.py --error 0.01`.
 
 The scene is a Python file that defines `scene`, a JSON file as `Scene.to_dict` writes it, or none for the chapter's. A
 file of Python is executed. Errors are those of the hub's path in space, in time and in sum, over classes of commands

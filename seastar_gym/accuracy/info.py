@@ -86,6 +86,6 @@ def warn_uncertified(
     else:
         remedy = "info has no errors: error_bars=True estimates them as the robot swims"
         if decision_period is None:
-            remedy = "errors in info are NaN: python -m seastar_gym.certify measures them"
+            remedy = "errors in info are NaN: seastar certify measures them"
         told = f'Errors of this scene were not measured: fidelity="{fidelity}" promises nothing for it, and {remedy}.'
     warnings.warn(told, stacklevel=3)

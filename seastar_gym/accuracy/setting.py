@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, cast, get_args
 
-from seastar_gym import renamed
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.checks import require_choice, require_count, require_number, shown
 from seastar_gym.scene.numerics import Resolution, SchemeName
@@ -16,7 +15,6 @@ LARGEST_GROWTH = 1.5
 """Growth of the kinetic energy over a long swim above which `Certificate.for_error` does not choose a setting."""
 
 
-@renamed.methods
 @dataclass(frozen=True)
 class Setting:
     """A resolution and numerics, with the errors and the speed of one scene.

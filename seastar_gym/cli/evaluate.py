@@ -23,7 +23,6 @@ from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.results import Row, write_csv
-from seastar_gym.evaluation.rollout import MOST_DECISIONS
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.evaluation.trials import SETS, as_text, trials
 from seastar_gym.extras import require_extra
@@ -50,9 +49,7 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
     found.add_argument("--decision-period", type=float, help="time between decisions [s] (default: a stroke of 1 s)")
-    limit = found.add_mutually_exclusive_group()
-    limit.add_argument("--seconds", type=float, default=TIME_LIMIT, help=f"time limit [s] {DEFAULT}")
-    limit.add_argument("--max-strokes", type=int, help="time limit [decisions]")
+    found.add_argument("--seconds", type=float, default=TIME_LIMIT, help=f"time limit [s] {DEFAULT}")
     radius = f"radius of the waypoints [m] {DEFAULT}"
     found.add_argument("--waypoint-radius", type=float, default=WAYPOINT_RADIUS, help=radius)
     found.add_argument("--random-heading", action=flag, default=False, help="turn the robot at random at the start")
@@ -66,8 +63,6 @@ def parser() -> argparse.ArgumentParser:
     report = found.add_argument_group("what the report shows, too")
     report.add_argument("--runs", nargs="+", type=Path, default=[], help="trainings (default: those of learned agents)")
     report.add_argument("--trials", type=Path, help="CSV file that --sets wrote")
-    bound = Path("docs/results/learning/bound.json")
-    report.add_argument("--bound", type=Path, default=bound, help=f"results of studies.learning.bound {DEFAULT}")
     many = found.add_argument_group("many swims")
     many.add_argument("--sets", nargs="+", choices=SETS, help="named paths; random paths or the pentagon, disturbed")
     many.add_argument("--swims", type=int, default=1000, help=f"number of random paths of every set {DEFAULT}")
@@ -81,8 +76,6 @@ def require_sound(options: argparse.Namespace) -> None:
     require_number("--waypoint-radius", options.waypoint_radius, "m")
     require_count("--swims", options.swims, 1, 1_000_000)
     require_period(options.decision_period, "--decision-period")
-    if options.max_strokes is not None:
-        require_count("--max-strokes", options.max_strokes, 1, MOST_DECISIONS)
     if options.sets is None and len(options.fidelity) > 1:
         raise ValueError("Several fidelities are for --sets: name one.")
     if (options.video or options.report or options.trajectory) and (options.out is None or options.sets is not None):
@@ -91,7 +84,7 @@ def require_sound(options: argparse.Namespace) -> None:
 
 def limit_of(options: argparse.Namespace, scene: Scene | None = None) -> int:
     """Time limit [decisions]."""
-    return options.max_strokes or decisions_in(options.seconds, options.decision_period, scene)
+    return decisions_in(options.seconds, options.decision_period, scene)
 
 
 def compared(options: argparse.Namespace, command: str) -> None:
@@ -114,7 +107,7 @@ def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: 
     """Remarks of the report: how the agents were trained, and how the report was made."""
     require_extra("Reports", "report", "plotly")
     from seastar_gym.evaluation.report.charts import Curve, read_progress
-    from seastar_gym.evaluation.report.page import Remarks, read_bound, trials_table
+    from seastar_gym.evaluation.report.page import Remarks, trials_table
 
     trainings = {name: one.training for name, one in agents.items() if isinstance(one, LearnedPolicy)}
     progress = {name: how["progress"] for name, how in trainings.items() if "progress" in how}
@@ -128,7 +121,6 @@ def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: 
         commands=[*commands, command],
         curves=[Curve.of(name, rows) for name, rows in progress.items()],
         tables=[] if options.trials is None else [trials_table(options.trials)],
-        bound=read_bound(options.bound) if options.bound.exists() else None,
     )
 
 

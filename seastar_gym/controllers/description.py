@@ -17,10 +17,10 @@ from seastar_gym.scene.actuators.actuator import Mirror
 from seastar_gym.scene.checks import is_whole_number, require_count, require_kind, shown
 from seastar_gym.version import __version__
 
-FORMAT = 2
+FORMAT = 3
 """Version of the entries of a description."""
 MOST_NUMBERS = 1000
-"""Most numbers of a task, or of a limb, that a description may claim."""
+"""Most numbers of a limb that a description may claim."""
 WIDEST = 1_000_000
 """Largest number of neurons of a layer that a description may claim."""
 
@@ -56,19 +56,11 @@ class Description(NamedTuple):
             "seastar_gym": __version__,
             "observation_layout": OBSERVATION_LAYOUT,
             "observation_size": self.observation_size,
-            **self._written(),
+            **self._asdict(),
             "scene": self.scene.to_dict(),
             **more,
         }
         return json.dumps(facts, indent=2, default=str, allow_nan=False)
-
-    def _written(self) -> dict[str, Any]:
-        """Entries as they are written, but for the scene."""
-        facts = self._asdict()
-        kinds, shows_limbs, stations = (facts.pop(name) for name in ("entries", "shows_limbs", "stations"))
-        rows = [WRITTEN_AS.get(kind, kind) for kind in kinds] if isinstance(kinds, tuple) else kinds
-        fewer = {} if is_whole_number(stations) and stations == N_STATIONS else {"stations": stations}
-        return {**facts, "own": {"kinds": rows, "with_stations": shows_limbs, **fewer}}
 
     @classmethod
     def from_json(cls, text: str | bytes) -> "Description":
@@ -79,7 +71,7 @@ class Description(NamedTuple):
     def from_facts(cls, facts: Mapping[str, Any]) -> "Description":
         """Description from the entries of `to_json`; ValueError where one is missing or wrong."""
         require_kind("facts", facts, Mapping, "entries by name, as to_json writes them")
-        missing = [name for name in WRITTEN if name not in facts]
+        missing = [name for name in ("format", "observation_layout", *cls._fields) if name not in facts]
         if missing:
             raise ValueError(f"It does not say {missing[0]!r}.")
         for name, ours in (("format", FORMAT), ("observation_layout", OBSERVATION_LAYOUT)):
@@ -91,7 +83,7 @@ class Description(NamedTuple):
     def _of(cls, facts: Mapping[str, Any], scene: Scene) -> "Description":
         """Description from its entries, with the scene of its own."""
         actions: Any = facts["actions"]
-        symmetry, hidden = facts["symmetry"], facts["hidden"]
+        symmetry, hidden, task, past = (facts[name] for name in ("symmetry", "hidden", "task", "past"))
         if not isinstance(actions, str) or actions not in get_args(Discrete):
             known = ", ".join(map(repr, get_args(Discrete)))
             raise ValueError(f"Its actions must be one of {known}, not {shown(actions)}.")
@@ -101,20 +93,28 @@ class Description(NamedTuple):
             raise ValueError(f"Its hidden must be a list of widths, not {shown(hidden)}.")
         for width in hidden:
             require_count("a width of its hidden layers", width, 1, WIDEST)
-        decision_period = facts.get("decision_period")  # older descriptions have none: strokes
-        if decision_period is not None:
-            checked_decision_period(decision_period, scene)
-        seen = _seen(facts)
-        if facts.get("past") and not symmetry:
+        if facts["decision_period"] is not None:
+            checked_decision_period(facts["decision_period"], scene)
+        if task is not None and (not isinstance(task, str) or task not in CHALLENGES):
+            raise ValueError(f"Its task must be one of {', '.join(CHALLENGES)}, not {shown(task)}.")
+        require_count("its past", past, 0, MOST_PAST)
+        if past and not symmetry:
             raise ValueError("A policy without symmetry has no past.")
-        return cls(cast(Discrete, actions), symmetry, scene, tuple(hidden), decision_period, *seen)
+        mirror = None if facts["limb_mirror"] is None else _mirror(facts["limb_mirror"])
+        entries = tuple(facts["entries"]) if isinstance(facts["entries"], list) else facts["entries"]
+        found = cls(
+            cast(Discrete, actions), symmetry, scene, tuple(hidden), facts["decision_period"], task, mirror, entries,
+            facts["shows_limbs"], past, facts["stations"],
+        )  # fmt: skip
+        _ = found.layout  # refuses the entries that are its own
+        return found
 
     def check(self) -> None:
         """ValueError, with one sentence, where an entry is none of its kind."""
         require_kind("scene", self.scene, Scene, "a Scene")
         require_kind("hidden", self.hidden, tuple, "a tuple of widths")
         rows = None if self.limb_mirror is None else _rows(self.limb_mirror)
-        self._of({**self._written(), "limb_mirror": rows, "hidden": list(self.hidden)}, self.scene)
+        self._of({**self._asdict(), "limb_mirror": rows, "hidden": list(self.hidden)}, self.scene)
 
     @property
     def mirror(self) -> Mirror:
@@ -162,27 +162,8 @@ class Description(NamedTuple):
         return shapes
 
 
-WRITTEN = ("format", "observation_layout", "actions", "symmetry", "hidden", "scene")
-"""Entries that every description has."""
-SEEN = ("task", "limb_mirror", "own", "past")
-"""Entries on what a policy of a task sees; older descriptions have none."""
-WRITTEN_AS: dict[str, str] = {"pseudoscalar": "turn"}
-"""Words for entries of an observation that are others in a description."""
-KINDS: dict[str, Entry] = {WRITTEN_AS.get(entry, entry): entry for entry in get_args(Entry)}
-"""Entries of an observation by their words in a description."""
 CHALLENGES = tuple(dict.fromkeys(about[0] for about in TASKS.values()))
 """Names of challenges that policies are trained for."""
-
-
-def _seen(facts: Mapping[str, Any]) -> tuple[str | None, Mirror | None, tuple[Entry, ...], bool, int, int]:
-    """Entries on what a policy of a task sees. ValueError where one is wrong."""
-    task, mirror, own, past = (facts.get(name) for name in SEEN)
-    if task is not None and (not isinstance(task, str) or task not in CHALLENGES):
-        raise ValueError(f"Its task must be one of {', '.join(CHALLENGES)}, not {shown(task)}.")
-    if past is not None:
-        require_count("its past", past, 0, MOST_PAST)
-    entries, shows_limbs, stations = ((), True, N_STATIONS) if own is None else _own(own)
-    return task, None if mirror is None else _mirror(mirror), entries, shows_limbs, past or 0, stations
 
 
 def _rows(mirror: object) -> object:
@@ -202,19 +183,6 @@ def _mirror(rows: object) -> Mirror:
     if any(rows[index] != [place, sign] for place, (index, sign) in enumerate(rows)):
         raise ValueError(f"Its limb_mirror is no mirror, which undoes itself: {shown(rows)}.")
     return tuple((index, sign) for index, sign in rows)
-
-
-def _own(own: object) -> tuple[tuple[Entry, ...], bool, int]:
-    """Further entries of an observation, whether it shows the limbs, and at how many stations each."""
-    facts = {"stations": N_STATIONS, **own} if isinstance(own, dict) else {}
-    if set(facts) != {"kinds", "with_stations", "stations"} or not isinstance(facts["with_stations"], bool):
-        raise ValueError(f"Its own must be an object with kinds and with_stations, not {shown(own)}.")
-    kinds = facts["kinds"]
-    known = isinstance(kinds, list) and all(isinstance(kind, str) and kind in KINDS for kind in kinds)
-    if not known or len(kinds) > MOST_NUMBERS:
-        raise ValueError(f"The kinds of its own numbers must be of {', '.join(KINDS)}, not {shown(kinds)}.")
-    require_count("its stations", facts["stations"], 1, N_STATIONS)
-    return tuple(KINDS[kind] for kind in kinds), facts["with_stations"], facts["stations"]
 
 
 def read_facts(text: str | bytes) -> dict[str, Any]:

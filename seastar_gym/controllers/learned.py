@@ -23,7 +23,6 @@ import safetensors
 import safetensors.numpy
 from numpy.typing import NDArray
 
-from seastar_gym import renamed
 from seastar_gym.controllers.contract import as_floating, memory_of, starts
 from seastar_gym.controllers.description import Description, read_facts
 from seastar_gym.envs.commands import Actions
@@ -34,8 +33,6 @@ from seastar_gym.scene.checks import is_finite_number, require_file, require_fla
 
 if TYPE_CHECKING:
     from seastar_gym.envs.tasks.challenge import Challenge
-
-__getattr__ = renamed.names_of(__name__)
 
 BUNDLED = Path(__file__).parent / "policies" / "strokes.safetensors"
 """File of the bundled policy that decides stroke by stroke; `python train.py --publish` replaces it."""
@@ -50,7 +47,6 @@ RESOLUTION = "robot.nodes_per_limb"
 """Fact of a scene that a policy does not depend on."""
 
 
-@renamed.methods
 class LearnedPolicy:
     """Trained policy with the `predict` of Stable-Baselines3, from observations of the environment to its actions.
 
@@ -254,7 +250,7 @@ def by_name() -> dict[str, Path]:
 
 def file_of(name: str) -> Path | None:
     """File of the bundled policy of a name; None if there is none."""
-    return by_name().get(renamed.policy(name))
+    return by_name().get(name)
 
 
 def pretrained(name: str = BUNDLED.stem) -> LearnedPolicy:

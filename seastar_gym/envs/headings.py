@@ -15,20 +15,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym import renamed
 from seastar_gym.scene.checks import is_finite_number, require_number, shown
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
-
-__getattr__ = renamed.names_of(__name__)
 
 LARGEST = 1e6
 """Largest angle that may be asked for [rad]: beyond it, rounding is seen."""
 
 
 @register_part
-@renamed.arguments
 @dataclass(frozen=True)
 class HeadingTargets:
     """Headings at the waypoints, without which they are not reached.

@@ -170,10 +170,3 @@ def memory_size(actuator: Actuator) -> int:
     """Numbers that are observed of an actuator, 0 without memory."""
     known = complete(actuator)
     return known.observe(known.rest).shape[-1]
-
-
-def layout(n_limbs: int, n_remembered: int = 0, with_headings: bool = False) -> Layout:
-    """`Layout` by its old name, for one release. n_remembered: Numbers that all actuators remember together."""
-    require_count("n_remembered", n_remembered, 0, MOST_REMEMBERED)
-    require_flag("with_headings", with_headings)
-    return Layout(n_limbs, n_remembered // n_limbs, HEADINGS if with_headings else ())

@@ -3,8 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.layout import Layout as Layout  # both by their old place, for one release
-from seastar_gym.envs.layout import layout as layout
 from seastar_gym.simd.compilation import entry_point, kernel
 from seastar_gym.simd.lanes import add_product, borrow, load, load_number, select, splat, sqrt, store
 

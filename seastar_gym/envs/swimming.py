@@ -21,7 +21,6 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym import renamed
 from seastar_gym.accuracy.info import errors_in_info, read_certificate
 from seastar_gym.envs.commands import checked_decision_period, unless_strokes
 from seastar_gym.envs.lag import Lag, Piece
@@ -78,7 +77,6 @@ class Draws(Protocol):
         """Draw all numbers of a robot, in place."""
 
 
-@renamed.methods
 class Swimming(ABC):
     """Task of `n_robots` robots.
 

@@ -1,4 +1,4 @@
-"""Fits numbers of a scene to measured trajectories: `python -m seastar_gym.identify --help`."""
+"""Fits numbers of a scene to measured trajectories: `seastar identify --help`."""
 
 from seastar_gym.identify.fit import Estimate, identify
 from seastar_gym.identify.measurement import Measurement

@@ -1,4 +1,4 @@
-"""Fits numbers of a scene to measured trajectories: `python -m seastar_gym.identify --help`.
+"""Fits numbers of a scene to measured trajectories: `seastar identify --help`.
 
 The trajectory is a CSV file with a line of names, `time,x0,y0,x9,y9,..`, and then one line for every time: the time [s]
 and the coordinates [m] of any nodes. Node 0 is the hub, node j (N - 1) the tip of limb j. The robot begins at rest with

@@ -65,7 +65,7 @@ class Measurement:
 
     @classmethod
     def from_csv(cls, trajectory: str | Path, commands: str | Path) -> "Measurement":
-        """Measurement from two CSV files, whose form `python -m seastar_gym.identify --help` shows."""
+        """Measurement from two CSV files, whose form `seastar identify --help` shows."""
         require_file("trajectory", trajectory)
         require_file("commands", commands)
         time, positions, nodes = _read_trajectory(trajectory)

@@ -1,6 +1,6 @@
 """`Numerics`: scheme, step and tolerances of time stepping, chosen by value or by preset."""
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from typing import Annotated, Literal, NamedTuple, get_args
 
 from seastar_gym.scene.checks import require_choice, require_flag, require_number, shown
@@ -64,7 +64,7 @@ class Numerics:
             raise ValueError(f'path_tolerance needs the scheme "implicit-midpoint", not {shown(self.scheme)}.')
         if self.damping > 0.0 and self.scheme != "implicit-midpoint":
             raise ValueError(f'damping needs the scheme "implicit-midpoint", not {shown(self.scheme)}.')
-        if not self.named and self not in (DEFAULT, *OLD_DEFAULTS):
+        if not self.named and self != DEFAULT:
             object.__setattr__(self, "named", True)
 
     def __repr__(self) -> str:
@@ -113,13 +113,11 @@ PRESETS: dict[Fidelity, Resolution] = {
     "chapter": Resolution("chapter", NODES["chapter"], Numerics("implicit-euler", 3e-3)),
 }
 """`fast` and `balanced` lie on or near the front that `python -m studies.accuracy` measures. `accurate` and `reference`
-keep the steps of earlier versions: longer steps on finer meshes reach their errors faster, see `Scene.for_error`."""
+have steps so short that longer ones on finer meshes reach their errors faster, see `Scene.for_error`."""
 
 DEFAULT_FIDELITY: Fidelity = "balanced"
 DEFAULT = PRESETS[DEFAULT_FIDELITY].numerics
 """Numerics of a `Scene` that is given none."""
-OLD_DEFAULTS = Numerics(), replace(DEFAULT, damping=0.0)
-"""Numerics that a `Scene` was given by default once, in files of that time."""
 
 
 def require_duration(duration: float, step: float, name: str = "duration") -> None:

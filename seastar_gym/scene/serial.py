@@ -4,10 +4,9 @@
     assert Scene.from_dict(data) == scene  # to the last bit
 
 A part of a scene is a dict of its `kind` and its constructor's arguments. Those that nobody named, so that a fidelity
-chooses them, are None. Arguments that are left out have their defaults, so that scenes written before a new term was
-added can be read. A tuple is a list, and numbers of each robot are a kind of their own. The outermost dict also has the
-`version` of this form. What could not be read back is refused when it is written. Reading constructs parts of
-registered classes only: it evaluates no text and imports nothing.
+chooses them, are None. Arguments that are left out have their defaults. A tuple is a list, and numbers of each robot
+are a kind of their own. The outermost dict also has the `version` of this form. What could not be read back is refused
+when it is written. Reading constructs parts of registered classes only: it evaluates no text and imports nothing.
 """
 
 import inspect
@@ -18,7 +17,6 @@ from typing import Any, ClassVar, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 
-from seastar_gym import renamed
 from seastar_gym.scene.checks import as_typed, shown
 from seastar_gym.scene.number import PerRobot, Unnamed
 
@@ -140,8 +138,8 @@ def _read(value: object, where: str, depth: int = 0) -> Any:
             return value
         case list():
             return tuple(_read(one, f"{where}[{k}]", depth + 1) for k, one in enumerate(value))
-        case {"kind": str(kind), **fields} if (kind := renamed.KINDS.get(kind, kind)) in KINDS:
-            return _read_part(kind, renamed.fields(kind, fields), where, depth)
+        case {"kind": str(kind), **fields} if kind in KINDS:
+            return _read_part(kind, fields, where, depth)
         case {"kind": str(kind), "items": list(items), **others} if kind in COLLECTIONS and not others:
             return _made(COLLECTIONS[kind], where, _read(items, where, depth + 1))
         case {"kind": kind}:

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym import renamed
 from seastar_gym.der.rods import Work
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
@@ -46,7 +45,6 @@ class Snapshot(NamedTuple):
     bars: Any
 
 
-@renamed.methods
 class Simulator:
     """A batch of robots of one scene. They begin at rest, with the hub at the origin.
 

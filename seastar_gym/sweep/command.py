@@ -1,4 +1,4 @@
-"""Simulates many designs and writes how they swim: `python -m seastar_gym.sweep robot.n_limbs=3,5 --out runs/limbs`.
+"""Simulates many designs and writes how they swim: `seastar sweep robot.n_limbs=3,5 --out runs/limbs`.
 
 Axes are NAME=VALUES. The name is that of a number of the scene, such as robot.limb_length, actuator.peak_angle or
 numerics.step, of a whole part (robot, fluid, actuator, numerics, contact), fidelity, gait or controller. The values are

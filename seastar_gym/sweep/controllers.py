@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from seastar_gym import renamed
 from seastar_gym.controllers.contract import Policy, require_fit
 from seastar_gym.controllers.learned import load
 from seastar_gym.controllers.registry import AGENTS, files_of, learned_file, load_agent
@@ -21,8 +20,6 @@ from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number, require_period, shown
-
-__getattr__ = renamed.names_of(__name__)
 
 
 @dataclass(frozen=True)

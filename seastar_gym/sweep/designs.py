@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from seastar_gym import renamed
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_seed, shown
 from seastar_gym.scene.number import check_numbers, whole
@@ -29,8 +28,6 @@ MOST_NUMBERS = 20_000_000
 """Numbers of a Latin hypercube, which is drawn as a whole: 160 MB."""
 
 
-@renamed.methods
-@renamed.arguments
 @dataclass(frozen=True)
 class Sweep:
     """Designs of all combinations of choices; with ranges, `samples` of a Latin hypercube for every combination.

@@ -9,15 +9,12 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet
 
-from seastar_gym import renamed
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_file
 from seastar_gym.scene.per_robot import unit_of
 from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS, swim
-
-__getattr__ = renamed.names_of(__name__)
 
 
 def result_file_of(batch: Batch, device: str = "cpu") -> bytes:

@@ -5,14 +5,11 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from seastar_gym import renamed
 from seastar_gym.command import refused_by_disk
 from seastar_gym.executors import Executor, Outcome, Work
 from seastar_gym.scene.checks import require_callable, require_file, require_kind, shown
 from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.result_files import ResultFiles, result_file_of
-
-__getattr__ = renamed.names_of(__name__)
 
 ATTEMPTS = 3
 """How often a batch is tried whose worker is lost."""

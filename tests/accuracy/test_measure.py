@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from currents import CURRENTS, velocity
-from declared import assert_declared_as_recorded
 from seastar_gym import Body, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires, UniformCurrent
 from seastar_gym.accuracy import commands, endurance, measure, water
 from seastar_gym.accuracy.setting import Setting, at, resolved
@@ -139,10 +138,6 @@ def test_decisions_are_told_at_whole_seconds(monkeypatch):
     simulator.advance(0.5, drawn[0])
     simulator.advance(0.5, drawn[1])
     np.testing.assert_array_equal(swum.hub[0], simulator.hub_position())
-
-
-def test_defaults_and_constants_are_declared_as_recorded():
-    assert_declared_as_recorded("seastar_gym.accuracy")
 
 
 # Long swims: which settings gather energy, told apart from noise, and in any current.

@@ -173,7 +173,7 @@ OTHERS = [
 @pytest.mark.parametrize("scene", OTHERS)
 def test_another_robot_or_fluid_is_promised_nothing_and_the_sentence_names_a_way(scene):
     assert TABLE.of(scene) is None
-    with assert_refused("The certificate is of the chapter's robot in the chapter's water", "seastar_gym.certify"):
+    with assert_refused("The certificate is of the chapter's robot in the chapter's water", "seastar certify"):
         TABLE.require_valid(scene)
 
 

@@ -11,10 +11,10 @@ from gymnasium.vector import AutoresetMode
 from agents import learner_file
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model, make_training_env, policy_of
-from agents.trials import main as trials_main
 from refusals import assert_refused
 from seastar_gym import Limited, Numerics, Scene, Simulator, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.cli.evaluate import main as evaluate_main
 from seastar_gym.controllers import checkpoint
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.greedy import GreedyPolicy, displacement_map
@@ -218,10 +218,10 @@ def test_a_timed_policy_survives_the_disk_with_its_decision_period(tmp_path):
             swim("learned", policy, SeastarSwimEnv(actions="pairs", decision_period=0.2), max_strokes=1)
 
 
-def test_a_description_without_a_decision_period_is_of_strokes():
-    description = Description("pairs", True, Scene(), (4,))
-    text = description.to_json()
-    assert Description.from_json(text.replace('  "decision_period": null,\n', "")) == description
+def test_a_description_says_its_decision_period():
+    text = Description("pairs", True, Scene(), (4,)).to_json()
+    with assert_refused("It does not say 'decision_period'"):
+        Description.from_json(text.replace('  "decision_period": null,\n', ""))
     timed = Description("pairs", True, make_scene(None, None, 0.5), (4,), 0.5)
     assert Description.from_json(timed.to_json()) == timed
     with assert_refused("decision_period"):
@@ -255,7 +255,9 @@ def test_masks_are_handed_out_robot_by_robot():
 
 def test_tables_of_timed_swims_count_decisions_and_seconds(tmp_path, capsys):
     command = ["--agents", "rest", "--sets", "nominal", "--decision-period", "0.5", "--fidelity", "fast"]
-    assert trials_main([*command, "--seconds", "20", "--num-threads", "1", "--out", str(tmp_path / "trials.csv")]) == 0
+    assert (
+        evaluate_main([*command, "--seconds", "20", "--num-threads", "1", "--out", str(tmp_path / "trials.csv")]) == 0
+    )
     printed = capsys.readouterr().out
     assert "decisions" in printed and "of 0.5 s" in printed and "time [s]" in printed and "strokes" not in printed
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from gymnasium.spaces import Box, Discrete
 
-from declared import assert_declared_as_recorded
 from refusals import assert_refused
 from seastar_gym import HeadingTargets, Numerics, RewardWeights, Scene, Seastar
 from seastar_gym.cli.main import main
@@ -239,10 +238,6 @@ def test_help_tells_the_names_of_all_agents(capsys):
     assert "usage: seastar evaluate" in text and ", ".join(PATHS) in text
 
 
-def test_defaults_and_constants_are_declared_as_recorded():
-    assert_declared_as_recorded("seastar_gym.controllers")
-
-
 @pytest.mark.parametrize("n_limbs, names", [(5, ("learned", "pentagon")), (4, ("greedy", "straight"))])
 def test_agents_by_default_fit_the_robot(n_limbs, names):
     assert default_agents(Scene(Seastar(n_limbs))) == names
@@ -281,8 +276,6 @@ def test_a_bundled_policy_has_a_name():
     for name, file in by_name().items():
         assert Description.from_facts(json.loads(file.with_suffix(".json").read_text())).scene == pretrained(name).scene
     assert pretrained().decision_period == 1.0 and pretrained("timed-0.2s").decision_period == 0.2
-    with pytest.warns(DeprecationWarning, match="The policy seastar-0.2s is called timed-0.2s now"):
-        assert pretrained("seastar-0.2s").decision_period == 0.2
     for wrong in ("timed-0.3s", 0.2):
         with assert_refused("There is no bundled policy", "take one of strokes, timed-0.2s, timed-0.5s, fail-blind"):
             pretrained(wrong)

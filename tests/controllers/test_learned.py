@@ -224,9 +224,12 @@ NO_LIMBS = Scene().to_dict() | {"robot": Scene().to_dict()["robot"] | {"n_limbs"
         ({"limb_mirror": [[5, 1]]}, "an index of its limb_mirror must be a whole number"),
         ({"limb_mirror": [[1, 1], [1, 1]]}, "its limb_mirror is no mirror, which undoes itself"),
         ({"limb_mirror": [[1, 1], [0, -1]]}, "its limb_mirror is no mirror, which undoes itself"),
-        ({"own": {"kinds": []}}, "its own must be an object with kinds and with_stations"),
-        ({"own": {"kinds": ["spin"], "with_stations": True}}, "the kinds of its own numbers must be of"),
-        ({"own": {"kinds": [["scalar"]], "with_stations": True}}, "the kinds of its own numbers must be of"),
+        *(
+            ({"entries": entries}, "entries must be a tuple of")
+            for entries in (None, 3, "scalar", ["spin"], [["scalar"]])
+        ),
+        *(({"stations": stations}, "stations must be a whole number") for stations in (None, 0, 10)),
+        *(({"shows_limbs": shows}, "shows_limbs must be True or False") for shows in (None, 1)),
     ],
 )
 def test_what_does_not_fit_is_said_in_one_sentence(file, change, sentence):
@@ -390,10 +393,9 @@ def test_a_description_of_a_task_survives_its_text_and_shapes_the_network():
         ({"limb_mirror": [(0, 1)]}, "its limb_mirror"),
         ({"limb_mirror": ((0, 1),) * 1001}, "must be a list of pairs"),
         ({"limb_mirror": 3}, "must be a list of pairs, not 3"),
-        ({"entries": ("colour",)}, "must be of scalar, turn, vector"),
-        ({"entries": ("scalar",) * 1001}, "must be of scalar, turn, vector"),
-        ({"shows_limbs": 1}, "must be an object with kinds and with_stations"),
-        ({"stations": 10}, "its stations must be a whole number from 1 to 9"),
+        ({"entries": ("colour",)}, "must be a tuple of scalar, pseudoscalar, vector"),
+        ({"shows_limbs": 1}, "shows_limbs must be True or False"),
+        ({"stations": 10}, "stations must be a whole number from 1 to 9"),
         ({"task": "chess"}, "its task must be one of miswired, prey"),
         ({"past": 1001}, "its past must be a whole number from 0 to 1000"),
         ({"symmetry": False}, "without symmetry has no past"),

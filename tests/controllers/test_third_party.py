@@ -12,14 +12,15 @@ import numpy as np
 import pytest
 from stable_baselines3 import A2C, DQN, PPO
 
-from agents import evaluate, trials
 from refusals import assert_refused, assert_told
 from seastar_gym import Numerics, Scene, Seastar
+from seastar_gym.cli.evaluate import main
 from seastar_gym.controllers.contract import actions_of
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.registry import load_agents
 from seastar_gym.controllers.third_party import load_model
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.many import swim_many
 from seastar_gym.evaluation.swim import swim
 
@@ -72,7 +73,7 @@ def test_a_model_swims_alone_as_in_a_batch(trained):
 def test_a_model_is_given_to_the_command_lines(trained, tmp_path, capsys):
     file, out = trained[2], tmp_path / "out"
     command = ["--agents", str(file), "--fidelity", "fast"]
-    assert evaluate.main([*command, "--no-video", "--max-strokes", "2", "--out", str(out)]) == 0
+    assert main([*command, "--seconds", "2", "--out", str(out)]) == 0
     assert "model" in capsys.readouterr().out and (out / "evaluation.csv").is_file()
 
 
@@ -84,8 +85,8 @@ def short_trials(monkeypatch):
 
 def rows_of_trials(agent, file):
     command = ["--agents", agent, "--sets", "nominal", "--fidelity", "fast", "--out", str(file)]
-    command += ["--num-threads", "1", "--max-strokes", "3"]
-    assert trials.main(command) == 0
+    command += ["--num-threads", "1", "--seconds", "3"]
+    assert main(command) == 0
     with file.open(newline="", encoding="utf-8") as stream:
         return [row["agent"] for row in csv.DictReader(stream)]
 
@@ -94,10 +95,9 @@ def test_a_model_is_given_to_the_trials(trained, short_trials, tmp_path):
     assert rows_of_trials(str(trained[2]), tmp_path / "trials.csv") == ["model"]
 
 
-@pytest.mark.parametrize("command", [evaluate.main, trials.main])
-def test_help_says_what_may_be_executed(command, capsys):
+def test_help_says_what_may_be_executed(capsys):
     with pytest.raises(SystemExit):
-        command(["--help"])
+        main(["--help"])
     text = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert "module:function" in text and "load only files that you trust" in text
 
@@ -195,7 +195,7 @@ def own(monkeypatch):
 def test_a_function_gets_the_environment_and_its_policy_swims_in_every_evaluation(own, short_trials, tmp_path):
     (policy,) = load_agents([own], fidelity="fast").values()
     assert policy.actions == "pairs" and policy.scene == Scene.preset("fast")
-    (done,) = evaluate.evaluate({"own": policy}, [[0.05, 0.0]], fidelity="fast", max_strokes=3)
+    (done,) = evaluate({"own": policy}, [[0.05, 0.0]], fidelity="fast", max_strokes=3)
     assert done.strokes == 3 and (done.limbs_heated == 2).all()
     assert rows_of_trials(own, tmp_path / "trials.csv") == [own]
 
@@ -206,7 +206,7 @@ def test_a_model_that_a_function_returns_keeps_its_action_mode(monkeypatch, trai
     monkeypatch.setitem(sys.modules, "a_module", module)
     (policy,) = load_agents(["a_module:make"]).values()
     assert actions_of(policy, 5) == actions
-    (done,) = evaluate.evaluate({"own": policy}, [[0.05, 0.0]], fidelity="fast", max_strokes=2)
+    (done,) = evaluate({"own": policy}, [[0.05, 0.0]], fidelity="fast", max_strokes=2)
     assert done.strokes == 2
 
 
@@ -222,5 +222,5 @@ def test_a_model_that_a_function_returns_keeps_its_action_mode(monkeypatch, trai
 def test_a_function_that_makes_no_policy_is_refused(own, name, words, capsys):
     with assert_refused(words):
         load_agents([name])
-    assert evaluate.main(["--agents", name]) == 2
+    assert main(["--agents", name]) == 2
     assert_told(capsys, words)

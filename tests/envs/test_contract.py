@@ -13,7 +13,6 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
 
 import seastar_gym
-from declared import assert_declared_as_recorded
 from episodes import assert_same, assert_same_steps, swum
 from refusals import assert_refused
 from seastar_gym import (
@@ -244,10 +243,6 @@ def test_what_a_camera_sees_of_a_task_is_that_of_the_table():
 @pytest.mark.parametrize("kind", CHALLENGED)
 def test_arguments_of_a_challenge_are_those_of_the_docstring(kind):
     assert arguments(kind) == list(inspect.signature(kind).parameters)
-
-
-def test_defaults_and_constants_are_declared_as_recorded():
-    assert_declared_as_recorded("seastar_gym.envs")
 
 
 def test_ids_are_declared_as_recorded():

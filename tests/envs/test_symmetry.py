@@ -38,7 +38,7 @@ from seastar_gym import (
 )
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table, to_commands
-from seastar_gym.envs.layout import HEADINGS, Layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.masks import action_masks
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import (
@@ -111,17 +111,6 @@ def test_the_group_is_found_from_limbs_body_and_attachments(name):
         for other in elements:
             product = matrix(symmetry.compose(other, element, group), group)
             np.testing.assert_allclose(product, matrix(other, group) @ matrix(element, group), atol=1e-12)
-
-
-def test_old_names_do_the_same_for_one_release():
-    mirror, seen = symmetry.memory_mirror(SmaWires()), np.random.default_rng(0).normal(size=(20, 200))
-    ours, elements = symmetry_for(5, mirror, "pairs", HEADINGS).reduce(seen)
-    theirs, its_elements = symmetry.reduce_observations(seen, 5, mirror, with_headings=True)
-    np.testing.assert_array_equal(theirs, ours)
-    np.testing.assert_array_equal(its_elements, elements)
-    actions = random_actions("pairs", 5, 20)
-    restored = symmetry_for(5, mode="pairs").restore(actions, elements)
-    np.testing.assert_array_equal(symmetry.restore_actions(actions, elements, "pairs", 5), restored)
 
 
 # Observations

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from agents.evaluate import main
 from refusals import assert_refused, assert_told
+from seastar_gym.cli.evaluate import main
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.comparison import evaluate
@@ -22,7 +22,6 @@ from seastar_gym.evaluation.report.charts import (
     curves_figure,
     paths_figure,
     read_progress,
-    speeds_figure,
     to_html,
 )
 from seastar_gym.evaluation.report.page import Remarks, ResultsTable, table_html, trials_table
@@ -63,7 +62,6 @@ def evaluated(tmp_path_factory):
             sentences=["It was <easy>."],
             commands=["python one", "python two"],
             curves=[Curve.of("straight", PROGRESS)],
-            bound={"fidelity": "fast", "directions_deg": [0, 18, 36], "mm_per_stroke": {"straight": [3.7, 3.0, 3.5]}},
         ),
         say=lambda text: None,
     )
@@ -183,24 +181,6 @@ def test_every_column_of_trials_is_text_not_markup(tmp_path):
         trials_table(tmp_path / "trials.csv")
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "", "[" * 100_000, "null", "[]", "{}",
-        '{"directions_deg": [0, 18], "mm_per_stroke": {"a": [1]}, "fidelity": "fast"}',
-        '{"directions_deg": 5, "mm_per_stroke": {}, "fidelity": "fast"}',
-        '{"directions_deg": [0, NaN], "mm_per_stroke": {"a": [1, 2]}, "fidelity": "fast"}',
-        '{"directions_deg": [0, 18], "mm_per_stroke": {"a": ["<b>", 2]}, "fidelity": "fast"}',
-    ],
-)  # fmt: skip
-def test_damaged_speeds_are_refused_in_a_sentence(text, tmp_path, capsys):
-    (tmp_path / "bound.json").write_text(text)
-    arguments = ["--report", "--no-video", "--out", str(tmp_path / "out")]
-    assert main([*arguments, "--bound", str(tmp_path / "bound.json")]) == 2
-    assert_told(capsys, "bound.json is no ")
-    assert not (tmp_path / "out").exists()
-
-
 def test_errors_of_a_swim_that_never_arrived_are_grey(text):
     """The straight gait does not arrive, and no other number of it is grey."""
     for line in text.splitlines():
@@ -261,16 +241,6 @@ def test_several_curves_have_their_median_and_range():
     assert [one.name for one in each] == ["a", "b", "c"] and list(unfinished.x) == [1, 1, 1]
 
 
-def test_speeds_of_one_sector_are_turned_and_mirrored_round():
-    (trace,) = speeds_figure([0.0, 18.0, 36.0], {"a": [4.0, 5.0, 3.0]}).data
-    around = dict(zip(trace.theta, trace.r, strict=True))
-    assert list(trace.theta[:-1]) == [18.0 * k for k in range(20)]
-    for theta, speed in around.items():
-        from_limb = theta % 72.0
-        assert speed == {0.0: 4.0, 18.0: 5.0, 36.0: 3.0}[min(from_limb, 72.0 - from_limb)]
-    assert trace.theta[-1] == trace.theta[0] and trace.r[-1] == trace.r[0]
-
-
 def test_every_waypoint_is_a_circle(evaluated):
     circles = [[one.x0, one.x1, one.y0, one.y1] for one in paths_figure(evaluated[1], 2e-3).layout.shapes]
     np.testing.assert_allclose(circles, [[18.0, 22.0, -2.0, 2.0], [18.0, 22.0, 18.0, 22.0]])
@@ -289,13 +259,12 @@ def test_command_line_writes_the_report_with_the_curves_of_runs(tmp_path, capsys
     run.mkdir()
     (run / "progress.csv").write_text("1000,200,5\n2000,190,5\n")
     arguments = ["--agents", "learned", "straight", "--waypoint-radius", "0.5", "--no-video", "--report", "--runs"]
-    arguments += [str(run), "--bound", str(tmp_path / "none.json")]  # the learned policy's speeds stand there too
-    assert main([*arguments, "--fidelity", "fast", "--out", str(tmp_path / "out")]) == 0
+    assert main([*arguments, str(run), "--fidelity", "fast", "--out", str(tmp_path / "out")]) == 0
     assert "report.html" in capsys.readouterr().out
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert '"name":"run"' in page and '"name":"learned"' not in page and "agent straight: 1" in page
     assert "python train.py" in page
-    assert "seastar evaluate --video --out runs/evaluate --agents learned straight" in page
+    assert "seastar evaluate --agents learned straight" in page
 
 
 def test_a_folder_without_a_run_is_answered_with_one_sentence(tmp_path, capsys):

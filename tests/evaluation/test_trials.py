@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import trim_mean
 
-from agents.trials import main
 from seastar_gym import Scene, ThermalSma
+from seastar_gym.cli.evaluate import main
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.layout import Layout
@@ -19,6 +19,7 @@ from seastar_gym.evaluation import results, statistics
 from seastar_gym.evaluation.disturbances import DISTURBANCES, Disturbance, DisturbedTask
 from seastar_gym.evaluation.many import swim_many
 from seastar_gym.evaluation.swim import swim
+from seastar_gym.evaluation.trials import SETS
 
 FAST = Scene.preset("fast")
 N = 16
@@ -145,7 +146,8 @@ def test_a_swim_ends_at_its_last_waypoint():
 @pytest.mark.slow
 def test_the_command_line_writes_a_row_for_every_set_and_agent(tmp_path, capsys):
     file = tmp_path / "trials.csv"
-    assert main(["--agents", "greedy", "pentagon", "--swims", "4", "--fidelity", "fast", "--out", str(file)]) == 0
+    command = ["--agents", "greedy", "pentagon", "--sets", *SETS, "--swims", "4", "--fidelity", "fast"]
+    assert main([*command, "--out", str(file)]) == 0
     with file.open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == 2 * (4 + 6 + 5)

@@ -11,7 +11,6 @@ import pytest
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from declared import assert_declared_as_recorded
 from refusals import assert_refused
 from seastar_gym import (
     AlongLimb,
@@ -492,10 +491,6 @@ def test_a_robot_whose_solver_gives_up_has_no_trajectory(monkeypatch):
         found = batch_of_trajectories(time, (0, 3), commands, [scene, scene])
         assert found.shape == (2, 2, 2, 2) and np.isnan(found).all(axis=(1, 2, 3)).tolist() == lost
         assert np.isnan(found).any(axis=(1, 2, 3)).tolist() == lost
-
-
-def test_defaults_and_constants_are_declared_as_recorded():
-    assert_declared_as_recorded("seastar_gym.identify")
 
 
 # Intervals of a fit hold what they promise where residuals depend on each other, and where they do not.

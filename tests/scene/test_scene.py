@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 import pytest
 
-from declared import assert_declared_as_recorded
 from oracle import Star
 from refusals import assert_refused
 from seastar_gym import (
@@ -27,10 +26,6 @@ from seastar_gym import (
 from seastar_gym.model.rods import make_rods
 
 FIDELITIES = ("fast", "balanced", "accurate", "reference", "chapter")
-
-
-def test_defaults_and_constants_are_declared_as_recorded():
-    assert_declared_as_recorded("seastar_gym.scene")
 
 
 # The chapter's values

@@ -97,14 +97,6 @@ def test_a_resolution_that_nobody_named_comes_back_unnamed():
     assert again(Scene()).robot.named_resolution == (None, None)
 
 
-def test_a_file_from_before_fidelities_chose_nodes_says_what_it_said():
-    old = Scene(Seastar(nodes_per_limb=10, discretisation="continuum"), numerics=Numerics()).to_dict()
-    old["numerics"]["named"] = False
-    scene = Scene.from_dict(old)
-    assert scene.robot.nodes_per_limb == 10 and scene.numerics == Numerics() and not scene.numerics.named
-    assert scene.at("fast").robot.nodes_per_limb == 10 and scene.at("fast").numerics == Numerics.preset("fast")
-
-
 def test_every_part_of_the_package_is_in_the_table():
     """A new part is not forgotten: of every registered kind some scene of the tables has one, and every field of it."""
     fields = {field.name for field in dataclasses.fields(Scene)}

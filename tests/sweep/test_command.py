@@ -147,7 +147,7 @@ def test_no_json_is_one_sentence(tmp_path, capsys):
 
 
 def command(tmp_path, *words):
-    arguments = [sys.executable, "-m", "seastar_gym.sweep", *words, "--out", str(tmp_path)]
+    arguments = [sys.executable, "-m", "seastar_gym.cli", "sweep", *words, "--out", str(tmp_path)]
     return subprocess.Popen(
         arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )  # fmt: skip

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from declared import assert_declared_as_recorded
 from refusals import assert_refused
 from seastar_gym.gaits import lagged_gait, thrifty_gait
 from seastar_gym.scene import Limb, Numerics, Scene, Seastar, SmaPulse
@@ -213,10 +212,6 @@ WATER_OR_NOT = Choices("fluid", (FAST.fluid, None), ("water", "vacuum"))
 def test_bad_axes_are_refused(make, words):
     with assert_refused(*words):
         make()
-
-
-def test_defaults_and_constants_are_declared_as_recorded():
-    assert_declared_as_recorded("seastar_gym.sweep")
 
 
 @pytest.mark.parametrize("name, gait", [("lagged", lagged_gait), ("thrifty", thrifty_gait)])

@@ -13,21 +13,18 @@ import pytest
 
 import works
 from losing import Interrupted
-from refusals import assert_refused
 from seastar_gym.executors import Outcome
 from seastar_gym.executors.here import Here
 from seastar_gym.executors.processes import Processes
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene, Seastar, SmaPulse
 from seastar_gym.simulator import Simulator
-from seastar_gym.sweep import trajectory
 from seastar_gym.sweep.axes import Choices, Range
 from seastar_gym.sweep.command import as_text
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.result_files import ResultFiles, read_results, result_file_of
 from seastar_gym.sweep.run import ATTEMPTS, run
 from seastar_gym.sweep.swimming import REFUSED, swim
-from seastar_gym.sweep.trajectory import write_trajectory
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -421,61 +418,3 @@ def test_a_sweep_of_a_hundred_thousand_cells_does_not_grow(tmp_path):
 
     run(sweep.batches(), tmp_path, Processes(2), watch, nothing)
     assert len(found) == 10 and found[-1] < found[0] + 20.0
-
-
-# Trajectories as Parquet: the simulator's numbers, with units and the scene.
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory):
-    place = tmp_path_factory.mktemp("swim") / "swim.parquet"
-    commands = np.stack([[STRAIGHT, -STRAIGHT]] * 2)
-    write_trajectory(place, FAST, commands, n_robots=2, frames_per_stroke=4)
-    return place
-
-
-def test_pandas_reads_the_simulator_s_numbers(file):
-    table = pytest.importorskip("pandas").read_parquet(file)
-    assert list(table) == list(trajectory.UNITS) and len(table) == 9 * 2 * FAST.robot.n_nodes
-    simulator = Simulator(FAST, 2)
-    for _ in range(2):
-        simulator.stroke([STRAIGHT, -STRAIGHT])
-    last = table[table.time == 2.0]
-    assert last[last.robot == 1][["x", "y"]].to_numpy().tolist() == simulator.positions[1].tolist()
-    assert last[last.robot == 0][["vx", "vy"]].to_numpy().tolist() == simulator.velocities[0].tolist()
-
-
-def test_polars_reads_the_same(file):
-    pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
-    assert polars.read_parquet(file).to_numpy().tolist() == pandas.read_parquet(file).to_numpy().tolist()
-
-
-def test_columns_have_units_and_the_file_its_scene(file):
-    schema = pyarrow.parquet.read_schema(file)
-    assert {field.name: field.metadata[b"unit"].decode() for field in schema} == trajectory.UNITS
-    assert Scene.from_dict(json.loads(schema.metadata[b"seastar_gym"])["scene"]) == FAST
-
-
-def test_a_trajectory_that_is_not_finished_is_not_there(tmp_path):
-    with pytest.raises(ValueError, match="must be numbers in"):
-        write_trajectory(tmp_path / "swim.parquet", FAST, [STRAIGHT, 2.0 * STRAIGHT])
-    assert not list(tmp_path.iterdir())
-
-
-def test_bad_trajectories_are_refused(tmp_path):
-    with assert_refused("commands", "shape"):
-        write_trajectory(tmp_path / "swim.parquet", FAST, STRAIGHT)
-    with assert_refused("frames_per_stroke"):
-        write_trajectory(tmp_path / "swim.parquet", FAST, [STRAIGHT], frames_per_stroke=0)
-    for commands in (np.zeros((1, 2, 5)), np.zeros((1, 1, 4)), np.zeros((1, 4)), np.zeros((1, 1, 1, 5))):
-        with assert_refused("commands must have shape (n_strokes, 5) or (n_strokes, 1, 5)"):
-            write_trajectory(tmp_path / "swim.parquet", FAST, commands)
-    with assert_refused("frames_per_stroke must be a whole number from 1 to 10000"):
-        write_trajectory(tmp_path / "swim.parquet", FAST, [STRAIGHT], frames_per_stroke=10_001)
-
-
-def test_a_trajectory_has_twenty_frames_a_stroke_and_the_start(tmp_path):
-    write_trajectory(tmp_path / "swim.parquet", FAST, [STRAIGHT])
-    table, n = pyarrow.parquet.read_table(tmp_path / "swim.parquet").to_pydict(), FAST.robot.n_nodes
-    np.testing.assert_allclose(table["time"][::n], np.arange(21) / 20.0, atol=1e-12)
-    assert table["node"][:n] == [*range(n)] and set(table["robot"]) == {0}

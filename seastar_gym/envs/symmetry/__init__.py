@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from seastar_gym.envs.symmetry.group import turns as turns
     from seastar_gym.envs.symmetry.symmetry import FrameStack as FrameStack
     from seastar_gym.envs.symmetry.symmetry import Symmetry as Symmetry
-    from seastar_gym.envs.symmetry.symmetry import reduce_observations as reduce_observations
-    from seastar_gym.envs.symmetry.symmetry import restore_actions as restore_actions
     from seastar_gym.envs.symmetry.wrappers import SymmetryReduction as SymmetryReduction
     from seastar_gym.envs.symmetry.wrappers import VectorFrameStack as VectorFrameStack
     from seastar_gym.envs.symmetry.wrappers import VectorSymmetryReduction as VectorSymmetryReduction

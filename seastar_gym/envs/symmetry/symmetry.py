@@ -7,9 +7,8 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym import renamed
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, as_array, choices
-from seastar_gym.envs.layout import HEADINGS, Layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.symmetry.group import (
     Elements,
     Group,
@@ -236,7 +235,6 @@ def _vector_order(group: Group, shows_limbs: bool, stations: int) -> NDArray[np.
     return read_only(np.concatenate([places, n_places + places, others], axis=1))
 
 
-@renamed.methods
 class FrameStack:
     """What a controller with memory sees: the present observation, and what was most telling of the last ones.
 
@@ -277,16 +275,3 @@ class FrameStack:
         n = len(observations)
         shown = np.concatenate([reduced[:, 0], reduced[:, 1:, self.features].reshape(n, -1)], axis=1)
         return shown.astype(np.float32), elements
-
-
-def reduce_observations(
-    observations: Floating, group: Group, mirror: Mirror = (), with_headings: bool = False
-) -> tuple[Floating, Elements]:
-    """`Symmetry.reduce` by its old name, for one release."""
-    layout = Layout(n_limbs_of(group), len(mirror), HEADINGS if with_headings else ())
-    return Symmetry(group, mirror, layout).reduce(observations)
-
-
-def restore_actions(actions: NDArray[Any], elements: ArrayLike, mode: Actions, group: Group) -> NDArray[Any]:
-    """`Symmetry.restore` by its old name, for one release."""
-    return Symmetry(group, (), Layout(n_limbs_of(group)), mode).restore(actions, elements)

@@ -11,7 +11,6 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from seastar_gym import renamed
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.symmetry.group import memory_mirror, symmetry_of
 from seastar_gym.envs.symmetry.symmetry import FrameStack, Symmetry
@@ -163,7 +162,6 @@ class VectorSymmetryReduction(_VectorWrapper):
         return {"final_obs": final, "final_info": self._symmetry.carry_info(info["final_info"], elements)}
 
 
-@renamed.methods
 class VectorFrameStack(VectorSymmetryReduction):
     """Wrapper of a native batch that shows a `FrameStack`, and takes actions that were chosen on it.
 

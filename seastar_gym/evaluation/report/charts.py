@@ -1,4 +1,4 @@
-"""The report's pictures, in plotly: traced paths, learning curves, the polar picture of speeds."""
+"""The report's pictures, in plotly: traced paths and learning curves."""
 
 import html
 from collections.abc import Mapping, Sequence
@@ -187,45 +187,3 @@ def _at(curve: Curve, trained: float) -> float:
 
 def _with_gaps(values: Floats) -> list[float | None]:
     return [None if np.isnan(value) else float(value) for value in values]
-
-
-def speeds_figure(directions: Sequence[float], speeds: Mapping[str, Sequence[float]], n_limbs: int = 5) -> go.Figure:
-    """Straight-line speeds [mm per stroke] by direction from limb 1, 0 to 180/n_limbs degrees, turned and mirrored."""
-    figure = go.Figure()
-    there, back = list(directions), list(directions)[-2::-1]
-    sector = 360.0 / n_limbs
-    angles = [angle for limb in range(n_limbs) for angle in _round_trip(limb * sector, sector, there, back)]
-    for number, (name, values) in enumerate(speeds.items()):
-        around = [*values, *list(values)[-2::-1]][:-1] * n_limbs
-        figure.add_scatterpolar(
-            theta=[*angles, angles[0]], r=np.round([*around, around[0]], 3).tolist(), mode="lines",
-            name=html.escape(name),
-            line={"color": COLOURS[number % len(COLOURS)], "dash": DASHES[number // len(COLOURS) % len(DASHES)]},
-            hovertemplate="%{theta:.0f}\u00b0: %{r:.2f} mm",
-        )  # fmt: skip
-    figure.update_layout(
-        polar={
-            "bgcolor": "rgba(0,0,0,0)",
-            "radialaxis": {
-                "rangemode": "tozero",
-                "angle": sector / 4,
-                "nticks": 5,
-                "gridcolor": "#dfe3e8",
-                "linecolor": FAINT_INK,
-            },
-            "angularaxis": {
-                "ticksuffix": "\u00b0",
-                "dtick": sector / 2,
-                "gridcolor": "#dfe3e8",
-                "linecolor": FAINT_INK,
-            },
-        },
-        margin={"l": 48, "r": 48, "t": 36, "b": 36},
-        legend_y=1.12,
-    )
-    return figure
-
-
-def _round_trip(begin: float, sector: float, there: Sequence[float], back: Sequence[float]) -> list[float]:
-    """Angles from a limb to the next, through a measured half and its mirror image; the next limb's is left out."""
-    return [*(begin + angle for angle in there), *(begin + sector - angle for angle in back)][:-1]

@@ -18,13 +18,12 @@ import plotly.offline
 
 from seastar_gym.evaluation.pictures import flow_in
 from seastar_gym.evaluation.playback import UNIT, Playback
-from seastar_gym.evaluation.report.charts import Curve, curves_figure, paths_figure, speeds_figure, to_html
+from seastar_gym.evaluation.report.charts import Curve, curves_figure, paths_figure, to_html
 from seastar_gym.evaluation.results import COLUMNS, Row, in_words, number
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.evaluation.trials import COLUMNS as TRIALS
 from seastar_gym.evaluation.trials import as_shown, read_trials
-from seastar_gym.files import read_json, write_atomically
-from seastar_gym.scene.checks import is_finite_number
+from seastar_gym.files import write_atomically
 from seastar_gym.scene.currents import AnyCurrent
 
 PAGE = Path(__file__).parent / "page.html"
@@ -51,8 +50,6 @@ class Remarks:
     commands: Sequence[str] = ()
     curves: Sequence[Curve] = ()
     tables: Sequence[ResultsTable] = ()
-    bound: Mapping[str, Any] | None = None
-    """Results of studies.learning.bound."""
 
 
 def write_report(
@@ -83,10 +80,6 @@ def write_report(
     if remarks.curves:
         figure = to_html(curves_figure(remarks.curves, baselines), "curves")
         sections.append(_section("Learning curves", _figure(figure, "wide")))
-    if remarks.bound is not None:
-        figure = to_html(speeds_figure(remarks.bound["directions_deg"], remarks.bound["mm_per_stroke"]), "speeds")
-        title = f'Speed straight ahead at "{remarks.bound["fidelity"]}" [mm per stroke], by direction from limb 1'
-        sections.append(_section(title, _figure(figure, "square")))
     sections.append(_section("Terms", _terms()))
     if remarks.commands or remarks.sentences:
         sections.append(_section("How it was made", _remarks(remarks)))
@@ -131,18 +124,6 @@ def trials_table(file: Path) -> ResultsTable:
     """Table of the CSV of trials. ValueError: it is none."""
     rows = [as_shown(row) for row in read_trials(file)]
     return ResultsTable("Trials, with 95 % confidence intervals", TRIALS, rows)
-
-
-def read_bound(file: Path) -> dict[str, Any]:
-    """The JSON that studies.learning.bound wrote. ValueError: it is none."""
-    found = read_json(file)
-    match found:
-        case {"fidelity": str(), "directions_deg": list(directions), "mm_per_stroke": dict(speeds)} if directions:
-            rows = [directions, *speeds.values()]
-            sound = all(isinstance(row, list) and all(map(is_finite_number, row)) for row in rows)
-            if sound and {len(row) for row in rows} == {len(directions)}:
-                return dict(found)
-    raise ValueError(f"{file} is no result of studies.learning.bound.")
 
 
 def _cell(row: Row, name: str) -> str:

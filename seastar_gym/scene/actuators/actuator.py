@@ -17,7 +17,6 @@ from typing import Any, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym import renamed
 from seastar_gym.scene.checks import shown
 from seastar_gym.scene.number import Numbers
 
@@ -55,7 +54,6 @@ class Actuator(Protocol):
         ...
 
 
-@renamed.methods
 class ActuatorBase(Actuator):
     """Base of actuators, with the answers of one that remembers nothing and says no more than it has to.
 
@@ -134,8 +132,7 @@ class Adapted(ActuatorBase):
 
 def _own_or_base(name: str) -> property:
     def answer(self: Adapted) -> Any:
-        own = renamed.name_in(self.own, "ActuatorBase", name)
-        return getattr(super(Adapted, self), name) if own is None else getattr(self.own, own)
+        return getattr(self.own if hasattr(self.own, name) else super(Adapted, self), name)
 
     return property(answer)
 

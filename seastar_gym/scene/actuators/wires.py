@@ -7,7 +7,6 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym import renamed
 from seastar_gym.scene.actuators.heating import WIRE_POWER, WirePair
 from seastar_gym.scene.checks import require_flag
 from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive
@@ -22,7 +21,6 @@ COLD = 1e-9
 
 
 @register_part
-@renamed.arguments
 @dataclass(frozen=True)
 class SmaWires(WirePair):
     """Actuator of two wires per limb, + and -, that contract linearly while they are heated and relax while they cool.
