@@ -21,7 +21,6 @@ from seastar_gym import (
     Scene,
     Seastar,
     Sight,
-    Simulator,
     SmaLimb,
     SmaPulse,
     Stiffening,
@@ -32,7 +31,6 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.scene.checks import (
     LONGEST_SHOWN,
-    as_floats,
     require_count,
     require_finite,
     require_number,
@@ -222,14 +220,6 @@ def test_numbers_of_environments_and_of_each_robot_are_floats_too():
         assert repr(Seastar(density=robots)) == repr(Seastar(density=np.array([1.0, 2.0])))
 
 
-@pytest.mark.parametrize("robot", [Seastar(relaxation_time=0), Seastar(relaxation_time=0, youngs_modulus=1_000_000)])
-def test_a_robot_of_whole_numbers_swims_the_same_bits(robot):
-    swum = Simulator(Scene(robot)), Simulator(Scene(Seastar(relaxation_time=0.0)))
-    for simulator in swum:
-        simulator.stroke([[1, 0, 0, -1, 0]])
-    np.testing.assert_array_equal(*(simulator.positions for simulator in swum))
-
-
 # Values in sentences are short and on one line, whatever they are; arrays are made of numbers.
 
 
@@ -250,12 +240,3 @@ def test_values_are_shown_as_python_writes_them_but_cut_and_on_one_line():
         text = shown(value)
         assert 0 < len(text) <= LONGEST_SHOWN + 3 and "\n" not in text
     assert {shown(value) for value in (10**400, -(10**5000))} == {"a number beyond all floats"}
-
-
-def test_numbers_become_floats_of_their_shape_and_what_is_none_is_refused():
-    for value in (1, True, [1, 2], ((0.5,), (1.5,)), np.zeros((2, 3), np.float32)):
-        array = as_floats("heading", value)
-        assert array.dtype == np.float64 and array.shape == np.shape(value)
-    for value in ("abc", None, [[1], [2, 3]], [1j], {}):
-        with assert_refused("heading", "numbers"):
-            as_floats("heading", value)

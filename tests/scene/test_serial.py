@@ -5,15 +5,17 @@ import dataclasses
 import inspect
 import json
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from random import Random
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seastar_gym
 from every_part import ACTUATORS, CURVE, EACH, PARTS, WAVES
+from fuzz.scenes import COMPILED, EVERYTHING, SWIMMER, draw_scene, drawn
 from refusals import assert_refused
 from seastar_gym import (
     Contact,
@@ -28,13 +30,9 @@ from seastar_gym import (
     RewardWeights,
     Scene,
     Seastar,
-    ShearCurrent,
     Sight,
     SmaPulse,
-    ThermalSma,
     Uniform,
-    UniformCurrent,
-    Vortex,
     Water,
     register_part,
 )
@@ -82,81 +80,9 @@ def test_every_part_of_the_package_is_registered_and_in_the_tables():
     assert {name for name, module in own.items() if not module.startswith("seastar_gym.envs")} == seen
 
 
-def numbers(low: float, high: float):
-    """A number in one of the forms that a user may give it, or one for each of three robots."""
-    one = st.floats(low, high)
-    each = st.lists(one, min_size=3, max_size=3).map(np.array)
-    return st.one_of(one, one.map(np.float64), one.map(np.float32), each)
-
-
-CURRENTS = st.one_of(
-    st.none(),
-    st.builds(UniformCurrent, numbers(-0.01, 0.01), numbers(-0.01, 0.01)),
-    st.builds(ShearCurrent, numbers(-0.1, 0.1), numbers(-9.0, 9.0)),
-    st.builds(Vortex, numbers(-0.01, 0.01), numbers(-1, 1), numbers(-1, 1), numbers(0.01, 1.0)),
-    st.lists(st.floats(-0.01, 0.01), min_size=12, max_size=12).map(
-        lambda u: GridCurrent((0.0, u[0]), 0.1, np.reshape(u, (3, 2, 2)))
-    ),
-)
-FLUIDS = st.one_of(
-    st.none(),
-    st.builds(
-        Water,
-        density=numbers(0.0, 2000.0),
-        drag_coefficient=numbers(0.5, 2.0),
-        tangential_drag_coefficient=st.one_of(st.none(), numbers(0.0, 0.5)),
-        current=CURRENTS,
-        added_mass_coefficient=st.one_of(st.none(), numbers(0.0, 1.0)),
-    ),
-)
-PULSES = st.builds(SmaPulse, numbers(0.0, 0.6), st.floats(0.05, 0.5), st.floats(0.1, 1.0))
-CURVES = st.builds(replace, st.just(CURVE), scale=numbers(0.0, 0.9))
-ANY_ACTUATOR = st.one_of(
-    PULSES,
-    CURVES,
-    st.builds(Limited, st.one_of(PULSES, CURVES), st.one_of(st.none(), numbers(0.1, 0.9)), numbers(0.1, 9.0)),
-    st.builds(ThermalSma, numbers(0.0, 0.6), time_constant=numbers(0.3, 0.9), steady_rise=numbers(100.0, 300.0)),
-)
-LIMBS = st.builds(
-    Limb,
-    length=st.one_of(st.none(), numbers(0.05, 0.2)),
-    radius=st.one_of(st.none(), numbers(1e-3, 2e-3), st.tuples(st.floats(1e-3, 2e-3), st.floats(1e-3, 2e-3))),
-    youngs_modulus=st.one_of(st.none(), numbers(1e5, 1e7)),
-    natural_curvature=numbers(-2.0, 2.0),
-)
-
-
-@st.composite
-def scenes(draw) -> Scene:
-    """Any scene that is accepted."""
-    n_limbs = draw(st.sampled_from([3, 4, 5, 7]))
-    try:
-        robot = Seastar(
-            n_limbs=draw(st.sampled_from([n_limbs, np.int64(n_limbs)])),
-            nodes_per_limb=draw(st.integers(3, 6)),
-            limb_length=draw(numbers(0.05, 0.2)),
-            density=draw(numbers(500.0, 2000.0)),
-            limbs=draw(st.one_of(st.just(()), st.lists(LIMBS, min_size=n_limbs, max_size=n_limbs).map(tuple))),
-            relaxation_time=draw(st.one_of(st.none(), numbers(0.0, 1e-2))),
-        )
-        return Scene(
-            robot,
-            draw(FLUIDS),
-            draw(ANY_ACTUATOR),
-            draw(st.sampled_from([Numerics.preset("fast"), Numerics(), Numerics("sdirk3", 1 / 30)])),
-            held_nodes=draw(st.one_of(st.just(()), st.just((1,)))),
-            loads=draw(st.one_of(st.just(()), st.tuples(st.tuples(st.integers(0, 5), st.floats(-1, 1), st.just(0.0))))),
-            limb_strengths=draw(st.one_of(st.just(()), st.tuples(*[st.floats(0.0, 1.0)] * n_limbs))),
-            contact=draw(st.one_of(st.none(), st.just(Contact()), st.builds(Contact, numbers(1e4, 1e6)))),
-        )  # fmt: skip
-    except ValueError:
-        assume(False)
-        raise
-
-
-@given(scenes())
-@settings(max_examples=60, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
-def test_any_scene_comes_back_from_json(scene):
+@drawn(60, [*COMPILED, EVERYTHING, SWIMMER])
+def test_any_scene_comes_back_from_json(terms, seed):
+    scene = draw_scene(Random(seed), terms, 3)
     assert again(scene) == scene
     assert repr(again(scene)) == repr(again(again(scene)))
     for index in range(scene.n_robots or 1):
@@ -292,29 +218,19 @@ def test_what_is_no_scene_is_refused(refused):
     "name, change, words",
     [
         ("robot", {"n_arms": 5}, ("Scene.robot says 'n_arms', which no Seastar has",)),
-        ("robot", {1: 5}, ("Scene.robot says 1",)),
         ("robot", {"density": math.nan}, ("Scene.robot.density must be a finite number", "nan")),
-        ("robot", {"density": HUGE}, ("Scene.robot.density", "a number beyond all floats")),
-        ("robot", {"n_limbs": HUGE}, ("Scene.robot.n_limbs",)),
         ("robot", {"n_limbs": 5.0}, ("n_limbs must be a whole number",)),
-        ("robot", {"n_limbs": True}, ("n_limbs must be a whole number",)),
-        ("robot", {"density": "1000"}, ("density must be",)),
-        ("robot", {"density": {"value": 3}}, ("Scene.robot.density", "value")),
         ("robot", {"density": {"kind": []}}, ("Scene.robot.density is of the kind []",)),
         ("robot", {"density": {"kind": "os.system", "items": ["true"]}}, ("'os.system'", "not known")),
         ("robot", {"density": {"kind": "per robot", "items": []}}, ("density",)),
         ("robot", {"density": {"kind": "per robot", "items": [[1.0]]}}, ("density",)),
-        ("robot", {"density": {"kind": "per robot"}}, ("Scene.robot.density",)),
-        ("robot", {"density": {"kind": "mapping", "items": 3}}, ("Scene.robot.density",)),
         ("robot", {"density": {"kind": "mapping", "items": [3]}}, ("Scene.robot.density is no dict",)),
         ("robot", {"density": {"kind": "mapping", "items": [[{"kind": "mapping", "items": []}, 1]]}}, ("no dict",)),
         ("robot", {"density": (1.0, 2.0)}, ("Scene.robot.density", "(1.0, 2.0)")),
-        ("robot", {"density": b"1"}, ("Scene.robot.density", "b'1'")),
         ("robot", {"limbs": [{"kind": "SmaPulse"}]}, ("limbs must be a tuple of Limb",)),
         ("fluid", {"current": {**PLAIN["fluid"]["current"], "velocities": [[["1", "2"]] * 2] * 2}}, ("velocities",)),
         ("fluid", {"current": {**PLAIN["fluid"]["current"], "corner": "ab"}}, ("corner",)),
         ("actuator", {"actuator": PLAIN["actuator"]}, ("Limited follows an actuator without memory",)),
-        ("numerics", {"scheme": ["euler"]}, ("scheme must be one of",)),
     ],
 )  # fmt: skip
 def test_wrong_words_and_numbers_are_refused_in_one_sentence(name, change, words):

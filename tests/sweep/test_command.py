@@ -7,7 +7,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -16,7 +15,7 @@ from seastar_gym.scene import Scene, Seastar
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.scene.serial import to_dict
 from seastar_gym.sweep.axes import Choices, Range
-from seastar_gym.sweep.command import as_text, bar_of, main
+from seastar_gym.sweep.command import as_text, main
 from seastar_gym.sweep.result_files import ResultFiles, read_results
 from seastar_gym.sweep.run import Progress
 from seastar_gym.sweep.text import axis_of
@@ -127,7 +126,7 @@ def test_bad_input_is_one_sentence(words, sentence, tmp_path, monkeypatch, capsy
 
 
 def command(tmp_path, *words):
-    seastar = "from seastar_gym.cli.main import main; raise SystemExit(main())"
+    seastar = "from seastar_gym.cli.main import run; run()"
     arguments = [sys.executable, "-c", seastar, "sweep", *words, "--out", str(tmp_path)]
     return subprocess.Popen(
         arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
@@ -184,16 +183,3 @@ def test_what_was_done_is_told_with_what_was_not(golden):
 def test_cells_without_result_are_an_exit_code(problems, code, tmp_path, monkeypatch):
     monkeypatch.setattr("seastar_gym.sweep.command.run", lambda *_: Progress(problems=problems))
     assert main(["--out", str(tmp_path), *QUICK]) == code
-
-
-def test_progress_tells_rates_and_what_was_lost():
-    told, moved = [], []
-    bar = SimpleNamespace(
-        format_dict={"elapsed": 2.0}, n=1, total=0, update=moved.append,
-        set_postfix_str=lambda text, refresh: told.append((text, refresh)),
-    )  # fmt: skip
-    show = bar_of(10, bar)
-    show(Progress(kept=3, done=4, designs=7, intervals=0))
-    show(Progress(kept=3, done=4, designs=7, intervals=9, losses=2))
-    assert bar.total == 7 and moved == [3, 3]
-    assert told == [("4 designs/s", False), ("4 designs/s, 4 strokes/s, 2 lost", False)]

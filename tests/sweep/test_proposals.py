@@ -7,10 +7,8 @@ import shutil
 import socket
 import subprocess
 import tempfile
-import time
 from pathlib import Path
 
-import optuna
 import pytest
 from optuna.trial import TrialState
 
@@ -20,8 +18,6 @@ from seastar_gym.executors import Outcome
 from seastar_gym.executors.here import Here
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.axes import Choices, Range
-from seastar_gym.sweep.command import make_parser
-from seastar_gym.sweep.controllers import Route
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.proposals import Proposals, Search, explore, put_back, put_back_stale, study_of
 from seastar_gym.sweep.result_files import ResultFiles, read_results, result_file_of
@@ -124,20 +120,6 @@ def test_proposals_of_a_lost_cell_are_proposed_again(sqlite, tmp_path):
     assert states(study).count(TrialState.COMPLETE) == 6
 
 
-def test_heartbeats_do_not_cover_ask_and_tell(sqlite):
-    """So proposals are put back by us. If this fails, Optuna does it now."""
-    with pytest.warns(optuna.exceptions.ExperimentalWarning):
-        beating = optuna.storages.RDBStorage(sqlite, heartbeat_interval=1, grace_period=1)
-    study = optuna.create_study(storage=beating)
-    with pytest.warns(UserWarning, match="supposed to be used with Study.optimize"):
-        study.ask()
-    time.sleep(2.1)
-    with pytest.warns(optuna.exceptions.ExperimentalWarning):
-        optuna.storages.fail_stale_trials(study)
-    assert states(study) == [TrialState.RUNNING]
-    assert put_back_stale(study, 1.0) == 1
-
-
 def test_stale_proposals_are_put_back_once(storage, tmp_path):
     search = Search(stale_after=1e-3)
     study = study_of(SWEEP, Search("ahead"), storage)
@@ -175,17 +157,6 @@ def test_a_design_without_the_objective_is_the_worst_and_not_tried_for_ever(is_l
     proposals.tell(Outcome(type("Batch", (), {"name": "batch"})(), b"part"))
     assert states(study) == [TrialState.COMPLETE] * 2 and study.best_value == 1.0
     assert list(proposals.batches()) == []
-
-
-def test_defaults_of_the_command_are_those_of_the_classes():
-    told, sweep, route = vars(make_parser().parse_args([])), Sweep(SWEEP.scene, ()), Route()
-    for name in ("gait", "settling", "measured", "seed", "robots"):
-        assert told[name] == getattr(sweep, name)
-    assert (told["path"], told["seconds"], told["decision_period"]) == (
-        route.path, route.seconds, route.decision_period,
-    )  # fmt: skip
-    wanted = Search()
-    assert (told["objective"], told["stale_after"]) == (wanted.objective, wanted.stale_after) == ("speed", 600.0)
 
 
 @pytest.mark.parametrize(

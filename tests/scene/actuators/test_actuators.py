@@ -2,14 +2,13 @@
 
 import pickle
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
 
 from own_actuators import Remembering, Triangle
 from refusals import assert_refused
-from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Simulator, SmaPulse, SmaWires, ThermalSma
+from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Simulator, SmaPulse
 from seastar_gym.scene.actuators.actuator import Actuator, complete
 
 NUMERICS = Numerics("implicit-midpoint", 0.01)
@@ -88,13 +87,6 @@ def test_files_of_no_curve_are_refused_by_their_names(tmp_path, read, text, word
 # --- limits ----------------------------------------------------------------------------------------------------------
 
 
-def test_limits_that_bind_nowhere_change_nothing():
-    loose = Limited(SmaPulse(), largest_angle=1.0, largest_rate=100.0)
-    for name in ("positions", "velocities"):
-        free = getattr(swim(Scene(numerics=NUMERICS)), name)
-        np.testing.assert_allclose(getattr(swim(Scene(actuator=loose, numerics=NUMERICS)), name), free, atol=1e-11)
-
-
 def test_a_limited_limb_turns_as_far_and_as_fast_as_it_may_to_either_side_from_wherever_it_is():
     actuator, t = Limited(SmaPulse(), largest_angle=0.4, largest_rate=2.0), np.linspace(0.0, 1.0, 101)
     commands, state = np.array([[1.0, -1.0, 0.3, -0.3]]), np.array([[[0.1], [-0.1], [-0.2], [0.2]]])
@@ -120,17 +112,6 @@ def test_a_limb_that_only_has_a_stop_follows_its_curve_up_to_it():
             turned, _ = actuator.respond(t, np.full((), side), np.zeros(1))
             np.testing.assert_array_equal(turned, side * np.minimum(SmaPulse().delta_psi(t), stop))
         np.testing.assert_array_equal(actuator.delta_psi(t), np.minimum(SmaPulse().delta_psi(t), stop))
-
-
-def test_a_slow_limb_goes_on_from_where_the_last_stroke_left_it():
-    simulator = Simulator(Scene(actuator=SLOW, numerics=NUMERICS))
-    assert simulator.get_state().actuators.shape == (1, 5, 1)
-    turns = []
-    for command in (1.0, 0.0, 0.0):
-        simulator.stroke([[command, 0, 0, 0, 0]])
-        turns.append(simulator.actuators[0, :, 0])
-    assert turns[0][0] == pytest.approx(0.083, abs=0.002) and turns[2][0] == 0.0
-    assert not np.any([turn[1:] for turn in turns])
 
 
 # --- weak limbs ------------------------------------------------------------------------------------------------------
@@ -183,22 +164,3 @@ def test_what_an_actuator_of_ones_own_says_is_heeded():
     simulator = Simulator(Scene(actuator=type("Saying", (Remembering,), says)(), numerics=NUMERICS), 2)
     assert complete(simulator.scene.actuator).mirror == ((0, -1),)
     np.testing.assert_allclose(simulator.stroke(np.ones((2, 5))).energy, 2.0 * 5 * 0.6)
-
-
-@pytest.mark.parametrize(
-    "actuator",
-    [
-        partial(ThermalSma, time_constant=1e308),
-        partial(ThermalSma, cooling_time=1e308),
-        partial(SmaPulse, heating_time=5e-324),
-        partial(SmaPulse, cooling_time=1e308),
-        partial(SmaWires, heating_time=5e-324),
-        partial(SmaWires, cooling_time=1e308),
-        partial(SmaWires, heating_time=1e-300, cooling_time=1e-300),
-    ],
-    ids=str,
-)
-def test_extreme_numbers_of_an_actuator_warn_of_nothing(actuator):
-    """Warnings are errors in tests; what is refused is refused in a sentence."""
-    curve = actuator().delta_psi([0.0, 1e-3, 1e307])
-    assert np.isfinite(curve).all()
