@@ -1,15 +1,21 @@
-"""Values that nobody should give as an argument, each made anew: what is odd at one place may be right at another."""
+"""Values that nobody should give as an argument, each made anew: what is odd at one place may be right at another; and
+which of them a call takes."""
 
 import math
+import traceback
 from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 
+from fuzz.sentences import INNER, LONGEST
 from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, SmaPulse, Uniform, Water
 
+ROOT = Path(__file__).parents[1]
 HUGE = 10**400
 """An integer that no float can hold."""
 
@@ -51,3 +57,45 @@ ARRAYS: dict[str, Callable[[], Any]] = {
 }  # fmt: skip
 ODD = {**NUMBERS, **THINGS, **ARRAYS}
 """All of them by name."""
+
+
+TAKEN, REFUSED = "taken", "refused"
+
+
+def is_our_own(refusal):
+    """Whether a statement `raise` of this repository refused, rather than a library or an operation deep inside."""
+    frame = traceback.extract_tb(refusal.__traceback__)[-1]
+    return Path(frame.filename).is_relative_to(ROOT) and (frame.line or "").startswith("raise")
+
+
+def outcome(call, arguments):
+    """Whether the arguments are taken, or refused as they should be; else what was raised."""
+    try:
+        call(**arguments)
+    except (ValueError, FileNotFoundError, gym.error.Error) as refused:
+        text = str(refused)
+        if isinstance(refused, OSError) and refused.errno is not None:
+            return REFUSED  # commands make a sentence of it
+        if not text.endswith(".") or "\n" in text or len(text) >= LONGEST or any(word in text for word in INNER):
+            return f"no sentence: {text!r}"
+        return REFUSED if is_our_own(refused) else f"deep inside: {text!r}"
+    except OSError as refused:
+        return REFUSED if refused.errno is not None else f"no sentence: {refused!r}"
+    except Exception as other:
+        return f"{type(other).__name__}: {other}"
+    return TAKEN
+
+
+def taken(call, arguments, functions=()):
+    """Lines of the odd values that are taken in place of every argument. All others are refused in a sentence.
+
+    functions: Arguments that are functions of the caller's: what they raise is theirs.
+    """
+    lines, wrong = [], []
+    for parameter in arguments:
+        odd = {name: make for name, make in ODD.items() if not (parameter in functions and callable(make()))}
+        found = {name: outcome(call, {**arguments, parameter: make()}) for name, make in odd.items()}
+        wrong += [f"{parameter}={name}: {each}" for name, each in found.items() if each not in (TAKEN, REFUSED)]
+        lines.append(f"{parameter}: {', '.join(name for name, each in found.items() if each == TAKEN) or 'none'}")
+    assert not wrong, "\n".join([f"{len(wrong)}", *wrong])
+    return sorted(lines)

@@ -1,19 +1,14 @@
-"""Whatever is given as an argument is accepted, or refused with a ValueError of one sentence."""
+"""Whatever is given as an argument is taken, as a file says, or refused with a ValueError of one sentence."""
 
 import inspect
-import traceback
-from pathlib import Path
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
 import documented
 from fuzz import odd
-from fuzz.sentences import INNER, LONGEST
-from odd_values import ODD
+from odd_values import ODD, REFUSED, outcome, taken
 
-ROOT = Path(__file__).parents[1]
 FUNCTIONS = ("watch", "on_step", "make", "function")
 """Arguments that are functions of the caller's: what they raise is theirs."""
 UNUSED = ("state", "episode_start", "deterministic", "info")
@@ -34,40 +29,6 @@ def calls_of(name):
     return [(call, {each.name: each.default for each in others} | arguments)]
 
 
-def is_our_own(refusal):
-    """Whether a statement `raise` of this repository refused, rather than a library or an operation deep inside."""
-    frame = traceback.extract_tb(refusal.__traceback__)[-1]
-    return Path(frame.filename).is_relative_to(ROOT) and (frame.line or "").startswith("raise")
-
-
-def outcome(call, arguments):
-    """None where the arguments are accepted or refused as they should be, else what was raised."""
-    try:
-        call(**arguments)
-    except (ValueError, FileNotFoundError, gym.error.Error) as refused:
-        text = str(refused)
-        if isinstance(refused, OSError) and refused.errno is not None:
-            return None  # of which commands make a sentence
-        if not text.endswith(".") or "\n" in text or len(text) >= LONGEST or any(word in text for word in INNER):
-            return f"no sentence: {text!r}"
-        return None if is_our_own(refused) else f"deep inside: {text!r}"
-    except OSError as refused:
-        return None if refused.errno is not None else f"no sentence: {refused!r}"
-    except Exception as other:
-        return f"{type(other).__name__}: {other}"
-    return None
-
-
-def wrong_outcomes(call, arguments):
-    return [
-        f"{parameter}={name}: {found}"
-        for parameter in arguments
-        for name, make in ODD.items()
-        if not (parameter in FUNCTIONS and callable(make()))
-        if (found := outcome(call, {**arguments, parameter: make()})) is not None
-    ]
-
-
 @pytest.fixture(autouse=True)
 def folder_of_ones_own(tmp_path, monkeypatch):
     """Odd names of files are names of files."""
@@ -76,9 +37,10 @@ def folder_of_ones_own(tmp_path, monkeypatch):
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", [*TOP_LEVEL, *DOCUMENTED])
-def test_odd_values_are_accepted_or_refused_in_a_sentence(name):
-    wrong = [each for call, arguments in calls_of(name) for each in wrong_outcomes(call, arguments)]
-    assert calls_of(name) and not wrong, "\n".join([f"{len(wrong)}", *wrong])
+def test_odd_values_are_taken_as_before_or_refused_in_a_sentence(name, golden):
+    found = [line for call, arguments in calls_of(name) for line in taken(call, arguments, FUNCTIONS)]
+    assert found
+    golden(f"{name}.txt", "\n".join(found))
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -94,7 +56,7 @@ def taken_masked(call, arguments):
         for parameter in arguments
         if parameter not in UNUSED
         for shape in SHAPES
-        if outcome_of_masked(call, {**arguments, parameter: masked(shape)})
+        if outcome(call, {**arguments, parameter: masked(shape)}) is not REFUSED
     ]
 
 
@@ -103,15 +65,6 @@ def masked(shape):
     numbers = np.ma.array(np.zeros(shape), mask=np.zeros(shape, bool))
     numbers.ravel()[:1] = np.ma.masked
     return numbers
-
-
-def outcome_of_masked(call, arguments):
-    """Whether it was taken, or refused by something deep inside."""
-    try:
-        call(**arguments)
-    except (ValueError, gym.error.Error) as refused:
-        return not is_our_own(refused)
-    return True
 
 
 # Whatever a simulator or an environment is given, it is taken or refused in one sentence, and loses nothing.

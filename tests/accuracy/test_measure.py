@@ -31,12 +31,6 @@ def test_classes_are_drawn_for_any_number_of_limbs(n_limbs):
     assert np.abs(classes["small"]).max() <= 0.1
 
 
-def test_failed_robots_have_no_bound():
-    assert measure.rounded_up(np.inf) == np.inf
-    assert measure.rounded_up(0.0123) == 0.013
-    assert measure.rounded_up(0.012) == 0.012
-
-
 def test_a_speed_is_the_simulated_time_of_all_robots_over_processor_time_the_best_of_three_strokes(monkeypatch):
     times = iter([0.0, 3.0, 3.0, 5.0, 5.0, 9.0])
     monkeypatch.setattr(measure.time, "thread_time", lambda: next(times))
@@ -59,24 +53,6 @@ def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):
     np.testing.assert_array_equal(swum.hub[0], simulator.hub_position())
 
 
-def test_the_dearest_swims_begin_first_and_progress_is_the_share_of_their_cost(monkeypatch):
-    began, shares = [], []
-
-    def swum(scene, group, period):
-        began.append((scene.robot.nodes_per_limb, scene.numerics.step, group.shape[1]))
-        return measure.Swims(*(np.zeros((len(group), group.shape[1], 2)[: 3 if k == 0 else 2]) for k in range(7)))
-
-    monkeypatch.setattr(measure, "swim", swum)
-    monkeypatch.setattr(measure, "GROUP", 3)
-    monkeypatch.setattr(measure, "processors", lambda: 1)
-    scenes = [resolved(SCENE, nodes, Numerics("sdirk2", step)) for nodes, step in ((5, 2e-2), (9, 2e-2), (5, 5e-3))]
-    found = measure.swim_all(scenes, np.zeros((2, 4, 5)), shares.append)
-    assert began == [(5, 5e-3, 3), (9, 2e-2, 3), (5, 5e-3, 1), (5, 2e-2, 3), (9, 2e-2, 1), (5, 2e-2, 1)]
-    costs = np.array([5 * 4 * 3, 9 * 3, 5 * 4, 5 * 3, 9, 5])
-    np.testing.assert_allclose(shares, np.cumsum(costs) / costs.sum())
-    assert [each.hub.shape for each in found] == [(2, 4, 2)] * 3
-
-
 def swims(hub, heading=None):
     """Swims with these hubs [m], shape (strokes, n, 2), and headings [rad]."""
     hub = np.asarray(hub, float)
@@ -84,12 +60,21 @@ def swims(hub, heading=None):
     return measure.Swims(hub, zeros if heading is None else np.asarray(heading, float), *[zeros] * 5)
 
 
-def test_path_error_is_the_largest_distance_over_the_length_of_the_converged_path():
-    exact = swims([[[3.0, 4.0]], [[3.0, 9.0]]])
+def test_errors_of_paths_and_ends_are_over_the_length_of_the_converged_path_and_those_of_headings_are_turns():
+    """And infinite of the robots whose solver failed."""
+    exact = swims([[[3.0, 4.0]], [[3.0, 9.0]]], [[0.0], [-3.1]])
     lengths = measure.path_lengths(SCENE, exact.hub)
     assert lengths == pytest.approx([10.0])
-    off = measure.errors(swims([[[3.0, 4.5]], [[3.0, 9.1]]]), exact, lengths)
+    off = measure.errors(swims([[[3.0, 4.5]], [[3.0, 9.1]]], [[0.0], [3.1]]), exact, lengths)
     assert off.path == pytest.approx([0.05]) and off.end == pytest.approx([0.01])
+    assert off.heading == pytest.approx([2.0 * np.pi - 6.2])
+    limit = np.cumsum(np.full((10, 2, 2), [0.003, 0.004]), axis=0)
+    hub = limit + [0.0, 0.001]
+    hub[3, 1] = np.nan
+    found = measure.errors(swims(hub), swims(limit), measure.path_lengths(SCENE, limit))
+    np.testing.assert_allclose(found.path, [0.02, np.inf])
+    assert np.isinf([found.end[1], found.heading[1]]).all()
+    assert [measure.rounded_up(error) for error in (np.inf, 0.0123, 0.012)] == [np.inf, 0.013, 0.012]
 
 
 def test_space_and_time_of_the_same_length_bound_the_whole_error():
@@ -99,21 +84,6 @@ def test_space_and_time_of_the_same_length_bound_the_whole_error():
     parts = measure.errors(fine, limit, lengths).path + measure.errors(coarse, fine, lengths).path
     assert measure.errors(coarse, limit, lengths).path == pytest.approx(parts.tolist())
     assert parts == pytest.approx([1.5])
-
-
-def test_heading_error_knows_that_a_turn_is_a_turn():
-    hub = [[[1.0, 0.0]]]
-    off = measure.errors(swims(hub, [[3.1]]), swims(hub, [[-3.1]]), np.ones(1))
-    assert off.heading == pytest.approx([2.0 * np.pi - 6.2])
-
-
-def test_errors_are_infinite_of_the_robots_whose_solver_failed():
-    limit = np.cumsum(np.full((10, 2, 2), [0.003, 0.004]), axis=0)
-    hub = limit + [0.0, 0.001]
-    hub[3, 1] = np.nan
-    found = measure.errors(swims(hub), swims(limit), measure.path_lengths(SCENE, limit))
-    np.testing.assert_allclose(found.path, [0.02, np.inf])
-    assert np.isinf([found.end[1], found.heading[1]]).all()
 
 
 def test_space_and_time_are_errors_against_many_nodes_and_short_steps():
@@ -181,35 +151,28 @@ def swims_of(energies, monkeypatch):
     return endurance.energy_growth(SCENE), len(strokes)
 
 
-def test_the_last_20_of_200_strokes_are_compared_with_the_first_20(monkeypatch):
-    energies = np.ones((200, 17))
-    energies[19, 0], energies[20:180, 0], energies[180, 0] = 2.0, 10.0, 3.0
-    assert swims_of(energies, monkeypatch) == (1.5, 200)
-    energies[199, 1] = 7.0
-    assert swims_of(energies, monkeypatch) == (7.0, 200)
+EARLY, LATER, EVERYTHING = slice(0, 20), slice(20, 200), slice(None)
+GROWTHS = [
+    ([(19, 0, 2.0), (slice(20, 180), 0, 10.0), (180, 0, 3.0)], 1.5, 200),
+    ([(19, 0, 2.0), (199, 1, 7.0)], 7.0, 200),
+    *(([(stroke, 5, 20.0)], 20.0, stroke + 1) for stroke in (20, 60, 198)),
+    ([(60, 5, np.nextafter(20.0, 0.0))], 1.0, 200),
+    ([(EARLY, 1, 1e-30), (LATER, 1, 3e-6)], 3.0, 200),
+    ([(EARLY, 1, 2e-6), (LATER, 1, 3e-6)], 1.5, 200),
+    ([(EVERYTHING, EVERYTHING, 0.0)], 0.0, 200),
+]
 
 
-@pytest.mark.parametrize("stroke", [20, 60, 198])
-def test_swims_end_where_the_energy_has_grown_20_fold(monkeypatch, stroke):
-    energies = np.ones((200, 17))
-    energies[stroke, 5] = 20.0
-    assert swims_of(energies, monkeypatch) == (20.0, stroke + 1)
-    energies[stroke, 5] = np.nextafter(20.0, 0.0)
-    assert swims_of(energies, monkeypatch)[1] == 200
-
-
-def test_a_millionth_of_the_largest_early_energy_is_noise(monkeypatch):
-    energies = np.ones((200, 17))
-    energies[:20, 1], energies[20:, 1] = 1e-30, 3e-6
-    assert swims_of(energies, monkeypatch)[0] == pytest.approx(3.0)
-    energies[:20, 1] = 2e-6
-    assert swims_of(energies, monkeypatch)[0] == pytest.approx(1.5)
-    assert swims_of(np.zeros((200, 17)), monkeypatch)[0] == 0.0
-
-
-def test_a_setting_endures_up_to_a_growth_by_half():
-    assert replace(SETTING, energy_growth=1.5).is_energy_stable
-    assert not replace(SETTING, energy_growth=np.nextafter(1.5, 2.0)).is_energy_stable
+@pytest.mark.parametrize("energies, growth, strokes", GROWTHS)
+def test_the_last_20_of_200_strokes_are_compared_with_the_first_20(energies, growth, strokes, monkeypatch):
+    """A millionth of the largest early energy is noise. Swims end where the energy has grown 20-fold."""
+    given = np.ones((200, 17))
+    for strokes_of, robots, energy in energies:
+        given[strokes_of, robots] = energy
+    found = swims_of(given, monkeypatch)
+    assert found == (pytest.approx(growth), strokes)
+    stable = replace(SETTING, energy_growth=found[0]).is_energy_stable
+    assert stable == (growth <= 1.5) and not replace(SETTING, energy_growth=np.nextafter(1.5, 2.0)).is_energy_stable
 
 
 def test_the_energy_of_a_swim_that_fails_grows_without_bound(monkeypatch):
@@ -256,19 +219,11 @@ def test_a_uniform_current_is_a_translation(body):
     assert endurance.energy_growth(moving) == pytest.approx(endurance.energy_growth(still), rel=1e-3)
 
 
-def test_errors_are_divided_by_the_way_through_the_water():
-    """A robot at rest in a current goes nowhere; one that swims has the same errors as in still water."""
-    hub = np.arange(1, 11)[:, None, None] * np.array([0.05, 0.0])
-    in_current = in_water(UniformCurrent(0.05))
-    assert measure.path_lengths(in_current, hub)[0] == pytest.approx(0.8e-4)
-    assert measure.path_lengths(SCENE, hub)[0] == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize("kind", ["vortex", "grid"])
-def test_a_current_that_differs_from_place_to_place_carries_the_hub(kind):
+@pytest.mark.parametrize("kind", ["uniform", "vortex", "grid"])
+def test_errors_are_divided_by_the_way_through_the_water(kind):
     """A robot that does nothing is carried by the water at its hub, nearly, and goes little way through it."""
     scene = resolved(in_water(CURRENTS[kind]), 5, Numerics("sdirk2", 2e-2, 1e-6))
     hub = measure.swim(scene, np.zeros((10, 1, 5))).hub
-    over_ground = measure.path_lengths(SCENE, hub)[0]
-    through_the_water = measure.path_lengths(scene, hub)[0]
-    assert through_the_water < 0.2 * over_ground
+    assert measure.path_lengths(scene, hub)[0] < 0.2 * measure.path_lengths(SCENE, hub)[0]
+    hub = np.arange(1, 11)[:, None, None] * np.array([0.05, 0.0])
+    assert measure.path_lengths(in_water(UniformCurrent(0.05)), hub)[0] == pytest.approx(0.8e-4)

@@ -1,9 +1,7 @@
 """The benchmark measures any agent on any registered task, and its results can be merged."""
 
 import json
-import math
 import os
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +10,7 @@ import numpy as np
 import pytest
 
 from losing import LOST, Interrupted, Losing, first
+from odd_values import taken
 from refusals import assert_refused, assert_told
 from seastar_gym import Scene, __version__
 from seastar_gym.benchmark import page
@@ -69,18 +68,17 @@ def entry(agent="a", scores=(2.0, 2.0, 4.0, 4.0), **more):
 def test_tasks_are_the_registered_ids_of_this_package(tasks):
     assert {SWIM, "SeastarSwimTimed-v0", SHORT} <= set(task_ids())
     assert not any(id.startswith("CartPole") for id in task_ids())
+    assert isinstance(make_batch(SHORT, 2), SeastarSwimVectorEnv)
+    assert isinstance(make_batch(OTHER, 2, split="test"), gym.vector.SyncVectorEnv)
 
 
-def test_returns_are_sums_of_rewards(tasks):
+def test_returns_are_sums_of_rewards_and_who_does_not_arrive_has_the_time_limit(tasks):
     swum = swim_episodes(SHORT, scripted("4+,1-"), [7])
     env, total = gym.make(SHORT), 0.0
     env.reset(seed=7)
     for _ in range(swum.decisions[0]):
         total += env.step(np.array([2, 0, 0, 1, 0]))[1]
     assert swum.returns[0] == pytest.approx(total)
-
-
-def test_who_does_not_arrive_has_the_time_limit_whatever_ended_the_episode(tasks):
     swum = swim_episodes(SHORT, scripted("rest"), [0, 1], max_decisions=4)
     np.testing.assert_array_equal(SECONDS.of(swum), [4.0, 4.0])
     np.testing.assert_array_equal(swum.decisions, 4)
@@ -96,21 +94,17 @@ def test_a_task_of_another_measure_without_a_batch_is_swum_on_its_held_out_split
     np.testing.assert_allclose(MEASURES[Station].of(swum), side, rtol=1e-3)
 
 
-def test_an_agent_that_cannot_see_is_refused_before_the_first_decision():
-    env = SeastarSwimEnv(decision_period=0.5, observe_actuators=False)
-    greedy = GreedyPolicy.__new__(GreedyPolicy)
-    greedy.actions, greedy.decision_period = "joint", 0.5
-    with assert_refused("It reads observations of 196 numbers, the task shows 186."):
-        require_seen(greedy, env)
-    with assert_refused("The policy decides every 1 s, the environment every 2 s"):
-        require_seen(load(), SeastarSwimEnv(decision_period=2.0, scene=Scene()))
-
-
-def test_agents_are_made_for_the_environment_they_swim_in():
+def test_agents_are_made_for_the_environment_they_swim_in_and_refused_where_they_cannot_see():
     env = SeastarSwimEnv(decision_period=0.5, fidelity="fast")
     assert load_agent("learned", env).decision_period == 0.5
     assert load_agent("learned", SeastarSwimEnv()).decision_period == 1.0
     assert load_agent("greedy", env).scene == env.scene
+    greedy = GreedyPolicy.__new__(GreedyPolicy)
+    greedy.actions, greedy.decision_period = "joint", 0.5
+    with assert_refused("It reads observations of 196 numbers, the task shows 186."):
+        require_seen(greedy, SeastarSwimEnv(decision_period=0.5, observe_actuators=False))
+    with assert_refused("The policy decides every 1 s, the environment every 2 s"):
+        require_seen(load(), SeastarSwimEnv(decision_period=2.0, scene=Scene()))
 
 
 # Results
@@ -124,13 +118,9 @@ def test_relative_scores_are_one_for_the_best():
     fast, slow = entry(scores=(1.0, 1.0)), entry("b", (3.0, 3.0))
     assert best_means([slow, fast]) == {SWIM: 1.0}
     assert best_means([replace(one, better="more") for one in (slow, fast)]) == {SWIM: 3.0}
-
-
-def test_a_failure_counts_in_the_mean():
-    """An interquartile mean would hide the quarter that does not arrive."""
+    # A failure counts in the mean: an interquartile one would hide the quarter that does not arrive.
     found = entry(scores=(100.0, 100.0, 100.0, 300.0)).estimate()
     assert found.mean == 150.0 and found.low == 100.0 and found.high > 150.0
-    assert str(entry(scores=(100.0,)).estimate()) == "100.0"
 
 
 def test_results_come_back_from_their_file_and_the_later_of_two_counts(tmp_path):
@@ -156,32 +146,35 @@ def test_other_files_are_refused(tmp_path, text):
         read(tmp_path / "results.json")
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"success": [True]}, {"better": "other"}, {"seeds": []}, {"seeds": [0, 0]}, {"seeds": [1001, 1000, 1002, 1003]},
-        {"seeds": [0, 1, 2, 3]}, {"seeds": None}, {"fidelity": "f`|"}, {"seeds": {}}, {"scores": "1234"},
-        {"success": [1, 0, 1, 0]}, {"decisions": [0, 1, 2, 3]}, {"decisions": [1.0] * 4},
-        *({name: [value] * 4} for name in ("scores", "returns")
-          for value in (math.nan, math.inf, 1e308, 10**400, None, "1", True)),
-        {"scores": [-1.0] * 4},
-    ],
-    ids=repr,
-)  # fmt: skip
-def test_entries_that_are_not_whole_are_refused(wrong):
-    with pytest.raises(ValueError, match="of a on"):
-        entry(**wrong)
+def made(**facts):
+    """An entry, refused in a sentence."""
+    try:
+        return Entry(**facts)
+    except ValueError as wrong:
+        raise ValueError(f"{wrong}.") from None
 
 
-@pytest.mark.parametrize("name", ["two\nlines", "x" * 101, None, 5, "\x1b[2J", "\u202e"])
-def test_names_are_texts_on_one_line(name):
-    for field in ("agent", "task", "measure", "unit"):
-        with pytest.raises(ValueError, match="its names are not all texts on one line"):
-            entry(**{field: name})
+def test_odd_entries_are_refused(golden):
+    """As a whole, and for every episode."""
+    facts = vars(entry(scores=(2.0, 4.0)))
+    lines = taken(made, facts)
+    for name in ("seeds", "scores", "success", "returns", "decisions"):
+        first = facts[name][0]
+        lines += taken(
+            lambda name=name, first=first, **odd: made(**facts | {name: [first, *odd.values()]}), {name: first}
+        )
+    golden("entry.txt", "\n".join(lines))
+    for wrong in ({"agent": "x" * 101}, {"agent": "\x1b[2J"}, {"unit": "\u202e"}, {"seeds": [1001, 1000]}):
+        with assert_refused("on one line" if wrong.keys() & {"agent", "unit"} else "the seeds of a on"):
+            made(**facts | wrong)
 
 
-def test_results_of_another_version_or_measure_are_not_merged(tmp_path, capsys):
+def test_results_of_another_version_or_measure_and_what_is_no_file_are_not_merged(tmp_path, capsys):
     file, arguments = tmp_path / "results.json", ["--agents", "--out", str(tmp_path / "out"), "--merge"]
+    for make in (os.mkfifo, os.mkdir):
+        make(tmp_path / make.__name__)
+        assert main([*arguments, str(tmp_path / make.__name__)]) == 2
+        assert_told(capsys, "There is no file")
     for wrong, sentence in (
         ({"version": "0.0.9"}, f"has results of version 0.0.9 of seastar_gym, not of this one, {__version__}"),
         ({"better": "more"}, "SeastarSwim-v0 is measured by time until done [s], of which less is better"),
@@ -194,22 +187,11 @@ def test_results_of_another_version_or_measure_are_not_merged(tmp_path, capsys):
         assert not (tmp_path / "out").exists()
 
 
-def test_names_are_text_not_markup_in_the_page(tmp_path):
+def test_names_are_text_not_markup_in_the_page(tmp_path, golden):
     wicked = "<script>a|b`c`[d](e)*$\\frac{$&lt;"
-    entries = [entry(wicked, measure="m|<b>", unit="|"), entry("b")]
-    rows = [line for line in page.page(entries, f"seastar `{wicked}`", None).splitlines() if line.startswith("|")]
-    assert [len(re.findall(r"(?<!\\)\|", row)) for row in rows] == [5, 5, 5, 3, 3, 3, 3]
-    assert not any(re.search(r"(?<!\\)<", row) for row in rows)
-    assert page.plain(wicked) == r"\<script\>a\|b\`c\`\[d\](e)\*\$\\frac{\$\&lt;"
-    assert page.code("a`b``c") == "``` a`b``c ```" and page.code("a") == "`a`"
-    page.draw(page.common([entry(wicked), entry("b")])[1], tmp_path / "profiles.png")
-
-
-@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir], ids=["pipe", "folder"])
-def test_what_is_no_file_is_not_merged(make, tmp_path, capsys):
-    make(tmp_path / "results.json")
-    assert main(["--agents", "--merge", str(tmp_path / "results.json")]) == 2
-    assert "There is no file" in capsys.readouterr().err
+    entries = [entry(wicked, measure="m|<b>", unit="|"), entry("b"), entry("c``d")]
+    golden("page.md", page.page(entries, f"seastar `{wicked}` ``", "profiles.png"))
+    page.draw(page.common(entries)[1], tmp_path / "profiles.png")
 
 
 def test_only_tasks_that_all_agents_swam_are_added_up():
@@ -265,22 +247,17 @@ def test_results_are_the_same_bits_on_every_executor(executor, tmp_path, monkeyp
     assert [len(one.seeds) for one in here] == [5, 5]
 
 
-def test_lost_jobs_are_run_again_and_those_that_are_always_lost_are_named(tasks, tmp_path, monkeypatch, capsys):
-    words = ["--agents", "rest", "--tasks", SHORT, "--seeds", "4", "--decisions", "2", "--seeds-per-job", "1"]
-    for losses, code in ((5, 0), (12, 2)):
-        monkeypatch.setattr("seastar_gym.benchmark.command.executor_of", lambda options, n=losses: Losing(first(n)))
-        assert main([*words, "--out", str(tmp_path)]) == code
-    assert read(tmp_path / "results.json")[0].seeds == [1000, 1001, 1002, 1003]
-    assert f"rest does not swim SeastarShort-v0: {LOST}" in capsys.readouterr().err
-
-
-def test_a_lost_agent_beside_others_is_left_out_and_the_command_exits_with_1(tasks, tmp_path, monkeypatch, capsys):
-    executor = Losing(lambda task: task.agent == "random")
-    monkeypatch.setattr("seastar_gym.benchmark.command.executor_of", lambda options: executor)
-    words = ["--agents", "random", "rest", "--tasks", SHORT, "--seeds", "2", "--decisions", "2"]
-    assert main([*words, "--out", str(tmp_path)]) == 1
-    assert [one.agent for one in read(tmp_path / "results.json")] == ["rest"]
-    assert f"random does not swim SeastarShort-v0: {LOST}" in capsys.readouterr().err
+def test_lost_jobs_are_run_again_and_agents_that_are_always_lost_are_left_out(tasks, tmp_path, monkeypatch, capsys):
+    words = ["--tasks", SHORT, "--seeds", "4", "--decisions", "2", "--seeds-per-job", "1", "--out", str(tmp_path)]
+    for is_lost, agents, swum, code in (
+        (first(5), ["rest"], ["rest"], 0), (first(12), ["rest"], ["rest"], 2),
+        (lambda task: task.agent == "random", ["random", "rest"], ["rest"], 1),
+    ):  # fmt: skip
+        monkeypatch.setattr("seastar_gym.benchmark.command.executor_of", lambda options, lost=is_lost: Losing(lost))
+        assert main(["--agents", *agents, *words]) == code
+        assert [(one.agent, one.seeds) for one in read(tmp_path / "results.json")] == [
+            (agent, [1000, 1001, 1002, 1003]) for agent in swum]  # fmt: skip
+        assert (f"{agents[0]} does not swim SeastarShort-v0: {LOST}" in capsys.readouterr().err) == (code > 0)
 
 
 def test_an_interrupt_keeps_what_is_finished_for_another_run_to_merge(tasks, tmp_path, monkeypatch, capsys):
@@ -292,37 +269,31 @@ def test_an_interrupt_keeps_what_is_finished_for_another_run_to_merge(tasks, tmp
     with monkeypatch.context() as pressed:
         pressed.setattr("seastar_gym.benchmark.command.executor_of", lambda options: Interrupted(3))
         assert main(["--agents", "rest", "random", *words]) == INTERRUPTED
-    kept = tmp_path / "interrupted.json"
-    told = f"Interrupted: what is finished is in {kept}, which --merge takes.\n"
-    assert capsys.readouterr().err == told
+        kept, told = tmp_path / "interrupted.json", capsys.readouterr().err
+        pressed.setattr("seastar_gym.benchmark.command.executor_of", lambda options: Interrupted(1))
+        (tmp_path / "nothing").mkdir()
+        assert main(["--agents", "rest", *words[:-1], str(tmp_path / "nothing")]) == INTERRUPTED
+        assert capsys.readouterr().err == "Interrupted: no agent had finished a task.\n"
+        assert not list((tmp_path / "nothing").iterdir())
+    assert told == f"Interrupted: what is finished is in {kept}, which --merge takes.\n"
     assert [(one.agent, one.seeds) for one in read(kept)] == [("rest", [1000, 1001])]
     assert (tmp_path / "results.json").read_bytes() == before
     assert main(["--agents", "random", *words, "--merge", str(kept)]) == 0
     assert [one.agent for one in read(tmp_path / "results.json")] == ["rest", "random"]
 
 
-def test_an_interrupt_before_anything_is_finished_writes_nothing(tasks, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("seastar_gym.benchmark.command.executor_of", lambda options: Interrupted(1))
-    words = ["--agents", "rest", "--tasks", SHORT, "--seeds", "2", "--decisions", "2", "--seeds-per-job", "1"]
-    assert main([*words, "--out", str(tmp_path)]) == INTERRUPTED
-    assert capsys.readouterr().err == "Interrupted: no agent had finished a task.\n"
-    assert not list(tmp_path.iterdir())
-
-
-def test_an_agent_with_a_bug_does_not_cost_the_others_their_results(tasks, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    "agent, words", [("a_bug:make", ""), ("lagged", "SeastarShort-v0: A lagged gait needs two decisions")]
+)
+def test_an_agent_with_a_bug_or_that_does_not_fit_does_not_cost_the_others_their_results(
+    agent, words, tasks, tmp_path, monkeypatch, capsys
+):
     (tmp_path / "a_bug.py").write_text("def make(env):\n    return 1 + 'one'\n")
     monkeypatch.syspath_prepend(str(tmp_path))
-    options = ["--tasks", SHORT, "--agents", "a_bug:make", "rest", "--seeds", "2", "--out", str(tmp_path / "out")]
+    options = ["--tasks", SHORT, "--agents", agent, "rest", "--seeds", "2", "--out", str(tmp_path / "out")]
     assert main([*options, "--fidelity", "fast", "--decisions", "2"]) == 0
-    assert "a_bug:make does not swim" in capsys.readouterr().err
+    assert f"{agent} does not swim {words}" in capsys.readouterr().err
     assert [entry.agent for entry in read(tmp_path / "out" / "results.json")] == ["rest"]
-
-
-def test_an_agent_that_does_not_fit_is_left_out_with_a_sentence(tasks, tmp_path, capsys):
-    arguments = ["--agents", "lagged", "rest", "--tasks", SHORT, "--seeds", "1", "--decisions", "2"]
-    assert main([*arguments, "--out", str(tmp_path)]) == 0
-    assert "lagged does not swim SeastarShort-v0: A lagged gait needs two decisions" in capsys.readouterr().err
-    assert [one.agent for one in read(tmp_path / "results.json")] == ["rest"]
 
 
 @pytest.mark.parametrize(
@@ -341,8 +312,3 @@ def test_what_cannot_be_measured_is_said_in_a_sentence(arguments, words, tmp_pat
     assert main(arguments) == 2
     assert_told(capsys, words)
     assert not list(tmp_path.iterdir())
-
-
-def test_the_native_batch_is_taken_where_there_is_one(tasks):
-    assert isinstance(make_batch(SHORT, 2), SeastarSwimVectorEnv)
-    assert isinstance(make_batch(OTHER, 2, split="test"), gym.vector.SyncVectorEnv)

@@ -91,9 +91,6 @@ def test_a_dataset_is_not_written_over(folder, capsys):
 def test_what_cannot_be_recorded_is_said_in_a_sentence(folder, arguments, words, capsys):
     assert main(["data", "--fidelity", "fast", "--out", str(folder), *arguments]) == 2
     assert_told(capsys, words)
-
-
-def test_no_episodes_are_no_dataset(folder):
     with assert_refused("There are no episodes for SeastarSwim/none-v0."):
         write([], "SeastarSwim/none-v0", SWIM, "nobody")
 
@@ -149,15 +146,3 @@ def test_the_tasks_have_datasets_of_three_qualities_by_one_command(tmp_path, mon
         assert first.infos["course"].shape == (201, 8)
     assert make(arguments) == 0
     assert capsys.readouterr().out.count("is there already") == 3
-
-
-def test_minari_s_own_recorder_keeps_infos(tmp_path, monkeypatch):
-    pytest.importorskip("jax")
-    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    env = minari.DataCollector(gym.make(SWIM, fidelity="fast", max_episode_steps=3), record_infos=True)
-    env.reset(seed=0)
-    for _ in range(3):
-        env.step(env.action_space.sample())
-    dataset = env.create_dataset("SeastarSwim/collected-v0")
-    (episode,) = dataset.iterate_episodes()
-    assert episode.infos["hub_position"].shape == (4, 2) and len(episode) == 3

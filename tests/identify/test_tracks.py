@@ -77,79 +77,45 @@ def written(folder, name, text):
     return folder / name
 
 
-def test_a_file_of_poses_is_read_and_lost_pictures_are_nan(tmp_path):
-    track = read_pose(written(tmp_path, "pose.csv", POSE))
-    assert track.time.tolist() == [0.0, 0.033, 0.067, 0.1]
-    np.testing.assert_array_equal(track.points["tag"], [[0.1, 0.2], [np.nan] * 2, [np.nan] * 2, [0.11, 0.2]])
-    np.testing.assert_array_equal(track.orientations["tag"], [0.3, np.nan, np.nan, 0.31])
-    assert read_pose(written(tmp_path, "place.csv", "time,x,y\n0,1,2\n")).orientations == {}
-
-
-def test_a_file_of_deeplabcut_is_read_and_unlikely_points_were_not_seen(tmp_path):
-    file = written(tmp_path, "dlc.csv", DEEPLABCUT)
-    track = read_deeplabcut(file, 30.0)
-    np.testing.assert_allclose(track.time, [0.0, 1 / 30, 2 / 30])
-    np.testing.assert_array_equal(track.points["hub"], [[100.5, 200.25], [np.nan] * 2, [np.nan] * 2])
-    np.testing.assert_array_equal(track.points["tip one"], [[300.0, 200.0], [301.0, 201.0], [302.0, 202.0]])
-    assert read_deeplabcut(file, 30.0, likelihood=0.2).points["hub"][1].tolist() == [101.0, 201.0]
-
-
-def test_one_of_several_animals_of_deeplabcut_is_named(tmp_path):
-    file = written(tmp_path, "dlc.csv", SEVERAL)
-    assert read_deeplabcut(file, 30.0, "b").points["hub"].tolist() == [[3.0, 4.0]]
-    for wrong in (None, "c"):
-        with assert_refused("has the individuals a, b: name one"):
-            read_deeplabcut(file, 30.0, wrong)
-
-
-def test_an_individual_of_a_file_that_names_none_is_refused(tmp_path):
-    with assert_refused("dlc.csv names no individuals: leave --individual out"):
-        read_deeplabcut(written(tmp_path, "dlc.csv", DEEPLABCUT), 30.0, "a")
-
-
-def test_a_file_of_sleap_is_read_in_the_order_of_its_pictures(tmp_path):
-    track = read_sleap(written(tmp_path, "sleap.csv", SLEAP), 10.0)
-    np.testing.assert_allclose(track.time, [0.0, 0.1, 0.3])
-    np.testing.assert_array_equal(track.points["hub"], [[101.5, 55.25], [102.0, 56.0], [103.0, 57.0]])
-    np.testing.assert_array_equal(track.points["tip"], [[140.0, 60.0], [np.nan] * 2, [141.0, 61.0]])
-
-
-def test_an_hdf5_file_of_sleap_is_read(tmp_path):
+def sleap_h5(folder, name, text):
+    """HDF5 file of two animals with two points, in three pictures."""
     h5py = pytest.importorskip("h5py", reason="h5py is not installed (extra data)")
-    tracks = np.arange(24.0).reshape(2, 2, 2, 3)
-    with h5py.File(tmp_path / "sleap.h5", "w") as file:
-        file["tracks"], file["node_names"], file["track_names"] = tracks, [b"hub", b"tip"], [b"a", b"b"]
-    track = read_sleap(tmp_path / "sleap.h5", 10.0, "b")
-    np.testing.assert_array_equal(track.points["tip"], tracks[1, :, 1].T)
-    assert track.time.tolist() == [0.0, 0.1, 0.2]
-    with assert_refused("has the individuals a, b"):
-        read_sleap(tmp_path / "sleap.h5", 10.0)
-    written(tmp_path, "no.h5", "no HDF5")
-    with assert_refused("no.h5 is no analysis file of SLEAP"):
-        read_sleap(tmp_path / "no.h5", 10.0)
+    with h5py.File(folder / name, "w") as file:
+        file["tracks"] = np.arange(24.0).reshape(2, 2, 2, 3)
+        file["node_names"], file["track_names"] = [b"hub", b"tip"], [b"a", b"b"]
+    return folder / name
+
+
+READ = {
+    "pose.csv": (POSE, read_pose), "place.csv": ("time,x,y\n0,1,2\n", read_pose),
+    "deeplabcut.csv": (DEEPLABCUT, lambda file: read_deeplabcut(file, 30.0)),
+    "deeplabcut_unlikely.csv": (DEEPLABCUT, lambda file: read_deeplabcut(file, 30.0, likelihood=0.2)),
+    "deeplabcut_b.csv": (SEVERAL, lambda file: read_deeplabcut(file, 30.0, "b")),
+    "sleap.csv": (SLEAP, lambda file: read_sleap(file, 10.0)),
+    "sleap.h5": ("", lambda file: read_sleap(file, 10.0, "b")),
+    "motive.csv": (MOTIVE, read_motive), "motive_z.csv": (MOTIVE, lambda file: read_motive(file, "z")),
+    "motive_with_parents.csv": (MOTIVE_WITH_PARENTS, read_motive),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", READ)
+def test_files_are_read_in_the_order_of_their_pictures_and_what_was_not_seen_is_nan(tmp_path, name, golden):
+    """Motive's from above in metres: half a turn about the upward axis is one to the left, and the measured marker is
+    taken, not the solver's."""
+    text, read = READ[name]
+    track = read((sleap_h5 if name.endswith("h5") else written)(tmp_path, name, text))
+    with np.printoptions(precision=9, suppress=True):
+        lines = [f"time {track.time}"]
+        lines += [f"{kind} {point}\n{each}" for kind in ("points", "orientations")
+                  for point, each in getattr(track, kind).items()]  # fmt: skip
+    golden(f"{name}.txt", "\n".join(lines))
 
 
 def test_hdf5_without_h5py_says_what_to_install(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "h5py", None)
     given = ["--from", "sleap", "--out", str(tmp_path / "out.csv"), "--rate", "30", "--metres-per-pixel", "0.001"]
     assert main(["track2csv", str(tmp_path / "sleap.h5"), *given]) == 2
-    assert capsys.readouterr().err == 'HDF5 files of SLEAP need h5py: pip install "seastar-gym[data]".\n'
-
-
-def test_a_file_of_motive_is_read_from_above_in_metres(tmp_path):
-    """Half a turn about the upward axis is one to the left; the measured marker is taken, not the solver's."""
-    track = read_motive(written(tmp_path, "motive.csv", MOTIVE))
-    np.testing.assert_allclose(track.time, [0.0, 0.008333, 0.016667])
-    np.testing.assert_allclose(track.points["Seastar"], [[0.01, -0.02], [np.nan] * 2, [0.011, -0.019]])
-    np.testing.assert_allclose(track.points["Seastar:Marker 001"], [[0.0015, 0.0035], [np.nan] * 2, [0.0015, 0.0045]])
-    np.testing.assert_allclose(track.orientations["Seastar"], [0.0, np.nan, math.pi / 3], atol=1e-7)
-    upright = read_motive(tmp_path / "motive.csv", "z")
-    np.testing.assert_allclose(upright.points["Seastar"][0], [0.01, 0.5])
-
-
-def test_a_file_of_motive_with_parents_and_time_codes_is_read(tmp_path):
-    track = read_motive(written(tmp_path, "motive.csv", MOTIVE_WITH_PARENTS))
-    np.testing.assert_allclose(track.points["Tip"], [[0.25, -1.0]])
+    assert_told(capsys, 'need h5py: pip install "seastar-gym[data]"')
 
 
 @pytest.mark.parametrize("up", ["y", "z"])
@@ -167,6 +133,9 @@ def test_a_rigid_body_turns_as_its_points_do(up, tmp_path):
     assert track.orientations["Seastar"][0] == pytest.approx(angle)
 
 
+CORNERS = np.array([[0.0, 0.0], [0.4, 0.0], [0.4, 0.3], [0.0, 0.3]])
+
+
 def pixels_of(metres):
     """Pixels of a camera that looks down from the side, shape (n, 2)."""
     matrix = np.array([[2000.0, 300.0, 640.0], [100.0, -1800.0, 480.0], [0.1, 0.4, 1.0]])
@@ -174,47 +143,29 @@ def pixels_of(metres):
 
 
 def test_four_points_tell_the_plane_of_a_camera_that_looks_from_the_side(tmp_path):
-    corners = np.array([[0.0, 0.0], [0.4, 0.0], [0.4, 0.3], [0.0, 0.3]])
     rng = np.random.default_rng(0)
     inside = rng.uniform(0.0, 0.3, (20, 2))
-    found = homography(pixels_of(corners), corners)
+    found = homography(pixels_of(CORNERS), CORNERS)
     np.testing.assert_allclose(mapped(found, pixels_of(inside)), inside, atol=1e-12)
     many = homography(pixels_of(inside), inside)
-    np.testing.assert_allclose(mapped(many, pixels_of(corners)), corners, atol=1e-12)
+    np.testing.assert_allclose(mapped(many, pixels_of(CORNERS)), CORNERS, atol=1e-12)
     noisy = pixels_of(inside) + rng.normal(size=(20, 2))  # wherever pixels are counted from
     here, there = (mapped(homography(noisy + begin, inside), noisy + begin) for begin in (0.0, [1e4, 0.0]))
     np.testing.assert_allclose(there, here, atol=1e-9)
-    lines = [",".join(f"{x:.12g}" for x in row) for row in np.hstack([pixels_of(corners), corners])]
+    lines = [",".join(f"{x:.12g}" for x in row) for row in np.hstack([pixels_of(CORNERS), CORNERS])]
     file = written(tmp_path, "corners.csv", "u,v,x,y\n" + "\n".join(lines) + "\n")
     np.testing.assert_allclose(mapped(read_homography(file), pixels_of(inside)), inside, atol=1e-9)
 
 
 def test_directions_are_mapped_as_short_lines_are():
-    corners = np.array([[0.0, 0.0], [0.4, 0.0], [0.4, 0.3], [0.0, 0.3]])
-    plane = homography(pixels_of(corners), corners)
+    plane = homography(pixels_of(CORNERS), CORNERS)
     points, angles = np.array([[600.0, 400.0], [900.0, 300.0]]), np.array([0.4, -2.0])
     ahead = points + 1e-4 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     x, y = (mapped(plane, ahead) - mapped(plane, points)).T
     np.testing.assert_allclose(turned(plane, points, angles), np.arctan2(y, x), atol=1e-6)
-
-
-def test_pictures_have_y_down():
     track = in_metres(Track(np.zeros(1), {"tag": np.array([[100.0, 200.0]])}, {"tag": np.array([0.5])}), scaled(1e-3))
-    np.testing.assert_allclose(track.points["tag"], [[0.1, -0.2]])
+    np.testing.assert_allclose(track.points["tag"], [[0.1, -0.2]])  # pictures have y down
     np.testing.assert_allclose(track.orientations["tag"], [-0.5])
-
-
-@pytest.mark.parametrize(
-    "points, words",
-    [
-        ([[0, 0], [1, 0], [0, 1]], "needs four points or more, not 3"),
-        ([[0, 0], [1, 0], [2, 0], [0, 1]], "no three of four may be on one line"),
-        ([[1, 1]] * 4, "they are all the same"),
-    ],
-)
-def test_points_that_tell_no_plane_are_refused(points, words):
-    with assert_refused(words):
-        homography(np.array(points, float), np.array(points, float))
 
 
 def test_a_robot_that_begins_anywhere_is_brought_to_the_origin():
@@ -236,41 +187,45 @@ def test_a_robot_that_begins_anywhere_is_brought_to_the_origin():
     np.testing.assert_allclose(found.positions.mean(axis=0), shape[list(nodes)], atol=1e-12)
 
 
-def test_what_tells_no_beginning_is_refused():
-    with assert_refused("does not tell the direction of limb 1"):
-        from_rest(Seen(np.zeros((2, 1, 2)), (0,)), np.arange(2.0), 0.0, Scene())
-    lost = np.array([[[np.nan, np.nan]], [[0.0, 0.0]]])
-    with assert_refused("No node was seen while the robot was at rest, in the first 0 s"):
-        from_rest(Seen(lost, (0,)), np.arange(2.0), 0.0, Scene())
+def no_plane(points):
+    return lambda file: homography(np.array(points, float), np.array(points, float))
 
 
-def test_points_that_are_not_there_are_refused():
-    track = Track(np.zeros(1), {"a": np.zeros((1, 2)), "b": np.zeros((1, 2))}, {})
-    with assert_refused("There is no point c: the file has a, b."):
-        seen_nodes(track, {"c": 0})
-    with assert_refused("Two points cannot be one node: a=0, b=0."):
-        seen_nodes(track, {"a": 0, "b": 0})
+LOST = np.array([[[np.nan, np.nan]], [[0.0, 0.0]]])
+NOTHING = Track(np.zeros(1), {"a": np.zeros((1, 2)), "b": np.zeros((1, 2))}, {})
+REFUSED = [
+    (lambda file: read_deeplabcut(file, 30.0), SEVERAL, "has the individuals a, b: name one"),
+    (lambda file: read_deeplabcut(file, 30.0, "c"), SEVERAL, "has the individuals a, b: name one"),
+    (lambda file: read_deeplabcut(file, 30.0, "a"), DEEPLABCUT, "names no individuals: leave --individual out"),
+    (lambda file: read_sleap(sleap_h5(file.parent, "sleap.h5", ""), 10.0), "", "has the individuals a, b"),
+    (lambda file: read_sleap(file.rename(file.with_suffix(".h5")), 10.0), "x", "h5 is no analysis file of SLEAP"),
+    (read_pose, "time,x\n0,1\n", "the first line must be time,x,y,theta"),
+    (read_pose, "time,x,y\n", "the first line must be time,x,y,theta"),
+    (read_pose, "time,x,y\n0,1\n", "line 2: the line must have 3 fields"),
+    (read_pose, "time,x,y\n,1,2\n", "line 2: there is no time"),
+    (read_pose, "time,x,y\n0,one,2\n", "line 2: 'one' is no number"),
+    (lambda file: read_deeplabcut(file, 1.0), POSE, "has no lines scorer, bodyparts and coords"),
+    (lambda file: read_deeplabcut(file, 1.0), DEEPLABCUT[:-1] + ",9\n", "line 6: the line must have 7 fields"),
+    (lambda file: read_deeplabcut(file, 1.0), "scorer,s\nbodyparts,a\ncoords,x\n0,1\n", "x, y and likelihood"),
+    (lambda file: read_sleap(file, 1.0), POSE, "the first line must be track,frame_idx,instance.score"),
+    (lambda file: read_sleap(file, 1.0), SLEAP[:-1] + "1\n" + "track_0,4\n", "line 5: the line must have 9 fields"),
+    (read_motive, POSE, "has no types, names and Position"),
+    (read_motive, MOTIVE.replace("Millimeters", "Feet"), "line 1: Format Version and Length Units must be there"),
+    (read_motive, MOTIVE.replace("Z,W,", "Z,,"), "export it with the rotation type Quaternion"),
+    (no_plane([[0, 0], [1, 0], [0, 1]]), "", "needs four points or more, not 3"),
+    (no_plane([[0, 0], [1, 0], [2, 0], [0, 1]]), "", "no three of four may be on one line"),
+    (no_plane([[1, 1]] * 4), "", "they are all the same"),
+    (lambda _: from_rest(Seen(np.zeros((2, 1, 2)), (0,)), np.arange(2.0), 0.0, Scene()), "",
+     "does not tell the direction of limb 1"),
+    (lambda _: from_rest(Seen(LOST, (0,)), np.arange(2.0), 0.0, Scene()), "",
+     "No node was seen while the robot was at rest, in the first 0 s"),
+    (lambda _: seen_nodes(NOTHING, {"c": 0}), "", "There is no point c: the file has a, b."),
+    (lambda _: seen_nodes(NOTHING, {"a": 0, "b": 0}), "", "Two points cannot be one node: a=0, b=0."),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "read, text, words",
-    [
-        (read_pose, "time,x\n0,1\n", "the first line must be time,x,y,theta"),
-        (read_pose, "time,x,y\n", "the first line must be time,x,y,theta"),
-        (read_pose, "time,x,y\n0,1\n", "line 2: the line must have 3 fields"),
-        (read_pose, "time,x,y\n,1,2\n", "line 2: there is no time"),
-        (read_pose, "time,x,y\n0,one,2\n", "line 2: 'one' is no number"),
-        (lambda file: read_deeplabcut(file, 1.0), POSE, "has no lines scorer, bodyparts and coords"),
-        (lambda file: read_deeplabcut(file, 1.0), DEEPLABCUT[:-1] + ",9\n", "line 6: the line must have 7 fields"),
-        (lambda file: read_deeplabcut(file, 1.0), "scorer,s\nbodyparts,a\ncoords,x\n0,1\n", "x, y and likelihood"),
-        (lambda file: read_sleap(file, 1.0), POSE, "the first line must be track,frame_idx,instance.score"),
-        (lambda file: read_sleap(file, 1.0), SLEAP[:-1] + "1\n" + "track_0,4\n", "line 5: the line must have 9 fields"),
-        (read_motive, POSE, "has no types, names and Position"),
-        (read_motive, MOTIVE.replace("Millimeters", "Feet"), "line 1: Format Version and Length Units must be there"),
-        (read_motive, MOTIVE.replace("Z,W,", "Z,,"), "export it with the rotation type Quaternion"),
-    ],
-)
-def test_files_of_another_form_are_refused_by_their_names(tmp_path, read, text, words):
+@pytest.mark.parametrize("read, text, words", REFUSED)
+def test_files_of_another_form_and_what_they_do_not_tell_are_refused(tmp_path, read, text, words):
     with assert_refused(words):
         read(written(tmp_path, "file.csv", text))
 
@@ -284,8 +239,7 @@ def test_files_of_a_tracker_end_in_a_fit(tmp_path, capsys):
     swum = trajectory(time, nodes, commands, with_parameters(scene, list(truth), list(truth.values())))
     c, s = math.cos(1.0), math.sin(1.0)
     lab = swum @ np.array([[c, s], [-s, c]]) + [0.2, 0.1]
-    corners = np.array([[0.0, 0.0], [0.4, 0.0], [0.4, 0.3], [0.0, 0.3]])
-    np.savetxt(tmp_path / "corners.csv", np.hstack([pixels_of(corners), corners]), "%.10g", ",")
+    np.savetxt(tmp_path / "corners.csv", np.hstack([pixels_of(CORNERS), CORNERS]), "%.10g", ",")
     pixels = np.stack([pixels_of(lab[:, k]) for k in range(3)], axis=1)
     pixels[1:] += np.random.default_rng(0).normal(0.0, 1.0, pixels[1:].shape)  # half a millimetre
     sure = np.where(np.random.default_rng(1).random((75, 3)) < 0.1, 0.2, 0.95)
@@ -313,21 +267,15 @@ def converted(tmp_path, text, *given):
     return code, (tmp_path / "out.csv").read_text() if code == 0 else None
 
 
-def test_poses_become_the_hub_and_its_orientation(tmp_path):
-    code, text = converted(tmp_path, POSE, "--from", "pose")
-    lines = [line.split(",") for line in text.splitlines()]
-    assert code == 0 and lines[0] == ["time", "x0", "y0", "theta"] and lines[2][1:] == ["", "", ""]
-    assert [float(x) for x in lines[1]] == pytest.approx([0.0] * 4, abs=1e-12)
-    c, s = math.cos(0.3), math.sin(0.3)
-    assert [float(x) for x in lines[4]] == pytest.approx([0.1, 0.01 * c, -0.01 * s, 0.01], rel=1e-6)
-    code, text = converted(tmp_path, POSE, "--from", "pose", "--aligned")
-    assert text.splitlines()[1] == "0.0,0.1,0.2,0.3"
-
-
-def test_a_marker_of_motive_may_be_any_node(tmp_path):
-    given = ["--from", "motive", "--nodes", "Seastar:Marker 001=tip1", "Seastar=hub"]
-    code, text = converted(tmp_path, MOTIVE, *given)
-    assert code == 0 and text.startswith("time,x0,y0,x11,y11,theta\n")
+def test_trackers_poses_and_markers_become_nodes_and_the_hub_s_orientation(tmp_path, golden):
+    for name, text, given in (
+        ("pose_turned", POSE, ["--from", "pose"]), ("pose_aligned", POSE, ["--from", "pose", "--aligned"]),
+        ("any_node", MOTIVE, ["--from", "motive", "--nodes", "Seastar:Marker 001=tip1", "Seastar=hub"]),
+    ):  # fmt: skip
+        code, csv = converted(tmp_path, text, *given)
+        assert code == 0
+        rounded = (",".join(f"{float(x):.6f}" if x else "" for x in line.split(",")) for line in csv.splitlines()[1:])
+        golden(f"{name}.csv", "\n".join([csv.splitlines()[0], *rounded]))
 
 
 @pytest.mark.parametrize(

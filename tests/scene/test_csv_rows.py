@@ -39,16 +39,14 @@ def test_a_file_of_numbers_is_read_to_the_last_line(tmp_path, data):
     "data, words",
     [
         (b"", "numbers.csv has no line with a time and an angle"),
-        (b"\n\n", "numbers.csv has no line with"),
         (b"time,angle\n", "numbers.csv has no line with"),
         (b"0.0,0.l\n" + GOOD, "line 1: '0.l' is no number"),
-        (b"O.0,0.0\n" + GOOD, "line 1: 'O.0' is no number"),
         (b"\xef\xbb\xbfO.0,O.0\n" + GOOD, "line 1: 'O.0' is no number"),
         (b"time\n" + GOOD, "line 1: every line must have a time and an angle, not 'time'"),
         (b"time,angle\ntime,angle\n" + GOOD, "line 2: 'time' is no number"),
         (b"nan,nan\n" + GOOD, "line 1: 'nan' is no finite number"),
-        (b"-,-\n" + GOOD, "line 1: '-' is no number"),
         (GOOD + b"2.0,inf\n", "line 4: 'inf' is no finite number"),
+        (b"-,-\n" + GOOD, "line 1: '-' is no number"),
         (GOOD + b"2.0,-Infinity\n", "line 4: '-Infinity' is no finite number"),
         (GOOD + b"2.0,1e999\n", "line 4: '1e999' is no finite number"),
         (GOOD + b"\n\n2.0,1_0\n", "line 6: '1_0' is no number"),
@@ -57,8 +55,6 @@ def test_a_file_of_numbers_is_read_to_the_last_line(tmp_path, data):
         (b"0;0\n1;0\n", "line 1: fields must be separated by commas, not by semicolons"),
         (b"0,0;0,1\n", "line 1: fields must be separated by commas, not by semicolons"),
         (b'"0,0","0,1"\n', "line 1: '0,0' is no number, decimals follow a point"),
-        (b"0\t0\n", "line 1: every line must have"),
-        (b"0,0,\n", "line 1: every line must have"),
         (b"0,0\n,\n", "line 2: '' is no number"),
         (b"Gr\xf6\xdfe,Winkel\n" + GOOD, "line 1: this is no UTF-8 text"),
         (GOOD + b"2.0,\xb50\n", "line 4: this is no UTF-8 text"),
@@ -74,8 +70,5 @@ def test_a_file_of_numbers_is_read_to_the_last_line(tmp_path, data):
 def test_what_is_no_file_of_numbers_is_refused_with_its_line(tmp_path, data, words):
     with assert_refused(words):
         read(tmp_path, data)
-
-
-def test_a_folder_is_no_file(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"^There is no file .*\.$"):
-        read_rows(tmp_path)
+        read_rows(tmp_path)  # a folder

@@ -5,15 +5,17 @@ import dataclasses
 import inspect
 import json
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from random import Random
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seastar_gym
 from every_part import ACTUATORS, CURVE, EACH, PARTS, WAVES
+from fuzz.scenes import COMPILED, EVERYTHING, SWIMMER, draw_scene, drawn
 from refusals import assert_refused
 from seastar_gym import (
     Contact,
@@ -28,19 +30,14 @@ from seastar_gym import (
     RewardWeights,
     Scene,
     Seastar,
-    ShearCurrent,
     Sight,
-    Simulator,
     SmaPulse,
-    ThermalSma,
     Uniform,
-    UniformCurrent,
-    Vortex,
     Water,
     register_part,
 )
+from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.model.rods import make_rods
-from seastar_gym.scene.actuators.actuator import Actuator
 from seastar_gym.scene.actuators.pulse import HeatingAndCooling
 from seastar_gym.scene.per_robot import numbers_of
 from seastar_gym.scene.serial import KINDS, VERSION, from_dict, to_dict
@@ -49,12 +46,6 @@ from seastar_gym.scene.serial import KINDS, VERSION, from_dict, to_dict
 def again(scene: Scene) -> Scene:
     """The scene by way of JSON."""
     return Scene.from_dict(json.loads(json.dumps(scene.to_dict(), allow_nan=False)))
-
-
-def swum(scene: Scene) -> np.ndarray:
-    simulator = Simulator(scene, scene.n_robots or 1)
-    simulator.stroke(np.tile([1.0, -1.0, 0.5, 0.0, -1.0][: scene.robot.n_limbs], (simulator.n_robots, 1)))
-    return simulator.positions
 
 
 # Coming back
@@ -70,128 +61,28 @@ def test_every_actuator_comes_back_with_every_part(actuator):
         assert numbers_of(found) == numbers_of(scene), name  # and which of them are those of each robot
 
 
-@pytest.mark.parametrize(
-    "actuator, part",
-    [
-        ("pulse of each robot", "nothing"),
-        ("limited curve", "strengths"),
-        ("thermal of each robot", "limbs"),
-        pytest.param("limits of each robot", "contact of each robot", marks=pytest.mark.slow),
-        pytest.param("curve", "shear", marks=pytest.mark.slow),
-        pytest.param("pulse", "grid", marks=pytest.mark.slow),
-    ],
-)
-def test_a_scene_that_came_back_swims_to_the_same_bits(actuator, part):
-    scene = Scene(**{"actuator": ACTUATORS[actuator], "numerics": Numerics.preset("fast"), **PARTS[part]})
-    assert swum(again(scene)).tobytes() == swum(scene).tobytes()
-
-
-def test_numerics_that_nobody_named_come_back_unnamed():
-    assert not again(Scene()).numerics.named
-    assert again(Scene(numerics=Numerics())).numerics.named
-
-
-def test_a_resolution_that_nobody_named_comes_back_unnamed():
+def test_what_nobody_named_comes_back_unnamed():
+    assert not again(Scene()).numerics.named and again(Scene(numerics=Numerics())).numerics.named
     assert again(Scene()).at("fast") == Scene.preset("fast")
     assert again(Scene(Seastar(nodes_per_limb=12))).at("fast").robot.nodes_per_limb == 12
     assert again(Scene()).robot.named_resolution == (None, None)
 
 
-def test_every_part_of_the_package_is_in_the_table():
+def test_every_part_of_the_package_is_registered_and_in_the_tables():
     """A new part is not forgotten: of every registered kind some scene of the tables has one, and every field of it."""
-    fields = {field.name for field in dataclasses.fields(Scene)}
-    assert {"actuator"}.union(*PARTS.values()) == fields
-    assert all(hasattr(seastar_gym, name) for name in seastar_gym.__all__)  # parts are registered where they are loaded
+    assert {"actuator"}.union(*PARTS.values()) == {field.name for field in dataclasses.fields(Scene)}
+    public = (getattr(seastar_gym, name) for name in seastar_gym.__all__)  # registered where they are loaded
+    parts = {kind for kind in public if inspect.isclass(kind) and dataclasses.is_dataclass(kind)}
+    assert parts - {seastar_gym.StrokeReport, seastar_gym.Certificate} <= set(KINDS.values())
     scenes = [Scene(actuator=actuator) for actuator in ACTUATORS.values()] + [Scene(**part) for part in PARTS.values()]
     seen = {kind for scene in scenes for kind in KINDS if f'"kind": "{kind}"' in json.dumps(scene.to_dict())}
-    of_environments = {"RewardWeights", "HeadingTargets", "DomainRandomization", "Uniform", "LogUniform", "Normal"}
-    of_environments |= {"Sight", "Miswired", "Prey", "Station", "FailBlind", "ObstTrap", "Prizes", "SimToReal"}
-    assert {name for name, kind in KINDS.items() if kind.__module__.startswith("seastar_gym")} == seen | of_environments
+    own = {name: kind.__module__ for name, kind in KINDS.items() if kind.__module__.startswith("seastar_gym")}
+    assert {name for name, module in own.items() if not module.startswith("seastar_gym.envs")} == seen
 
 
-def test_every_actuator_of_the_package_is_registered():
-    public = (getattr(seastar_gym, name) for name in seastar_gym.__all__)
-    parts = [kind for kind in public if inspect.isclass(kind) and dataclasses.is_dataclass(kind)]
-    assert len(parts) > 15
-    reports = {seastar_gym.StrokeReport, seastar_gym.Certificate}
-    assert {kind for kind in parts if kind not in reports} <= set(KINDS.values())
-
-
-def numbers(low: float, high: float):
-    """A number in one of the forms that a user may give it, or one for each of three robots."""
-    one = st.floats(low, high)
-    each = st.lists(one, min_size=3, max_size=3).map(np.array)
-    return st.one_of(one, one.map(np.float64), one.map(np.float32), each)
-
-
-CURRENTS = st.one_of(
-    st.none(),
-    st.builds(UniformCurrent, numbers(-0.01, 0.01), numbers(-0.01, 0.01)),
-    st.builds(ShearCurrent, numbers(-0.1, 0.1), numbers(-9.0, 9.0)),
-    st.builds(Vortex, numbers(-0.01, 0.01), numbers(-1, 1), numbers(-1, 1), numbers(0.01, 1.0)),
-    st.lists(st.floats(-0.01, 0.01), min_size=12, max_size=12).map(
-        lambda u: GridCurrent((0.0, u[0]), 0.1, np.reshape(u, (3, 2, 2)))
-    ),
-)
-FLUIDS = st.one_of(
-    st.none(),
-    st.builds(
-        Water,
-        density=numbers(0.0, 2000.0),
-        drag_coefficient=numbers(0.5, 2.0),
-        tangential_drag_coefficient=st.one_of(st.none(), numbers(0.0, 0.5)),
-        current=CURRENTS,
-        added_mass_coefficient=st.one_of(st.none(), numbers(0.0, 1.0)),
-    ),
-)
-PULSES = st.builds(SmaPulse, numbers(0.0, 0.6), st.floats(0.05, 0.5), st.floats(0.1, 1.0))
-CURVES = st.builds(replace, st.just(CURVE), scale=numbers(0.0, 0.9))
-ANY_ACTUATOR = st.one_of(
-    PULSES,
-    CURVES,
-    st.builds(Limited, st.one_of(PULSES, CURVES), st.one_of(st.none(), numbers(0.1, 0.9)), numbers(0.1, 9.0)),
-    st.builds(ThermalSma, numbers(0.0, 0.6), time_constant=numbers(0.3, 0.9), steady_rise=numbers(100.0, 300.0)),
-)
-LIMBS = st.builds(
-    Limb,
-    length=st.one_of(st.none(), numbers(0.05, 0.2)),
-    radius=st.one_of(st.none(), numbers(1e-3, 2e-3), st.tuples(st.floats(1e-3, 2e-3), st.floats(1e-3, 2e-3))),
-    youngs_modulus=st.one_of(st.none(), numbers(1e5, 1e7)),
-    natural_curvature=numbers(-2.0, 2.0),
-)
-
-
-@st.composite
-def scenes(draw) -> Scene:
-    """Any scene that is accepted."""
-    n_limbs = draw(st.sampled_from([3, 4, 5, 7]))
-    try:
-        robot = Seastar(
-            n_limbs=draw(st.sampled_from([n_limbs, np.int64(n_limbs)])),
-            nodes_per_limb=draw(st.integers(3, 6)),
-            limb_length=draw(numbers(0.05, 0.2)),
-            density=draw(numbers(500.0, 2000.0)),
-            limbs=draw(st.one_of(st.just(()), st.lists(LIMBS, min_size=n_limbs, max_size=n_limbs).map(tuple))),
-            relaxation_time=draw(st.one_of(st.none(), numbers(0.0, 1e-2))),
-        )
-        return Scene(
-            robot,
-            draw(FLUIDS),
-            draw(ANY_ACTUATOR),
-            draw(st.sampled_from([Numerics.preset("fast"), Numerics(), Numerics("sdirk3", 1 / 30)])),
-            held_nodes=draw(st.one_of(st.just(()), st.just((1,)))),
-            loads=draw(st.one_of(st.just(()), st.tuples(st.tuples(st.integers(0, 5), st.floats(-1, 1), st.just(0.0))))),
-            limb_strengths=draw(st.one_of(st.just(()), st.tuples(*[st.floats(0.0, 1.0)] * n_limbs))),
-            contact=draw(st.one_of(st.none(), st.just(Contact()), st.builds(Contact, numbers(1e4, 1e6)))),
-        )  # fmt: skip
-    except ValueError:
-        assume(False)
-        raise
-
-
-@given(scenes())
-@settings(max_examples=60, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
-def test_any_scene_comes_back_from_json(scene):
+@drawn(60, [*COMPILED, EVERYTHING, SWIMMER])
+def test_any_scene_comes_back_from_json(terms, seed):
+    scene = draw_scene(Random(seed), terms, 3)
     assert again(scene) == scene
     assert repr(again(scene)) == repr(again(again(scene)))
     for index in range(scene.n_robots or 1):
@@ -207,17 +98,15 @@ def assert_same_bits(one, other):
         assert type(one) is type(other) and np.asarray(one).tobytes() == np.asarray(other).tobytes()
 
 
-@pytest.mark.parametrize(
-    "part",
-    [
-        RewardWeights(199.9, 0.0, 1 / 3),
-        HeadingTargets((0.1, 1 / 3), 0.2),
-        Sight(100 / 3, Uniform(0.1, 1 / 3), sees=3),
-        HeadingTargets("random"),
-        DomainRandomization({"robot.density": Uniform(900, 1100.1), "actuator.peak_angle": Uniform(0, 0.5)}),
-        DomainRandomization({"fluid.density": LogUniform(1.0, 1 / 0.3), "actuator.peak_angle": Normal(0.5, 0.01)}),
-    ],
-)
+OF_ENVIRONMENTS = [
+    RewardWeights(199.9, 0.0, 1 / 3), HeadingTargets((0.1, 1 / 3), 0.2), HeadingTargets("random"),
+    Sight(100 / 3, Uniform(0.1, 1 / 3), sees=3), *CHALLENGES.values(),
+    DomainRandomization({"robot.density": Uniform(900, 1100.1), "actuator.peak_angle": Uniform(0, 0.5)}),
+    DomainRandomization({"fluid.density": LogUniform(1.0, 1 / 0.3), "actuator.peak_angle": Normal(0.5, 0.01)}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("part", OF_ENVIRONMENTS, ids=lambda part: type(part).__name__)
 def test_what_an_environment_is_told_comes_back_in_its_order(part):
     read = from_dict(json.loads(json.dumps(to_dict(part), sort_keys=True)), type(part))
     assert read == part and repr(read) == repr(part)
@@ -238,44 +127,10 @@ class Sawtooth(HeatingAndCooling):
         return np.interp(t, self.corners, (0.0, self.peak_angle, 0.0))
 
 
-def test_an_actuator_of_ones_own_is_refused_when_it_is_written(monkeypatch):
-    with assert_refused("Scene.actuator is a Sawtooth", "seastar_gym.register_part"):
-        Scene(actuator=Sawtooth()).to_dict()
-    with assert_refused("Scene.actuator.actuator is a Sawtooth"):
-        Scene(actuator=Limited(Sawtooth())).to_dict()
-
-
-def test_a_registered_actuator_of_ones_own_comes_back(monkeypatch):
-    monkeypatch.setitem(KINDS, "Sawtooth", Sawtooth)
-    assert register_part(Sawtooth) is Sawtooth
-    scene = Scene(actuator=Limited(Sawtooth(0.2), largest_rate=3.0))
-    data = scene.to_dict()
-    assert Scene.from_dict(data) == scene
-    monkeypatch.delitem(KINDS, "Sawtooth")
-    with assert_refused("Scene.actuator.actuator", "'Sawtooth'", "registered"):
-        Scene.from_dict(data)
-
-
 @dataclass(frozen=True)
 class Labelled(Sawtooth):
     label: str = field(default="none", kw_only=True, compare=False, repr=False)
     table: dict = field(default_factory=dict)
-
-
-def test_what_does_not_count_in_comparisons_comes_back_too(monkeypatch):
-    monkeypatch.setitem(KINDS, "Labelled", Labelled)
-    actuator = Labelled(0.25, label="the left one", table={"b": (1, 2.0), "a": None})
-    read = again(Scene(actuator=actuator)).actuator
-    assert read == actuator and read.label == "the left one" and [*read.table] == ["b", "a"]
-
-
-def test_two_parts_of_one_name_are_refused():
-    other = type("SmaPulse", (SmaPulse,), {"__module__": "elsewhere"})
-    with assert_refused("SmaPulse"):
-        register_part(other)
-    assert KINDS["SmaPulse"] is SmaPulse
-    with assert_refused("Scene.actuator is a SmaPulse"):
-        Scene(actuator=other()).to_dict()
 
 
 class Forgetful(Sawtooth):
@@ -288,78 +143,47 @@ class Incomparable(HeatingAndCooling):
     delta_psi = Sawtooth.delta_psi
 
 
+def test_a_registered_actuator_of_ones_own_comes_back(monkeypatch):
+    """What does not count in comparisons, too."""
+    monkeypatch.setitem(KINDS, "Sawtooth", Sawtooth)
+    monkeypatch.setitem(KINDS, "Labelled", Labelled)
+    assert register_part(Sawtooth) is Sawtooth
+    read = again(Scene(actuator=Labelled(0.25, label="the left one", table={"b": (1, 2.0), "a": None}))).actuator
+    assert read == Labelled(0.25, table=read.table) and read.label == "the left one" and [*read.table] == ["b", "a"]
+    scene = Scene(actuator=Limited(Sawtooth(0.2), largest_rate=3.0))
+    data = scene.to_dict()
+    assert Scene.from_dict(data) == scene
+    monkeypatch.delitem(KINDS, "Sawtooth")
+    with assert_refused("Scene.actuator.actuator", "'Sawtooth'", "registered"):
+        Scene.from_dict(data)
+
+
+ELSEWHERE = type("SmaPulse", (SmaPulse,), {"__module__": "elsewhere"})
+
+
 @pytest.mark.parametrize(
-    "kind, actuator, words",
-    [(Forgetful, Forgetful(0.3), "keeps no peak, memory"), (Incomparable, Incomparable(), "compare by value")],
+    "make, words",
+    [
+        (lambda: Scene(actuator=Sawtooth()), ("Scene.actuator is a Sawtooth", "seastar_gym.register_part")),
+        (lambda: Scene(actuator=Limited(Sawtooth())), ("Scene.actuator.actuator is a Sawtooth",)),
+        (lambda: Scene(actuator=ELSEWHERE()), ("Scene.actuator is a SmaPulse",)),
+        (lambda: register_part(ELSEWHERE), ("SmaPulse",)),
+        (lambda: Scene(actuator=Forgetful(0.3)), ("keeps no peak, memory",)),
+        (lambda: Scene(actuator=Incomparable()), ("compare by value",)),
+    ],
 )
-def test_a_registered_class_that_would_not_come_back_is_refused_when_it_is_written(kind, actuator, words, monkeypatch):
-    assert isinstance(actuator, Actuator)
-    monkeypatch.setitem(KINDS, kind.__name__, kind)
-    with assert_refused(words):
-        Scene(actuator=actuator).to_dict()
+def test_what_would_not_come_back_is_refused_when_it_is_written(make, words, monkeypatch):
+    for kind in (Forgetful, Incomparable):
+        monkeypatch.setitem(KINDS, kind.__name__, kind)
+    with assert_refused(*words):
+        make().to_dict()
+    assert KINDS["SmaPulse"] is SmaPulse
 
 
 # What is no scene
 
 HUGE = 10**400
 PLAIN = Scene(actuator=Limited(SmaPulse()), fluid=Water(current=WAVES)).to_dict()
-
-
-@pytest.mark.parametrize("data", [None, [], 3, "Scene", {}, {"kind": "Scene"}, PLAIN["robot"], Scene()])
-def test_what_has_no_version_is_refused(data):
-    with assert_refused("is a dict with a version"):
-        Scene.from_dict(data)
-
-
-@pytest.mark.parametrize("version", [0, VERSION + 1, HUGE, True, 1.0, None, "1", [1], {}])
-def test_other_versions_are_refused(version):
-    with assert_refused("of version", f"only of {VERSION}"):
-        Scene.from_dict({**PLAIN, "version": version})
-
-
-def test_another_part_is_refused():
-    with assert_refused("plain Seastar, not a Scene"):
-        Scene.from_dict(to_dict(Seastar()))
-    with assert_refused("Scene.robot must be"):
-        Scene.from_dict({**PLAIN, "robot": PLAIN["numerics"]})
-
-
-@pytest.mark.parametrize(
-    "name, change, words",
-    [
-        ("robot", {"n_arms": 5}, ("Scene.robot says 'n_arms', which no Seastar has",)),
-        ("robot", {1: 5}, ("Scene.robot says 1",)),
-        ("robot", {"density": math.nan}, ("Scene.robot.density must be a finite number", "nan")),
-        ("robot", {"density": -math.inf}, ("Scene.robot.density",)),
-        ("robot", {"density": HUGE}, ("Scene.robot.density", "a number beyond all floats")),
-        ("robot", {"density": 10**5000}, ("Scene.robot.density", "a number beyond all floats")),
-        ("robot", {"n_limbs": HUGE}, ("Scene.robot.n_limbs",)),
-        ("robot", {"n_limbs": 5.0}, ("n_limbs must be a whole number",)),
-        ("robot", {"n_limbs": True}, ("n_limbs must be a whole number",)),
-        ("robot", {"density": "1000"}, ("density must be",)),
-        ("robot", {"density": {"value": 3}}, ("Scene.robot.density", "value")),
-        ("robot", {"density": {"kind": []}}, ("Scene.robot.density is of the kind []",)),
-        ("robot", {"density": {"kind": "os.system", "items": ["true"]}}, ("'os.system'", "not known")),
-        ("robot", {"density": {"kind": "per robot", "items": []}}, ("density",)),
-        ("robot", {"density": {"kind": "per robot", "items": [[1.0]]}}, ("density",)),
-        ("robot", {"density": {"kind": "per robot"}}, ("Scene.robot.density",)),
-        ("robot", {"density": {"kind": "mapping", "items": 3}}, ("Scene.robot.density",)),
-        ("robot", {"density": {"kind": "mapping", "items": [3]}}, ("Scene.robot.density is no dict",)),
-        ("robot", {"density": {"kind": "mapping", "items": [[{"kind": "mapping", "items": []}, 1]]}}, ("no dict",)),
-        ("robot", {"density": (1.0, 2.0)}, ("Scene.robot.density", "(1.0, 2.0)")),
-        ("robot", {"density": b"1"}, ("Scene.robot.density", "b'1'")),
-        ("robot", {"limbs": [{"kind": "SmaPulse"}]}, ("limbs must be a tuple of Limb",)),
-        ("fluid", {"current": {**PLAIN["fluid"]["current"], "velocities": [[["1", "2"]] * 2] * 2}}, ("velocities",)),
-        ("fluid", {"current": {**PLAIN["fluid"]["current"], "corner": "ab"}}, ("corner",)),
-        ("actuator", {"actuator": PLAIN["actuator"]}, ("Limited follows an actuator without memory",)),
-        ("numerics", {"scheme": ["euler"]}, ("scheme must be one of",)),
-    ],
-)  # fmt: skip
-def test_wrong_words_and_numbers_are_refused_in_one_sentence(name, change, words):
-    data = copy.deepcopy(PLAIN)
-    data[name] |= change
-    with assert_refused(*words):
-        Scene.from_dict(data)
 
 
 def nested(depth: int) -> list:
@@ -369,10 +193,51 @@ def nested(depth: int) -> list:
     return lists
 
 
-@pytest.mark.parametrize("depth, words", [(31, "A load is"), (32, "nested too deeply"), (100_000, "nested too deeply")])
-def test_what_is_nested_without_end_is_refused(depth, words):
-    with assert_refused(words):
-        Scene.from_dict({**PLAIN, "loads": nested(depth)})
+NO_SCENES = [
+    *((data, "is a dict with a version")
+      for data in (None, [], 3, "Scene", {}, {"kind": "Scene"}, PLAIN["robot"], Scene())),
+    *(({**PLAIN, "version": version}, "of version", f"only of {VERSION}")
+      for version in (0, VERSION + 1, HUGE, True, 1.0, None, "1", [1], {})),
+    (to_dict(Seastar()), "plain Seastar, not a Scene"),
+    ({**PLAIN, "robot": PLAIN["numerics"]}, "Scene.robot must be"),
+    *(({**PLAIN, "loads": nested(depth)}, words)
+      for depth, words in ((31, "A load is"), (32, "nested too deeply"), (100_000, "nested too deeply"))),
+    ({**PLAIN, "fluid": {**PLAIN["fluid"], "current": {"kind": "Vortex"}}}, "does not say"),
+    ({**PLAIN, "actuator": {"kind": "Limited"}}, "does not say"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("refused", NO_SCENES, ids=lambda refused: " ".join(refused[1:]))
+def test_what_is_no_scene_is_refused(refused):
+    data, *words = refused
+    with assert_refused(*words):
+        Scene.from_dict(data)
+
+
+@pytest.mark.parametrize(
+    "name, change, words",
+    [
+        ("robot", {"n_arms": 5}, ("Scene.robot says 'n_arms', which no Seastar has",)),
+        ("robot", {"density": math.nan}, ("Scene.robot.density must be a finite number", "nan")),
+        ("robot", {"n_limbs": 5.0}, ("n_limbs must be a whole number",)),
+        ("robot", {"density": {"kind": []}}, ("Scene.robot.density is of the kind []",)),
+        ("robot", {"density": {"kind": "os.system", "items": ["true"]}}, ("'os.system'", "not known")),
+        ("robot", {"density": {"kind": "per robot", "items": []}}, ("density",)),
+        ("robot", {"density": {"kind": "per robot", "items": [[1.0]]}}, ("density",)),
+        ("robot", {"density": {"kind": "mapping", "items": [3]}}, ("Scene.robot.density is no dict",)),
+        ("robot", {"density": {"kind": "mapping", "items": [[{"kind": "mapping", "items": []}, 1]]}}, ("no dict",)),
+        ("robot", {"density": (1.0, 2.0)}, ("Scene.robot.density", "(1.0, 2.0)")),
+        ("robot", {"limbs": [{"kind": "SmaPulse"}]}, ("limbs must be a tuple of Limb",)),
+        ("fluid", {"current": {**PLAIN["fluid"]["current"], "velocities": [[["1", "2"]] * 2] * 2}}, ("velocities",)),
+        ("fluid", {"current": {**PLAIN["fluid"]["current"], "corner": "ab"}}, ("corner",)),
+        ("actuator", {"actuator": PLAIN["actuator"]}, ("Limited follows an actuator without memory",)),
+    ],
+)  # fmt: skip
+def test_wrong_words_and_numbers_are_refused_in_one_sentence(name, change, words):
+    data = copy.deepcopy(PLAIN)
+    data[name] |= change
+    with assert_refused(*words):
+        Scene.from_dict(data)
 
 
 def places(data, path=()):
@@ -423,21 +288,3 @@ def test_junk_anywhere_is_refused_in_a_sentence_or_is_a_scene(place, junk):
 def test_what_is_missing_has_its_default_or_is_asked_for():
     for place in places(SMALL):
         assert_read_or_refused(place, lambda inner, key: inner.pop(key))
-
-
-def test_a_scene_written_before_a_term_was_known_can_be_read():
-    data = Scene().to_dict()
-    del data["gravity"], data["numerics"]["named"]
-    assert Scene.from_dict(data) == Scene()
-
-
-@pytest.mark.parametrize(("part", "name"), [("fluid", "current"), ("actuator", "actuator")])
-def test_what_has_no_default_is_asked_for(part, name):
-    scene = Scene(fluid=Water(current=Vortex(1e-3)), actuator=Limited(SmaPulse(), 0.5))
-    data = scene.to_dict()
-    if part == "fluid":
-        del data["fluid"]["current"]["circulation"]
-    else:
-        del data["actuator"]["actuator"]
-    with assert_refused("does not say"):
-        Scene.from_dict(data)

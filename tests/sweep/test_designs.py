@@ -2,14 +2,12 @@
 
 import itertools
 import json
-import tracemalloc
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from refusals import assert_refused
-from seastar_gym.gaits import lagged_gait, thrifty_gait
+from seastar_gym.gaits import STRAIGHT, lagged_gait, thrifty_gait
 from seastar_gym.scene import Limb, Numerics, Scene, Seastar, SmaPulse
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.simulator import Simulator
@@ -99,119 +97,29 @@ def test_parts_fidelities_and_gaits_are_choices_of_frames():
     assert frames[-1].gait.commands == ((0.0, 1.0, 0.0, -1.0),)
 
 
-def test_a_gait_of_signs_turns_the_limbs_that_it_names():
-    assert gait_of("1+,3-", FAST).commands == ((1.0, 0.0, -1.0, 0.0, 0.0),)
-
-
 def test_a_turn_is_the_short_way_round():
     way, turn = np.zeros(4, complex), np.array([0.4, 3.0, 3.5, -7.0])
     found = ways(FAST, np.ones(4), way, turn)["turn"]
     np.testing.assert_allclose(found, [0.4, 3.0, 3.5 - 2.0 * np.pi, 2.0 * np.pi - 7.0])
 
 
-def test_a_cell_is_named_by_all_that_its_results_depend_on():
+def test_a_cell_is_named_by_all_that_its_results_depend_on(monkeypatch):
     def names(scene=FAST, axes=(LENGTH,), **options):
         return [batch.name for batch in Sweep(scene, axes, **{"samples": 4, **options}).batches()]
 
-    first = names()
+    first, one, other = names(), np.array([0.1]), np.array([0.2])
     assert first == names()
+    frame = next(Sweep(FAST, (LENGTH,), samples=1).configurations())
+    numbers = {"a": one, "b": other}, {"a": other, "b": one}, {"ab": one, "": other}
     others = [
         names(Scene.preset("balanced")), names(seed=1), names(gait="2-,5+"), names(settling=3), names(measured=9),
         names(axes=(Range("robot.limb_length", 0.05, 0.16),)), names(axes=(LENGTH, Choices("robot.n_limbs", (5,)))),
-        names(gait=np.full((2, 5), 0.5)),
+        names(gait=np.full((2, 5), 0.5)), *([Batch(frame, each, 1).name] for each in numbers),
     ]  # fmt: skip
-    assert len({name for each in (first, *others) for name in each}) == 9
-
-
-def test_the_text_that_names_a_cell_has_its_entries_in_order():
-    """So a name does not depend on the order of a scene's fields."""
-    told = json.loads(next(Sweep(FAST, (LENGTH,), samples=1).configurations()).text)
-    assert list(told) == sorted(told) and list(told["scene"]["robot"]) == sorted(told["scene"]["robot"])
-
-
-def test_a_new_version_of_the_package_is_another_cell(monkeypatch):
-    before = next(Sweep(FAST, (LENGTH,), samples=1).batches()).name
     monkeypatch.setattr("seastar_gym.sweep.configurations.__version__", "99.0")
-    assert next(Sweep(FAST, (LENGTH,), samples=1).batches()).name != before
-
-
-def test_numbers_of_a_robot_belong_to_their_names():
-    frame = next(Sweep(FAST, (LENGTH,), samples=1).configurations())
-    one, other = np.array([0.1]), np.array([0.2])
-    names = {
-        Batch(frame, numbers, 1).name
-        for numbers in ({"a": one, "b": other}, {"a": other, "b": one}, {"ab": one, "": other})
-    }
-    assert len(names) == 3
-
-
-def test_memory_does_not_grow_with_the_number_of_cells():
-    """Ten thousand batches of one robot are made and named one by one."""
-    axes = Range("robot.limb_length", 0.05, 0.15).spaced(100), Range("robot.density", 500.0, 2000.0).spaced(100)
-
-    def peak(n_batches):
-        tracemalloc.start()
-        for batch in itertools.islice(Sweep(FAST, axes, robots=1).batches(), n_batches):
-            assert batch.name
-        size = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-        return size
-
-    peak(10)
-    assert peak(10_000) < peak(100) + 50_000
-
-
-@pytest.mark.parametrize(
-    "arguments, words",
-    [
-        (((LENGTH, LENGTH),), ("once",)),
-        (((LENGTH,),), ("samples", "from 1 to")),
-        (((LENGTH,), "straight", 2, 8, 10**8), ("samples",)),
-        ((LENGTH,), ("tuple of Range and Choices",)),
-        (((Choices("robot.n_limbs", (0, 3)),),), ("n_limbs", "not 0")),
-        (((Choices("robot.colour", (1, 2)),),), ("robot.colour", "nothing that a sweep can vary")),
-        (((Choices("robot.limbs.0.length", (1, 2)),),), ("robot.limbs.0.length",)),
-        (((Range("numerics.step", 1e-3, 2e-3),), "straight", 2, 8, 5), ("numerics.step", "within a batch")),
-        (((Choices("actuator.heating_time", (0.1, 0.2)),), "straight", 2, 8, 5), ("needs a range",)),
-        (((Choices("robot.limb_length", (-1.0, -2.0)),),), ("limb_length",)),
-        (((Choices("gait", ("straight", "6+")),),), ("gait", "6+")),
-        (((Choices("actuator", (SmaPulse(), "pulse")),),), ("actuator", "pulse")),
-        (((Choices("fidelity", ("fast", "quick")),),), ("fidelity", "quick")),
-        (((), "lagged"), ("lagged", "SmaWires")),
-        (((), np.zeros((2, 4))), ("rows of commands of 5 limbs",)),
-        (((), "straight", -1), ("settling",)),
-        (((), "straight", 1, 0), ("measured",)),
-        (((), "straight", 1, 1, 0, -1), ("seed",)),
-        (((), "straight", 1, 1, 0, 0, 0), ("robots",)),
-    ],
-)  # fmt: skip
-def test_bad_sweeps_are_refused(arguments, words):
-    with assert_refused(*words):
-        Sweep(FAST, *arguments)
-
-
-WATER_OR_NOT = Choices("fluid", (FAST.fluid, None), ("water", "vacuum"))
-
-
-@pytest.mark.parametrize(
-    "make, words",
-    [
-        (lambda: Range("x", 2.0, 1.0), ("larger",)),
-        (lambda: Range("x", 0.0, float("inf")), ("finite",)),
-        (lambda: Range("x", 0.0, 1.0, is_log=True), ("positive",)),
-        (lambda: Range("x", 0.0, 1.0, is_log=1), ("is_log",)),
-        (lambda: Choices("x", ()), ("tuple of values",)),
-        (lambda: Choices("x", [1]), ("tuple of values",)),
-        (lambda: Choices("x", (1, 2), ("a",)), ("labels",)),
-        (lambda: Choices("x", (SmaPulse(0.1), SmaPulse(0.2))), ("labels that differ",)),
-        (lambda: Sweep(FAST, (WATER_OR_NOT, Range("fluid.density", 900.0, 1100.0)), samples=2),
-         ("vacuum", "fluid.density")),
-        (lambda: Sweep(Scene(Seastar(limb_length=np.array([0.1, 0.2]))), ()), ("one robot",)),
-    ],
-)  # fmt: skip
-def test_bad_axes_are_refused(make, words):
-    with assert_refused(*words):
-        make()
+    assert len({name for each in (first, *others, names()) for name in each}) == 13
+    told = json.loads(frame.text)  # in order, so a name does not depend on that of a scene's fields
+    assert list(told) == sorted(told) and list(told["scene"]["robot"]) == sorted(told["scene"]["robot"])
 
 
 @pytest.mark.parametrize("name, gait", [("lagged", lagged_gait), ("thrifty", thrifty_gait)])
@@ -220,12 +128,7 @@ def test_gaits_in_time_are_those_of_a_tenth_of_a_second(name, gait):
     found = gait_of(name, wires)
     np.testing.assert_array_equal(found.commands, gait(0.1, 6))
     assert found.interval == 0.1 and gait_of("straight", wires).interval is None
-
-
-@pytest.mark.parametrize("text", ["1*", "0+", "6+", "+", "1+2-", "a+", "1+,", "\u00b2+"])
-def test_what_names_no_limb_is_no_gait(text):
-    with assert_refused(f"limbs of 5 such as 1+,2-, not {text!r}"):
-        gait_of(text, FAST)
+    assert gait_of("1+,3-", FAST).commands == ((1.0, 0.0, -1.0, 0.0, 0.0),)
 
 
 def test_a_range_has_both_ends_and_its_shares_in_between():
@@ -233,18 +136,14 @@ def test_a_range_has_both_ends_and_its_shares_in_between():
     np.testing.assert_allclose(whole.at(np.array([0.0, 0.5, 1.0])), [1.0, 50.5, 100.0])
     np.testing.assert_allclose(log.at(np.array([0.0, 0.5, 1.0])), [1.0, 10.0, 100.0])
     assert whole.spaced(1).values == (1.0,) and log.spaced(3).values == pytest.approx((1.0, 10.0, 100.0))
-    for n in (0, 1_000_001):
-        with assert_refused("n must be a whole number from 1 to 1000000"):
-            whole.spaced(n)
-    for name in ("", 3):
-        with assert_refused("The name of an axis must be a text"):
-            Range(name, 0.0, 1.0)
 
 
-def test_a_straight_swim_goes_ahead_and_turns_nothing():
-    (batch,) = Sweep(FAST, (), settling=1, measured=2).batches()
+@pytest.mark.parametrize("ahead_of_limb", [0, 1])
+def test_a_straight_swim_goes_where_its_gait_is_turned_and_turns_nothing(ahead_of_limb):
+    (batch,) = Sweep(FAST, (), np.roll([STRAIGHT], ahead_of_limb, axis=1), settling=1, measured=2).batches()
     found = swim(batch)
-    assert found["ahead"][0] > 0.0 and abs(found["aside"][0]) < 1e-12 and abs(found["turn"][0]) < 1e-9
+    way = np.arctan2(found["aside"][0], found["ahead"][0])
+    assert way == pytest.approx(ahead_of_limb * 0.4 * np.pi, abs=1e-6) and abs(found["turn"][0]) < 1e-9
 
 
 def test_a_swim_is_measured_after_it_has_settled():

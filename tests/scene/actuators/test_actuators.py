@@ -1,15 +1,14 @@
-"""Actuators other than the pulse, and weak limbs: what they do to a limb, and what is refused."""
+"""Actuators other than the pulse, and weak limbs: what they do to a limb."""
 
 import pickle
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
 
 from own_actuators import Remembering, Triangle
 from refusals import assert_refused
-from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires, ThermalSma
+from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Simulator, SmaPulse
 from seastar_gym.scene.actuators.actuator import Actuator, complete
 
 NUMERICS = Numerics("implicit-midpoint", 0.01)
@@ -51,83 +50,44 @@ def test_time_steps_end_at_every_sample():
     assert set(curve.times[1:]) <= set(np.round(times, 12)) and simulator.time[0] == pytest.approx(0.8)
 
 
-def test_a_curve_is_read_from_csv_with_a_line_of_names_or_without(tmp_path):
-    lines = "0.0,0.0\n0.1,0.6\n\n1.0,0.0\n"
-    for text in (lines, "time,angle\n" + lines):
-        file = tmp_path / "curve.csv"
-        file.write_text(text)
-        assert MeasuredCurve.from_csv(file) == MeasuredCurve((0.0, 0.1, 1.0), (0.0, 0.6, 0.0))
-
-
-def test_measured_curvatures_bend_a_limb_by_their_change_times_its_length(tmp_path):
-    file = tmp_path / "curvature.csv"
+@pytest.mark.parametrize("head", ["", "phase,angle\n"])
+def test_curves_are_read_from_csv(tmp_path, head):
+    """Of angles, or of curvatures, which bend a limb by their change times its length."""
+    file = tmp_path / "curve.csv"
+    file.write_text(head + "0.0,0.0\n0.1,0.6\n\n1.0,0.0\n")
+    assert MeasuredCurve.from_csv(file) == MeasuredCurve((0.0, 0.1, 1.0), (0.0, 0.6, 0.0))
     for last in ("", "1.0,121.0\n"):
-        file.write_text("phase,curvature\n0.0,120.0\n0.25,40.0\n0.5,80.0\n" + last)
+        file.write_text(head + "0.0,120.0\n0.25,40.0\n0.5,80.0\n" + last)
         curve = MeasuredCurve.from_curvatures(file, period=2.0, limb_length=0.03)
         assert curve.times == (0.0, 0.5, 1.0, 2.0)
         np.testing.assert_allclose(curve.angles, (0.0, -2.4, -1.2, 0.0), rtol=1e-14)
 
 
-@pytest.mark.parametrize("text", ["0.1,1\n0.5,2\n", "0,1\n0.5,2\n0.4,3\n", "0,1\n1.5,2\n", "0,1,2\n"])
-def test_phases_that_do_not_go_once_round_are_refused(tmp_path, text):
-    file = tmp_path / "curvature.csv"
-    file.write_text(text)
-    with assert_refused(str(file)):
-        MeasuredCurve.from_curvatures(file, 1.0, 0.03)
-
-
-JUMPING = "0,0\n1,1\n"
-
-
-@pytest.mark.parametrize("text", ["0,0\n1,0,0\n", "0,0\n0.5\n", "time,angle\n", "0,O\n", "", JUMPING])
-def test_lines_that_are_no_samples_and_curves_that_jump_are_refused_by_the_name_of_their_file(tmp_path, text):
-    file = tmp_path / "curve.csv"
-    file.write_text(text)
-    with assert_refused(str(file), "curve.csv: A measured curve must begin and end at 0" if text == JUMPING else ""):
-        MeasuredCurve.from_csv(file)
+def of_curvatures(file):
+    return MeasuredCurve.from_curvatures(file, 1.0, 0.03)
 
 
 @pytest.mark.parametrize(
-    "times, angles, words",
+    "read, text, words",
     [
-        ((0.0, 0.5), (0.0, 0.1, 0.0), "as many angles"),
-        ((0.0,), (0.0,), "two or more"),
-        ((0.1, 0.5, 1.0), (0.0, 0.1, 0.0), "begin at 0"),
-        ((0.0, 0.5, 0.5), (0.0, 0.1, 0.0), "increase"),
-        ((0.0, 0.5, 1.0), (0.1, 0.1, 0.1), "jump"),
-        ((0.0, 0.5, 1.0), (0.0, 0.1, 0.1), "jump"),
-        ((0.0, 0.5, np.nan), (0.0, 0.1, 0.0), "finite"),
-        ([0.0, 0.5, 1.0], (0.0, 0.1, 0.0), "tuple"),
-        ((0.0, 0.5, 1.0), (0.0, "x", 0.0), "angles"),
+        *((MeasuredCurve.from_csv, text, "") for text in ("0,0\n1,0,0\n", "0,0\n0.5\n", "time,angle\n", "0,O\n", "")),
+        (MeasuredCurve.from_csv, "0,0\n1,1\n", ": A measured curve must begin and end at 0"),
+        *((of_curvatures, text, "") for text in ("0.1,1\n0.5,2\n", "0,1\n0.5,2\n0.4,3\n", "0,1\n1.5,2\n", "0,1,2\n")),
     ],
 )
-def test_what_is_no_curve_is_refused_with_a_sentence(times, angles, words):
-    with pytest.raises(ValueError, match=words):
-        MeasuredCurve(times, angles)
+def test_files_of_no_curve_are_refused_by_their_names(tmp_path, read, text, words):
+    file = tmp_path / "curve.csv"
+    with pytest.raises(FileNotFoundError, match=r"^There is no measured curve at .*curve\.csv: .*\.$"):
+        MeasuredCurve.from_csv(file)
+    file.write_text(text)
+    with assert_refused(f"{file}{words}"):
+        read(file)
 
 
 # --- limits ----------------------------------------------------------------------------------------------------------
 
 
-def test_limits_that_bind_nowhere_change_nothing():
-    loose = Limited(SmaPulse(), largest_angle=1.0, largest_rate=100.0)
-    for name in ("positions", "velocities"):
-        free = getattr(swim(Scene(numerics=NUMERICS)), name)
-        np.testing.assert_allclose(getattr(swim(Scene(actuator=loose, numerics=NUMERICS)), name), free, atol=1e-11)
-
-
-def test_a_limited_limb_turns_as_far_and_as_fast_as_it_may():
-    actuator = Limited(SmaPulse(), largest_angle=0.4, largest_rate=2.0)
-    t = np.linspace(0.0, 1.0, 1001)
-    angle = actuator.delta_psi(t)
-    assert angle.max() == pytest.approx(0.4) and np.abs(np.diff(angle)).max() <= 2.0 * 1e-3 * (1 + 1e-9)
-    assert angle[100] == pytest.approx(0.2)  # 0.1 s at 2 rad/s
-    half, _ = actuator.respond(t, np.full((), 0.5), np.zeros(1))
-    meeting = (np.pi / 10 / 0.9) / (2.0 + np.pi / 10 / 0.9)  # [s], where 2 t meets half the falling pulse
-    assert half.max() == pytest.approx(2.0 * meeting, rel=0.01)
-
-
-def test_a_limited_limb_turns_as_far_and_as_fast_to_either_side_from_wherever_it_is():
+def test_a_limited_limb_turns_as_far_and_as_fast_as_it_may_to_either_side_from_wherever_it_is():
     actuator, t = Limited(SmaPulse(), largest_angle=0.4, largest_rate=2.0), np.linspace(0.0, 1.0, 101)
     commands, state = np.array([[1.0, -1.0, 0.3, -0.3]]), np.array([[[0.1], [-0.1], [-0.2], [0.2]]])
     turned, after = actuator.respond(t, commands, state)
@@ -138,6 +98,10 @@ def test_a_limited_limb_turns_as_far_and_as_fast_to_either_side_from_wherever_it
     steps = np.diff(turned, axis=0)
     np.testing.assert_allclose([steps.max(), steps.min()], [2.0 * 0.01, -2.0 * 0.01])
     np.testing.assert_allclose(actuator.observe(state)[0, :, 0], [0.25, -0.25, -0.5, 0.5])
+    np.testing.assert_allclose(actuator.delta_psi(t[[0, 10, 30]]), [0.0, 0.2, 0.4])  # 0.1 s at 2 rad/s
+    half, _ = actuator.respond(np.linspace(0.0, 1.0, 1001), np.full((), 0.5), np.zeros(1))
+    meeting = (np.pi / 10 / 0.9) / (2.0 + np.pi / 10 / 0.9)  # [s], where 2 t meets half the falling pulse
+    assert half.max() == pytest.approx(2.0 * meeting, rel=0.01)
 
 
 def test_a_limb_that_only_has_a_stop_follows_its_curve_up_to_it():
@@ -148,17 +112,6 @@ def test_a_limb_that_only_has_a_stop_follows_its_curve_up_to_it():
             turned, _ = actuator.respond(t, np.full((), side), np.zeros(1))
             np.testing.assert_array_equal(turned, side * np.minimum(SmaPulse().delta_psi(t), stop))
         np.testing.assert_array_equal(actuator.delta_psi(t), np.minimum(SmaPulse().delta_psi(t), stop))
-
-
-def test_a_slow_limb_goes_on_from_where_the_last_stroke_left_it():
-    simulator = Simulator(Scene(actuator=SLOW, numerics=NUMERICS))
-    assert simulator.get_state().actuators.shape == (1, 5, 1)
-    turns = []
-    for command in (1.0, 0.0, 0.0):
-        simulator.stroke([[command, 0, 0, 0, 0]])
-        turns.append(simulator.actuators[0, :, 0])
-    assert turns[0][0] == pytest.approx(0.083, abs=0.002) and turns[2][0] == 0.0
-    assert not np.any([turn[1:] for turn in turns])
 
 
 # --- weak limbs ------------------------------------------------------------------------------------------------------
@@ -211,55 +164,3 @@ def test_what_an_actuator_of_ones_own_says_is_heeded():
     simulator = Simulator(Scene(actuator=type("Saying", (Remembering,), says)(), numerics=NUMERICS), 2)
     assert complete(simulator.scene.actuator).mirror == ((0, -1),)
     np.testing.assert_allclose(simulator.stroke(np.ones((2, 5))).energy, 2.0 * 5 * 0.6)
-
-
-def wrong(**changes):
-    """A scene of an actuator that contradicts itself."""
-    return Scene(actuator=type("Wrong", (Triangle,), changes)())
-
-
-TURNING = Seastar(hub_hinge="turning", discretisation="chapter")
-NO_STRENGTHS = (1.0,) * 4, (1.0, 1.0, 1.0, 1.0, 1.1), (-0.1, 1.0, 1.0, 1.0, 1.0), [1.0] * 5, "a"
-NO_STRENGTHS_OF_TWO = np.ones(4), np.full((2, 5), 1.5), np.full(5, np.nan), np.ones((3, 5))
-REFUSED = [
-    (lambda: wrong(corners=(0.0, 0.2, 0.5)), "from 0 to its period"),
-    (lambda: wrong(corners=(0.0, 0.7, 0.6)), "increasing"),
-    (lambda: wrong(peak_angle=0.2), "largest angle"),
-    (lambda: wrong(delta_psi=lambda self, t: 0.1 + 0.0 * t), "jump"),
-    (lambda: wrong(delta_psi=lambda self, t: 0.1), "per time"),
-    (lambda: Limited(SLOW), "without memory"),
-    (lambda: Scene(TURNING, actuator=Limited(SmaPulse(), largest_rate=1.0)), "above zero"),  # a stroke begins turned
-    *((partial(Scene, limb_strengths=strengths), "limb_strengths") for strengths in NO_STRENGTHS),
-    *((partial(Simulator(Scene(), 2).set_limb_strengths, shares), "limb_strengths") for shares in NO_STRENGTHS_OF_TWO),
-]
-"""Actuators and strengths of limbs that cannot be."""
-
-
-@pytest.mark.parametrize("make, words", REFUSED)
-def test_what_contradicts_itself_or_its_robot_is_refused(make, words):
-    with assert_refused(words):
-        make()
-
-
-def test_a_missing_file_of_a_curve_is_said_in_one_sentence(tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"^There is no measured curve at .*none\.csv: .*\.$"):
-        MeasuredCurve.from_csv(tmp_path / "none.csv")
-
-
-@pytest.mark.parametrize(
-    "actuator",
-    [
-        partial(ThermalSma, time_constant=1e308),
-        partial(ThermalSma, cooling_time=1e308),
-        partial(SmaPulse, heating_time=5e-324),
-        partial(SmaPulse, cooling_time=1e308),
-        partial(SmaWires, heating_time=5e-324),
-        partial(SmaWires, cooling_time=1e308),
-        partial(SmaWires, heating_time=1e-300, cooling_time=1e-300),
-    ],
-    ids=str,
-)
-def test_extreme_numbers_of_an_actuator_warn_of_nothing(actuator):
-    """Warnings are errors in tests; what is refused is refused in a sentence."""
-    curve = actuator().delta_psi([0.0, 1e-3, 1e307])
-    assert np.isfinite(curve).all()
