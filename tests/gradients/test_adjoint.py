@@ -10,8 +10,20 @@ import numpy as np
 import pytest
 
 import seastar_gym.gradients.adjoint as adjoint
-from gradients.test_differentiate import COMMANDS, SMALL, TERMS, differences, swum
-from seastar_gym import Numerics, Simulator, SmaWires, ThermalSma, Water
+from gradients.test_differentiate import (
+    BRANCH,
+    COMMANDS,
+    HALVED,
+    SMALL,
+    SWIMS,
+    TERMS,
+    THERMAL,
+    WIRES,
+    differences,
+    swum,
+)
+from refusals import assert_refused
+from seastar_gym import Simulator, Water
 from seastar_gym.gradients import Motion, differentiate, gradient, record
 from seastar_gym.gradients.adjoint import QUANTITIES
 from seastar_gym.scene.per_robot import at, with_numbers
@@ -19,7 +31,6 @@ from seastar_gym.scene.per_robot import at, with_numbers
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="lanes of a tape have compiled code alone")
 
 ALL_KINDS = ["commands", "robot.youngs_modulus", "fluid.drag_coefficient", "actuator.peak_angle", "robot.limb_length"]
-OF_START = ["positions", "velocities"]
 
 
 def slopes_of(swim, seed=0):
@@ -33,49 +44,40 @@ def number_of(slopes, quantities):
     return sum(np.tensordot(each, getattr(quantities, name), axes=each.ndim) for name, each in slopes.items())
 
 
-def assert_is_that_of_dual_lanes(scene, names, commands=COMMANDS, tolerance=1e-10, **start):
-    """The gradient of a number of all quantities is that of dual lanes, and the swim is theirs to the bit."""
-    expected, recorded = differentiate(scene, commands, names, **start), record(scene, commands, **start)
-    for mine, theirs in zip(recorded.swim, expected.swim, strict=True):
-        np.testing.assert_array_equal(mine, theirs)
-    slopes = slopes_of(recorded.swim)
-    for name, found in recorded.gradient(slopes, names).items():
-        right = number_of(slopes, expected.by[name])
-        sizes = Motion(*map(np.abs, expected.by[name]))  # of the terms, whose sum may be small
-        largest = number_of({quantity: np.abs(each) for quantity, each in slopes.items()}, sizes).max()
-        share = tolerance if scene.contact is None else 1e-8  # conjugate gradients leave rounding
-        np.testing.assert_allclose(found, right, rtol=0.0, atol=share * largest, err_msg=name)
-    assert recorded.sentence == expected.sentence
-    return recorded
-
-
-def test_gradient_is_that_of_dual_lanes():
-    assert_is_that_of_dual_lanes(SMALL, [*ALL_KINDS, *OF_START])
-
-
-@pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"])
-def test_every_scheme(scheme):
-    assert_is_that_of_dual_lanes(replace(SMALL, numerics=Numerics(scheme, 5e-3, 1e-12)), ALL_KINDS)
+TIGHT = replace(SMALL, numerics=replace(SMALL.numerics, newton_tolerance=1e-14))
+SCENES = {
+    "positions and velocities": (SMALL, [*ALL_KINDS, "positions", "velocities"], COMMANDS),
+    **{name: (SWIMS[name][0], ALL_KINDS, COMMANDS) for name in
+       ("implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint", "adapted", "halved")},
+    "halved midpoint": (
+        replace(SMALL, fluid=Water(), numerics=replace(HALVED, scheme="implicit-midpoint")), ALL_KINDS, COMMANDS
+    ),
+    **{type(each).__name__: (replace(TIGHT, actuator=each), ALL_KINDS[:4], 0.5 + 0.3 * COMMANDS)
+       for each in (WIRES, THERMAL)},
+    **{name: (scene, ["commands", *numbers], commands) for name, (scene, numbers, commands) in TERMS.items()},
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    "numerics",
-    [
-        Numerics("implicit-midpoint", 0.02, 1e-12, path_tolerance=0.01),
-        Numerics("implicit-euler", 0.05, 1e-12, 3),
-        Numerics("implicit-midpoint", 0.05, 1e-12, 3),
-    ],
-)
-def test_halved_steps_are_of_their_branch(numerics):
-    recorded = assert_is_that_of_dual_lanes(replace(SMALL, fluid=Water(), numerics=numerics), ALL_KINDS)
-    assert recorded.sentence.startswith("The derivatives are of the branch that was taken")
-
-
-@pytest.mark.parametrize("actuator", [SmaWires(0.6, 0.05, 0.3, period=0.1), ThermalSma()])
-def test_actuators_with_memory(actuator):
-    numerics = replace(SMALL.numerics, newton_tolerance=1e-14)
-    scene = replace(SMALL, actuator=actuator, numerics=numerics)
-    assert_is_that_of_dual_lanes(scene, ALL_KINDS[:4], 0.5 + 0.3 * COMMANDS)
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name in TERMS and name not in ("vacuum", "held node")))
+     for name in SCENES],
+)  # fmt: skip
+def test_gradient_is_that_of_dual_lanes(name):
+    """Of a number of all quantities; and the swim is theirs to the bit."""
+    scene, names, commands = SCENES[name]
+    expected, recorded = differentiate(scene, commands, names), record(scene, commands)
+    for mine, theirs in zip(recorded.swim, expected.swim, strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+    slopes = slopes_of(recorded.swim)
+    for by, found in recorded.gradient(slopes, names).items():
+        right = number_of(slopes, expected.by[by])
+        sizes = Motion(*map(np.abs, expected.by[by]))  # of the terms, whose sum may be small
+        largest = number_of({quantity: np.abs(each) for quantity, each in slopes.items()}, sizes).max()
+        share = 1e-10 if scene.contact is None else 1e-8  # conjugate gradients leave rounding
+        np.testing.assert_allclose(found, right, rtol=0.0, atol=share * largest, err_msg=by)
+    assert recorded.sentence == expected.sentence
+    assert (BRANCH in recorded.sentence) == (name.startswith(("adapted", "halved"))) or name in TERMS
 
 
 def test_gradient_is_a_difference_of_swims():
@@ -100,14 +102,14 @@ def test_a_swim_in_two_parts_has_the_gradient_of_the_whole():
     np.testing.assert_array_equal(rest.swim.positions, whole.swim.positions[1:])
     first, at_end = record(SMALL, COMMANDS[:1]), np.zeros((3, 2))
     at_end[-1] = 1.0
-    between = rest.gradient({"hub": at_end}, OF_START)
-    slopes = {name: np.stack([0.0 * between[name], between[name]]) for name in OF_START}
+    between = rest.gradient({"hub": at_end}, ["positions", "velocities"])
+    slopes = {name: np.stack([0.0 * each, each]) for name, each in between.items()}
     found = first.gradient(slopes, ["commands"])["commands"]
     expected = whole.gradient({"hub": np.vstack([np.zeros((1, 2)), at_end])}, ["commands"])["commands"][:1]
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("actuator", [SMALL.actuator, SmaWires(0.6, 0.05, 0.3, period=0.1)])
+@pytest.mark.parametrize("actuator", [SMALL.actuator, WIRES])
 def test_commands_of_a_policy_pass_slopes_on(actuator):
     """Of a closed loop: the gradient in the policy's offsets and in velocities at the start is that of differences."""
     scene, rng = replace(SMALL, actuator=actuator), np.random.default_rng(2)
@@ -150,9 +152,11 @@ def test_commands_of_a_policy_pass_slopes_on(actuator):
     )
 
 
-def test_a_tape_grows_where_a_step_needs_more(monkeypatch):
-    slopes = slopes_of(record(SMALL, COMMANDS).swim)
-    expected = record(SMALL, COMMANDS).gradient(slopes, ["robot.density"])
+def test_a_record_keeps_its_own_memory_and_a_tape_grows_where_a_step_needs_more(monkeypatch):
+    recorded = record(SMALL, COMMANDS)
+    assert all(kept.base is None for kept in map(recorded.history, range(len(COMMANDS))))
+    slopes = slopes_of(recorded.swim)
+    expected = recorded.gradient(slopes, ["robot.density"])
     monkeypatch.setattr(adjoint, "ENTRIES", 1000)
     assert record(SMALL, COMMANDS).gradient(slopes, ["robot.density"]) == expected
 
@@ -167,63 +171,32 @@ def test_a_swim_that_failed_has_no_gradient():
 
 
 @pytest.mark.parametrize(
-    ("slopes", "reason"),
+    ("slopes", "feedback", "words"),
     [
-        ({"hope": np.zeros(3)}, "slopes has 'hope', which is none of hub, positions"),
-        ({"hub": np.zeros((3, 2))}, r"slopes in hub must have shape \(4, 2\), not \(3, 2\)"),
+        ({"hope": np.zeros(3)}, None, ("slopes has 'hope', which is none of hub, positions",)),
+        ({"hub": np.zeros((3, 2))}, None, ("slopes in hub must have shape (4, 2), not (3, 2)",)),
+        ({"hub": np.ones((4, 2))}, 3, ("feedback must be a function, not 3.",)),
+        *(({"hub": np.ones((4, 2))}, each, ("feedback must return slopes in", "of shape (21, 2) each"))
+          for each in (lambda k, slope: (slope, slope), lambda k, slope: slope, lambda k, slope: None)),
     ],
-)
-def test_refusals_are_sentences(slopes, reason):
-    with pytest.raises(ValueError, match=rf"{reason}.*\.$"):
-        record(SMALL, COMMANDS).gradient(slopes, ["commands"])
+)  # fmt: skip
+def test_refusals_are_sentences(slopes, feedback, words):
+    with assert_refused(*words):
+        record(SMALL, COMMANDS).gradient(slopes, ["commands"], feedback)
 
 
-@pytest.mark.parametrize("answer", [lambda slope: (slope, slope), lambda slope: slope, lambda slope: None])
-def test_feedback_of_another_shape_is_refused(answer):
-    recorded = record(SMALL, COMMANDS)
-    with pytest.raises(ValueError, match=r"feedback must return slopes in .*, of shape \(21, 2\) each\."):
-        recorded.gradient({"hub": np.ones((4, 2))}, ["commands"], lambda k, slope: answer(slope))
-    with pytest.raises(ValueError, match=r"feedback must be a function, not 3\."):
-        recorded.gradient({"hub": np.ones((4, 2))}, ["commands"], 3)
-
-
-def test_memory_of_a_record_is_what_it_has_kept():
-    recorded = record(SMALL, COMMANDS)
-    assert all(kept.base is None for kept in map(recorded.history, range(len(COMMANDS))))
-
-
-def example(name):
-    return runpy.run_path(str(Path(__file__).parents[2] / "examples" / name))
-
-
-def assert_is_slope_of_the_hub(found):
+@pytest.mark.parametrize("library", ["torch", "jax"])
+def test_other_libraries_swim_farther_along_the_gradient(library):
+    module = pytest.importorskip(library)
+    its = runpy.run_path(str(Path(__file__).parents[2] / "examples" / f"{library}_gradients.py"))
+    distances = its["swim_far"](SMALL, steps=5)
+    assert all(after > before for before, after in pairwise(distances))
+    if library == "torch":
+        commands = module.tensor(COMMANDS, requires_grad=True)
+        its["Swim"].apply(commands, SMALL)[-1, 0].backward()
+        found = commands.grad.numpy()
+    else:
+        of_two = module.vmap(module.grad(lambda commands: its["hub_of"](SMALL)(commands)[-1, 0]))
+        found = of_two(module.numpy.stack([module.numpy.zeros_like(COMMANDS), COMMANDS]))[1]
     expected = differentiate(SMALL, COMMANDS, ["commands"]).by["commands"].hub[-1, 0]
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-10 * np.abs(expected).max())
-
-
-def test_pytorch_swims_farther_along_the_gradient():
-    torch = pytest.importorskip("torch")
-    its = example("torch_gradients.py")
-    distances = its["swim_far"](SMALL, steps=5)
-    assert all(after > before for before, after in pairwise(distances))
-    commands = torch.tensor(COMMANDS, requires_grad=True)
-    its["Swim"].apply(commands, SMALL)[-1, 0].backward()
-    assert_is_slope_of_the_hub(commands.grad.numpy())
-
-
-def test_jax_swims_farther_along_the_gradient():
-    jax = pytest.importorskip("jax")
-    its = example("jax_gradients.py")
-    distances = its["swim_far"](SMALL, steps=5)
-    assert all(after > before for before, after in pairwise(distances))
-    of_two = jax.vmap(jax.grad(lambda commands: its["hub_of"](SMALL)(commands)[-1, 0]))
-    found = of_two(jax.numpy.stack([jax.numpy.zeros_like(COMMANDS), COMMANDS]))
-    assert_is_slope_of_the_hub(found[1])
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[] if name in ("vacuum", "held node") else pytest.mark.slow) for name in TERMS]
-)
-def test_every_term_has_the_gradient_of_dual_lanes(name):
-    scene, numbers, commands = TERMS[name]
-    assert_is_that_of_dual_lanes(scene, ["commands", *numbers], commands)

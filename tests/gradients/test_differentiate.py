@@ -6,6 +6,7 @@ import numba
 import numpy as np
 import pytest
 
+from refusals import assert_refused
 from seastar_gym import (
     AlongLimb,
     Body,
@@ -61,7 +62,7 @@ def assert_same(found, expected, tolerance):
         np.testing.assert_allclose(slope, difference, rtol=0.0, atol=tolerance * scale + 1e-13, err_msg=name)
 
 
-def assert_is_derivative(scene, names, tolerance=1e-6, commands=COMMANDS, share=1e-4):
+def assert_is_derivative(scene, names, commands=COMMANDS, tolerance=1e-6, share=1e-4):
     """Derivatives in numbers, and in two commands, are differences; and the swim is that of `Simulator`."""
     found = differentiate(scene, commands, [*names, "commands"])
     for name, value, expected in zip(QUANTITIES, found.swim, swum(scene, commands), strict=True):
@@ -81,31 +82,65 @@ def assert_is_derivative(scene, names, tolerance=1e-6, commands=COMMANDS, share=
     return found
 
 
-@pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"])
-def test_every_scheme_has_the_derivatives_of_its_differences(scheme):
-    scene = replace(SMALL, numerics=Numerics(scheme, 5e-3, 1e-12))
-    found = assert_is_derivative(scene, ["robot.youngs_modulus", "fluid.drag_coefficient", "actuator.peak_angle"])
-    assert (
-        found.sentence
-        == "The derivatives are of the swim as it is: no step was halved, no energy cut, and no limb touched."
-    )
+# Each of these scenes with other terms is compiled for minutes
+
+TOUCHING = np.array([[0.9, -0.9, 0.0, 0.8, -0.7], [-0.8, 0.9, 0.3, -0.9, 0.5], [0.9, -0.9, 0.7, 0.6, -0.9]])
+FAR = SmaPulse(1.2, 0.1, 0.2)
+"""Pulses with which limbs touch by the commands TOUCHING."""
+FLUID = Water(950.0, 1.3, 0.1, Vortex(0.02, 0.1, -0.05, 0.06), 0.8)
+EVERYTHING = Seastar(
+    nodes_per_limb=5, density=1100.0, relaxation_time=4e-3, body=Body(radius=0.02), along=AlongLimb(0.7),
+    stiffening=Stiffening(ratio=2.0),
+)  # fmt: skip
+YOUNG, DRAG, PEAK = "robot.youngs_modulus", "fluid.drag_coefficient", "actuator.peak_angle"
+TERMS = {
+    "vacuum": (replace(SMALL, fluid=None), ["robot.density"], COMMANDS),
+    "contact": (replace(SMALL, contact=Contact(), actuator=FAR), [YOUNG, "robot.rod_radius"], TOUCHING),
+    "hub hinges": (replace(SMALL, robot=Seastar(nodes_per_limb=5, discretisation="chapter")), [YOUNG], COMMANDS),
+    "fluid, damping": (
+        replace(SMALL, robot=Seastar(nodes_per_limb=5, relaxation_time=4e-3), fluid=FLUID),
+        ["fluid.added_mass_coefficient", "fluid.tangential_drag_coefficient", "fluid.current.x",
+         "robot.relaxation_time"], COMMANDS,
+    ),
+    "held node": (replace(SMALL, held_nodes=(0,)), [YOUNG, DRAG], COMMANDS),
+    "along, body, contact, loads, gravity and more": (
+        replace(SMALL, robot=EVERYTHING, fluid=FLUID, actuator=SmaPulse(2.9, 0.2, 0.3), contact=Contact(),
+                loads=((3, 1e-4, 2e-5),), gravity=(0.3, -1.0)),
+        ["robot.density", YOUNG, "fluid.added_mass_coefficient", PEAK],
+        TOUCHING,
+    ),
+}  # fmt: skip
+ADAPTED = Numerics("implicit-midpoint", 0.02, 1e-12, path_tolerance=0.01)
+HALVED = Numerics("implicit-euler", 0.05, 1e-12, 3)
+WIRES, THERMAL = SmaWires(0.6, 0.05, 0.3, period=0.1), ThermalSma()
+AS_IT_IS = "The derivatives are of the swim as it is: no step was halved, no energy cut, and no limb touched."
+ANY, BRANCH, TOUCHED = (
+    "The derivatives are of",
+    "The derivatives are of the branch that was taken",
+    "some limbs touched",
+)
+SWIMS = {
+    **{scheme: (replace(SMALL, numerics=Numerics(scheme, 5e-3, 1e-12)), [YOUNG, DRAG, PEAK], COMMANDS, AS_IT_IS)
+       for scheme in ("implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint")},
+    "adapted": (replace(SMALL, numerics=ADAPTED), ["robot.density"], COMMANDS, BRANCH),
+    "halved": (replace(SMALL, fluid=Water(), numerics=HALVED), [YOUNG], COMMANDS, BRANCH, 1e-5, 1e-6),
+    **{type(each).__name__: (replace(SMALL, actuator=each), [PEAK], 0.5 + 0.3 * COMMANDS, ANY)
+       for each in (WIRES, THERMAL)},
+    "lengths, which move the start": (SMALL, ["robot.limb_length", "robot.rod_radius"], COMMANDS, ANY),
+    **{name: (*each, TOUCHED if each[0].contact else ANY, 1e-6, 1e-5 if each[0].contact else 1e-4)
+       for name, each in TERMS.items()},
+}  # fmt: skip
 
 
-def test_adapted_steps_are_differentiated_as_they_were_taken():
-    scene = replace(SMALL, numerics=Numerics("implicit-midpoint", 0.02, 1e-12, path_tolerance=0.01))
-    found = assert_is_derivative(scene, ["robot.density"])
-    assert found.rejections.sum() > 0
-    assert "of the branch that was taken" in found.sentence
-
-
-@pytest.mark.parametrize("actuator", [SmaWires(0.6, 0.05, 0.3, period=0.1), ThermalSma()])
-def test_actuators_with_memory(actuator):
-    name = "actuator.peak_angle"
-    assert_is_derivative(replace(SMALL, actuator=actuator), [name], commands=0.5 + 0.3 * COMMANDS)
-
-
-def test_lengths_move_the_start():
-    assert_is_derivative(SMALL, ["robot.limb_length", "robot.rod_radius"])
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in TERMS)) for name in SWIMS])
+def test_derivatives_are_those_of_differences(name):
+    scene, numbers, commands, sentence, *accuracy = SWIMS[name]
+    found = assert_is_derivative(scene, numbers, commands, *accuracy)
+    assert sentence in found.sentence and (TOUCHED in found.sentence) == (scene.contact is not None)
+    assert (found.rejections.sum() > 0, found.halvings.sum() > 0) == (
+        name == "adapted",
+        name == "halved",
+    ) or name in TERMS
 
 
 def test_velocities_at_the_start():
@@ -115,34 +150,27 @@ def test_velocities_at_the_start():
     assert_same([np.tensordot(each, blow, axes=2) for each in found.by["velocities"]], expected, 1e-6)
 
 
-def test_a_robot_that_is_moved_swims_as_far_aside():
-    """Exact: the sum of the derivatives in all nodes' positions is that of the whole robot's."""
-    found = differentiate(SMALL, COMMANDS, ["positions"]).by["positions"]
-    moved = found.positions.sum(axis=-2)
+def test_symmetries_and_units_are_exact():
+    """A robot that is moved swims as far aside: the sum of the derivatives in all positions is the whole robot's. E and
+    both densities times one factor are the same robot in other units of mass. Strengths are factors of commands, by
+    which alone a robot at rest moves.
+    """
+    names = [YOUNG, "robot.density", "fluid.density"]
+    weak = replace(SMALL, limb_strengths=(1.0, 0.9, 0.8, 0.7, 0.6))
+    found, of_weak = (
+        differentiate(scene, COMMANDS, by).by
+        for scene, by in ((SMALL, ["positions", *names]), (weak, ["limb_strengths.1", "commands"]))
+    )
+    moved = found["positions"].positions.sum(axis=-2)
     np.testing.assert_allclose(moved, np.broadcast_to(np.eye(2), moved.shape), atol=1e-9)
-    np.testing.assert_allclose(found.heading.sum(axis=-2), 0.0, atol=1e-7)
-
-
-def test_no_path_depends_on_the_unit_of_mass():
-    """Exact: E, density of limbs and density of water, times one factor, are the same robot in other units."""
-    names = ["robot.youngs_modulus", "robot.density", "fluid.density"]
-    found = differentiate(SMALL, COMMANDS, names)
-    each = np.array([at(SMALL, name) * found.by[name].positions for name in names])
+    np.testing.assert_allclose(found["positions"].heading.sum(axis=-2), 0.0, atol=1e-7)
+    each = np.array([at(SMALL, name) * found[name].positions for name in names])
     assert np.abs(each.sum(axis=0)).max() < 1e-9 * np.abs(each).max()
-
-
-def test_strengths_are_factors_of_commands():
-    scene = replace(SMALL, limb_strengths=(1.0, 0.9, 0.8, 0.7, 0.6))
-    found = differentiate(scene, COMMANDS, ["limb_strengths.1", "commands"])
-    expected = found.by["commands"].hub[..., 1] @ (COMMANDS[:, 1] / 0.9)
-    np.testing.assert_allclose(found.by["limb_strengths.1"].hub, expected, atol=1e-9 * np.abs(expected).max())
-
-
-def test_a_robot_at_rest_moves_by_its_commands_alone():
-    found = differentiate(SMALL, np.zeros((2, 5)), ["commands", "robot.youngs_modulus"])
-    assert SMALL.robot.youngs_modulus * np.abs(found.by["robot.youngs_modulus"].positions).max() < 1e-12
-    assert np.isfinite(found.by["commands"].positions).all()
-    assert found.by["commands"].positions.any()
+    expected = of_weak["commands"].hub[..., 1] @ (COMMANDS[:, 1] / 0.9)
+    np.testing.assert_allclose(of_weak["limb_strengths.1"].hub, expected, atol=1e-9 * np.abs(expected).max())
+    at_rest = differentiate(SMALL, np.zeros((2, 5)), ["commands", YOUNG]).by
+    assert SMALL.robot.youngs_modulus * np.abs(at_rest[YOUNG].positions).max() < 1e-12
+    assert np.isfinite(at_rest["commands"].positions).all() and at_rest["commands"].positions.any()
 
 
 def test_derivatives_go_on_from_a_state():
@@ -152,74 +180,6 @@ def test_derivatives_go_on_from_a_state():
     rest = differentiate(SMALL, COMMANDS[1:], ["commands"], simulator.get_state())
     np.testing.assert_array_equal(rest.swim.positions, whole.swim.positions[1:])
     np.testing.assert_allclose(rest.by["commands"].hub, whole.by["commands"].hub[1:, :, 1:], rtol=0.0, atol=1e-12)
-
-
-def test_halved_steps_are_of_their_branch():
-    scene = replace(SMALL, fluid=Water(), numerics=Numerics("implicit-euler", 0.05, 1e-12, 3))
-    found = assert_is_derivative(scene, ["robot.youngs_modulus"], 1e-5, share=1e-6)
-    assert found.halvings.sum() > 0
-    assert found.sentence.startswith("The derivatives are of the branch that was taken")
-
-
-# Other terms; each of these scenes is compiled for minutes
-
-TOUCHING = np.array([[0.9, -0.9, 0.0, 0.8, -0.7], [-0.8, 0.9, 0.3, -0.9, 0.5], [0.9, -0.9, 0.7, 0.6, -0.9]])
-FAR = SmaPulse(1.2, 0.1, 0.2)
-"""Pulses with which limbs touch by the commands TOUCHING."""
-FLUID = Water(950.0, 1.3, 0.1, Vortex(0.02, 0.1, -0.05, 0.06), 0.8)
-TERMS = {
-    "vacuum": (replace(SMALL, fluid=None), ["robot.density"], COMMANDS),
-    "contact": (
-        replace(SMALL, contact=Contact(), actuator=FAR),
-        ["robot.youngs_modulus", "robot.rod_radius"],
-        TOUCHING,
-    ),
-    "hub hinges": (
-        replace(SMALL, robot=Seastar(nodes_per_limb=5, discretisation="chapter")),
-        ["robot.youngs_modulus"],
-        COMMANDS,
-    ),
-    "fluid, damping": (
-        replace(SMALL, robot=Seastar(nodes_per_limb=5, relaxation_time=4e-3), fluid=FLUID),
-        [
-            "fluid.added_mass_coefficient",
-            "fluid.tangential_drag_coefficient",
-            "fluid.current.x",
-            "robot.relaxation_time",
-        ],
-        COMMANDS,
-    ),
-    "held node": (replace(SMALL, held_nodes=(0,)), ["robot.youngs_modulus", "fluid.drag_coefficient"], COMMANDS),
-    "along, body, contact, loads, gravity and more": (
-        replace(
-            SMALL,
-            contact=Contact(),
-            actuator=SmaPulse(2.9, 0.2, 0.3),
-            robot=Seastar(
-                nodes_per_limb=5,
-                density=1100.0,
-                relaxation_time=4e-3,
-                body=Body(radius=0.02),
-                along=AlongLimb(0.7),
-                stiffening=Stiffening(ratio=2.0),
-            ),
-            fluid=FLUID,
-            loads=((3, 1e-4, 2e-5),),
-            gravity=(0.3, -1.0),
-        ),
-        ["robot.density", "robot.youngs_modulus", "fluid.added_mass_coefficient", "actuator.peak_angle"],
-        TOUCHING,
-    ),
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", TERMS)
-def test_every_term_has_the_derivatives_of_its_differences(name):
-    scene, numbers, commands = TERMS[name]
-    touch = scene.contact is not None
-    found = assert_is_derivative(scene, numbers, commands=commands, share=1e-5 if touch else 1e-4)
-    assert ("some limbs touched" in found.sentence) == touch
 
 
 @pytest.mark.slow
@@ -251,21 +211,17 @@ def test_derivatives_jump_where_limbs_begin_to_touch():
 
 
 @pytest.mark.parametrize(
-    ("by", "reason"),
+    ("scene", "by", "words"),
     [
-        ((), "by must name one unknown or more, each once"),
-        (("commands", "commands"), "each once"),
-        (("robot.colour",), "no number of this scene"),
-        (("numerics.step",), "no number of this scene"),
-        (("actuator.heating_time",), "moves the ends of time steps"),
-        (("robot.nodes_per_limb",), "cannot be changed both ways"),
+        (SMALL, (), ("by must name one unknown or more, each once",)),
+        (SMALL, ("commands", "commands"), ("each once",)),
+        (SMALL, ("robot.colour",), ("no number of this scene",)),
+        (SMALL, ("numerics.step",), ("no number of this scene",)),
+        (SMALL, ("actuator.heating_time",), ("moves the ends of time steps",)),
+        (SMALL, ("robot.nodes_per_limb",), ("cannot be changed both ways",)),
+        (replace(SMALL, actuator=SmaPulse((0.3, 0.4))), ("commands",), ("scene of one robot",)),
     ],
 )
-def test_refusals_are_sentences(by, reason):
-    with pytest.raises(ValueError, match=rf"{reason}.*\.$"):
-        differentiate(SMALL, COMMANDS, by)
-
-
-def test_scenes_of_many_robots_are_refused():
-    with pytest.raises(ValueError, match=r"scene of one robot.*\.$"):
-        differentiate(replace(SMALL, actuator=SmaPulse((0.3, 0.4))), COMMANDS, ["commands"])
+def test_refusals_are_sentences(scene, by, words):
+    with assert_refused(*words):
+        differentiate(scene, COMMANDS, by)

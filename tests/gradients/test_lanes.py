@@ -1,5 +1,7 @@
 """Every operation of the lanes that are differentiated: the values of lanes.py, and the derivatives of calculus."""
 
+from functools import cache
+
 import numba
 import numpy as np
 import pytest
@@ -48,6 +50,7 @@ OF_TAPES = {
 }
 
 
+@cache
 def compiled(lanes, lines, before="", behind=""):
     """function(arguments, table, results, entries) that stores every line in a row of its own."""
     stores = "".join(f"    store(out, {k}, {line})\n" for k, line in enumerate(lines))
@@ -66,77 +69,60 @@ def test_duals_have_the_slopes_of_calculus():
     n, row = dual_lanes.N_LANES, dual_lanes.ROW
     arguments, results = np.zeros((BEYOND, row)), np.full((len(expected), row), np.nan)
     arguments[1:, :n], arguments[1:, n:] = np.transpose([POINT]), np.transpose([DIRECTION])
-    compiled(dual_lanes, expected)(arguments, TABLE, results, None)
+    compiled(dual_lanes, tuple(expected))(arguments, TABLE, results, None)
     for found, (line, (value, slope)) in zip(results, expected.items(), strict=True):
         np.testing.assert_allclose(found[:n], value, rtol=1e-15, err_msg=line)
         np.testing.assert_allclose(found[n:], slope, rtol=1e-14, err_msg=line)
 
 
-@pytest.fixture(scope="module")
-def on_tape():
-    """The operations on a tape of a given length: (values, places, factors, entries, end, whether it is full)."""
+def on_tape(lines, capacity=100, x=(X,), seed=1.0):
+    """Lines on a tape of a given length: (values, derivatives in the arguments, end, whether it is full).
+
+    x: Of the robots, in turn. seed: Factor of the arguments.
+    """
+    n, entries = tape_lanes.N_LANES, np.zeros((capacity, tape_lanes.ENTRY))
+    arguments, results = np.zeros((BEYOND, tape_lanes.ROW)), np.full((len(lines), tape_lanes.ROW), np.nan)
+    arguments[1:, :n], arguments[1:, n : 2 * n] = np.transpose([POINT]), seed
+    arguments[1, :n] = np.resize(x, n)
+    arguments.view(np.int64)[1:, tape_lanes.PLACE] = range(1, BEYOND)
     behind = "    return end_of_tape(), tape_is_full()\n"
-    function = compiled(tape_lanes, EXPECTED | OF_TAPES, f"    begin_tape(entries, {BEYOND})\n", behind)
-
-    def run(capacity):
-        n, entries = tape_lanes.N_LANES, np.zeros((capacity, tape_lanes.ENTRY))
-        arguments, results = (
-            np.zeros((BEYOND, tape_lanes.ROW)),
-            np.full((len(EXPECTED | OF_TAPES), tape_lanes.ROW), np.nan),
-        )
-        arguments[1:, :n], arguments[1:, n : 2 * n] = np.transpose([POINT]), 1.0
-        arguments.view(np.int64)[1:, tape_lanes.PLACE] = range(1, BEYOND)
-        end, full = function(arguments, TABLE, results, entries.ravel())
-        return results[:, :n], results.view(np.int64)[:, tape_lanes.PLACE], results[:, n : 2 * n], entries, end, full
-
-    return run
+    function = compiled(tape_lanes, tuple(lines), f"    begin_tape(entries, {BEYOND})\n", behind)
+    end, full = function(arguments, TABLE, results, entries.ravel())
+    places, factors = results.view(np.int64)[:, tape_lanes.PLACE], results[:, n : 2 * n]
+    swept_back = [swept(entries, *each, end) for each in zip(places, factors, strict=True)] if not full else None
+    return results[:, :n], swept_back, end, full
 
 
 def swept(entries, place, factors, end):
-    """Derivatives of a number with a place and factors in the three arguments, of every robot."""
+    """Derivatives of a number with a place and factors in the three arguments, of every robot; of none at place 0."""
     n, slopes, parents = len(factors), np.zeros((end, len(factors))), entries.view(np.int32)
-    slopes[place] = factors
+    slopes[place] = factors if place else 0.0
     for k in range(end - 1, BEYOND - 1, -1):
         slopes[parents[k, 0]] += entries[k, 1 : 1 + n] * slopes[k]
         slopes[parents[k, 1]] += entries[k, 1 + n :] * slopes[k]
     return slopes[1:BEYOND]
 
 
-def test_a_tape_has_the_derivatives_of_calculus(on_tape):
-    values, places, factors, entries, end, full = on_tape(100)
+def test_a_tape_has_the_derivatives_of_calculus_and_says_when_it_is_too_short():
+    values, derivatives, _, full = on_tape(EXPECTED | OF_TAPES)
     assert full == 0
-    rows = zip(values, places, factors, (EXPECTED | OF_TAPES).items(), strict=True)
-    for found, place, factor, (line, (value, *slopes)) in rows:
-        np.testing.assert_allclose(found, value, rtol=1e-15, err_msg=line)
-        derivatives = np.zeros((3, 1)) if place == 0 else swept(entries, place, factor, end)
-        for derivative in derivatives.T:
-            np.testing.assert_allclose(derivative, slopes, rtol=1e-14, err_msg=line)
+    for value, slopes, (line, (expected, *wanted)) in zip(
+        values, derivatives, (EXPECTED | OF_TAPES).items(), strict=True
+    ):
+        np.testing.assert_allclose(value, expected, rtol=1e-15, err_msg=line)
+        np.testing.assert_allclose(slopes, np.transpose([wanted]) * np.ones(len(value)), rtol=1e-14, err_msg=line)
+    *_, end, full = on_tape(EXPECTED | OF_TAPES, 10)
+    assert (end, full != 0) == (10, True)
 
 
 def test_every_robot_has_the_derivatives_of_its_choice():
-    n, choices = tape_lanes.N_LANES, {"select(x > y, x, y)": (2.0, 0.0), "select(x > y, 3.0, x)": (0.0, 2.0)}
-    choices |= {"select(x > y, 5.0 * x, x)": (2.0 * 5.0, 2.0), "select(x > y, x * z, y)": (2.0 * Z, 0.0)}
-    entries, results = np.zeros(100 * tape_lanes.ENTRY), np.zeros((len(choices), tape_lanes.ROW))
-    arguments = np.zeros((BEYOND, tape_lanes.ROW))
-    arguments[1:, :n], arguments[1:, n : 2 * n] = np.transpose([POINT]), 2.0
-    arguments.view(np.int64)[1:, tape_lanes.PLACE] = range(1, BEYOND)
-    first = np.arange(n) % 2 == 0
-    arguments[1, :n] = np.where(first, Y + 1.0, Y - 1.0)
-    behind = "    return end_of_tape()\n"
-    end = compiled(tape_lanes, choices, f"    begin_tape(entries, {BEYOND})\n", behind)(
-        arguments, TABLE, results, entries
-    )
-    places = results.view(np.int64)[:, tape_lanes.PLACE]
-    for place, factors, (line, (when_true, when_false)) in zip(
-        places, results[:, n : 2 * n], choices.items(), strict=True
-    ):
-        of_x = swept(entries.reshape(-1, tape_lanes.ENTRY), place, factors, end)[0]
-        np.testing.assert_allclose(of_x, np.where(first, when_true, when_false), rtol=1e-14, err_msg=line)
-
-
-def test_a_tape_that_is_too_short_says_so(on_tape):
-    *_, end, full = on_tape(10)
-    assert (end, full != 0) == (10, True)
+    choices = {
+        "select(x > y, x, y)": (2.0, 0.0), "select(x > y, 3.0, x)": (0.0, 2.0),
+        "select(x > y, 5.0 * x, x)": (2.0 * 5.0, 2.0), "select(x > y, x * z, y)": (2.0 * Z, 0.0),
+    }  # fmt: skip
+    _, derivatives, *_ = on_tape(choices, x=(Y + 1.0, Y - 1.0), seed=2.0)
+    for slopes, (line, of_x) in zip(derivatives, choices.items(), strict=True):
+        np.testing.assert_allclose(slopes[0], np.resize(of_x, len(slopes[0])), rtol=1e-14, err_msg=line)
 
 
 @pytest.mark.parametrize(

@@ -8,24 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from oracle import Star
-from seastar_gym import (
-    GridCurrent,
-    Limb,
-    Numerics,
-    Scene,
-    Seastar,
-    ShearCurrent,
-    SmaPulse,
-    UniformCurrent,
-    Vortex,
-    Water,
-)
-from seastar_gym.der.terms.current import current_velocity
-from seastar_gym.model.currents import current_rows
+from seastar_gym import Limb, Numerics, Scene, Seastar, SmaPulse, Water
 from seastar_gym.model.rods import make_limits, make_rods
 from seastar_gym.scene.numerics import ADAPTATION, MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP
-from seastar_gym.simd.numpy_lanes import Lanes
-from slopes import plain
 
 
 @given(
@@ -55,23 +40,10 @@ def test_coefficients_are_the_oracles(hub_hinge):
     np.testing.assert_allclose(rods.bending.EI_over_dl * rods.bending.dl_over_EI, 1.0, rtol=1e-14)
     assert rods.hub.side == {"opening": 1.0, "turning": -1.0}[hub_hinge]
     assert rods.hub.angle == pytest.approx(math.pi / 2 if hub_hinge == "opening" else -math.pi / 2)
+    for vacuum in (None, Water(density=0.0), Water(drag_coefficient=0.0)):
+        rods_in_vacuum = make_rods(Scene(fluid=vacuum))
+        assert not rods_in_vacuum.drag.any() and not rods_in_vacuum.middle_drag.any()
     assert len(rods.stretching.EA) == len(star.edges) and len(rods.bending.EI_over_dl) == len(star.hinges)
-
-
-@pytest.mark.parametrize("fluid", [None, Water(density=0.0), Water(drag_coefficient=0.0)])
-def test_vacuum_has_no_drag(fluid):
-    rods = make_rods(Scene(fluid=fluid))
-    assert not rods.drag.any() and not rods.middle_drag.any()
-
-
-def mass_matrix(scene):
-    """Of one direction [kg], from lumped masses less what edges have less; shape (n_nodes, n_nodes)."""
-    rods = make_rods(scene)
-    matrix, edges = np.diag(rods.mass.copy()), scene.robot.nodes_per_limb - 1
-    for e, mu in enumerate(rods.edge_mass):
-        ends = np.ix_(*[[0 if e % edges == 0 else e, e + 1]] * 2)
-        matrix[ends] -= mu * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    return matrix
 
 
 @pytest.mark.parametrize("nodes", [2, 3, 5, 10])
@@ -80,42 +52,14 @@ def test_kinetic_energy_is_positive_however_limbs_taper(nodes):
     rng = np.random.default_rng(nodes)
     for _ in range(50):
         limbs = tuple(Limb(radius=tuple(10.0 ** rng.uniform(-4, -2, rng.integers(2, 6)))) for _ in range(3))
-        scene = Scene(Seastar(n_limbs=3, nodes_per_limb=nodes, limbs=limbs))
-        matrix = mass_matrix(scene)
-        assert matrix.sum() == pytest.approx(make_rods(scene).mass.sum())
+        rods = make_rods(Scene(Seastar(n_limbs=3, nodes_per_limb=nodes, limbs=limbs)))
+        matrix = np.diag(rods.mass.copy())  # lumped masses, less what edges have less
+        for e, mu in enumerate(rods.edge_mass):
+            matrix[np.ix_(*[[0 if e % (nodes - 1) == 0 else e, e + 1]] * 2)] -= mu * np.array(
+                [[1.0, -1.0], [-1.0, 1.0]]
+            )
+        assert matrix.sum() == pytest.approx(rods.mass.sum())
         assert np.linalg.eigvalsh(matrix).min() > 0.0
-
-
-def test_edges_of_one_radius_keep_a_sixth_of_their_mass():
-    scene = Scene()
-    rods, robot = make_rods(scene), scene.robot
-    a_sixth = robot.density * np.pi * robot.rod_radius**2 * robot.limb_length / (robot.nodes_per_limb - 1) / 6.0
-    np.testing.assert_allclose(rods.edge_mass, a_sixth, rtol=1e-12)
-
-
-# Currents and the solver's limits are those of the scene, in numbers that kernels read.
-
-
-X, Y = np.random.default_rng(0).uniform(-0.3, 0.3, (2, 9))
-ALONG = -X * np.sin(0.7) + Y * np.cos(0.7)
-FROM_CENTRE = np.array([-(Y + 0.2), X - 0.1]) / ((X - 0.1) ** 2 + (Y + 0.2) ** 2 + 0.07**2)
-CURRENTS = {
-    "uniform": (UniformCurrent(0.02, -0.03), np.outer([0.02, -0.03], np.ones(9))),
-    "shear": (ShearCurrent(0.4, 0.7), 0.4 * ALONG * np.array([[np.cos(0.7)], [np.sin(0.7)]])),
-    "vortex": (Vortex(0.3, 0.1, -0.2, 0.07), 0.3 / (2.0 * np.pi) * FROM_CENTRE),
-    "grid": (
-        GridCurrent.from_function(lambda x, y: (2.0 * x - y, x + 3.0 * y), (-0.4, 0.4), (-0.5, 0.4), 0.1),
-        np.array([2.0 * X - Y, X + 3.0 * Y]),
-    ),
-}
-
-
-@pytest.mark.parametrize("name", CURRENTS)
-def test_a_current_flows_everywhere_as_its_formula_says(name):
-    current, expected = CURRENTS[name]
-    found = plain(current_velocity.plain(current_rows(current), Lanes(X), Lanes(Y)))
-    for component, velocity in zip(found, expected, strict=True):
-        np.testing.assert_allclose(np.broadcast_to(component, 9), velocity, rtol=1e-12, atol=1e-15)
 
 
 def test_limits_are_in_limb_lengths_and_in_steps_begun():

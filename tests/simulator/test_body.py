@@ -7,8 +7,7 @@ import pytest
 
 from momenta import bodied_momenta as momenta
 from momenta import cross
-from seastar_gym import Attachment, Body, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, UniformCurrent, Water
-from seastar_gym.der.stepping.schemes import SCHEMES
+from seastar_gym import Attachment, Body, Numerics, Scene, Seastar, Simulator, SmaPulse, UniformCurrent, Water
 
 MIDPOINT = Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-10)
 SPECK = {"n_limbs": 2, "nodes_per_limb": 2, "limb_length": 1e-3, "rod_radius": 1e-4, "density": 1.0}
@@ -30,17 +29,6 @@ def set_moving(simulator: Simulator, velocity: tuple[float, float], spin: float)
     q = simulator.positions
     v = np.array(velocity) + spin * np.stack([-q[..., 1], q[..., 0]], axis=-1)
     simulator.set_state(simulator.get_state()._replace(velocities=v, spin=np.full(len(q), spin)))
-
-
-@pytest.mark.parametrize("contact", [None, Contact()], ids=["free", "contact"])
-def test_a_body_without_size_is_the_point_hub_to_the_last_bit(contact):
-    for body in (Body(), Body(mass=0.0, inertia=0.0, height=1.0)):
-        robots = (Seastar(nodes_per_limb=5, body=each) for each in (None, body))
-        one, other = (Simulator(Scene(robot, contact=contact), 3) for robot in robots)
-        for simulator in (one, other):
-            simulator.stroke([[0, 1, 0, 0, -1], [1, 0, -1, 1, 0], [1, -1, 0, 1, -1]])
-        np.testing.assert_array_equal(one.q, other.q)
-        np.testing.assert_array_equal(one.v, other.v)
 
 
 def test_a_small_light_body_swims_as_the_point_hub_does():
@@ -92,69 +80,6 @@ def test_a_robot_with_a_lopsided_body_turns_about_its_centre_of_mass():
         exact = np.array([0.01, 0.02]) - 0.01 * np.array([math.cos(2.0), math.sin(2.0)])
         errors.append(np.abs(simulator.hub_position()[0] - exact).max())
     assert errors[1] < 2e-5 and errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
-
-
-LOPSIDED = Body(
-    outline=((0.03, -0.01), (0.02, 0.02), (-0.02, 0.015), (-0.025, -0.02)), mass=4e-3, centre_of_mass=(4e-3, -3e-3),
-    attachments=(Attachment(0.03, 0.005, 0.3), Attachment(-0.01, 0.018, 1.4), Attachment(-0.02, -0.01, 3.6)),
-)  # fmt: skip
-"""Neither its centre of mass nor that of its limbs is the hub."""
-
-
-def thrown(numerics: Numerics, **parts) -> Simulator:
-    """A robot around a lopsided body that moves, turns and bends its limbs in vacuum."""
-    simulator = Simulator(Scene(Seastar(3, 5, body=LOPSIDED), None, SmaPulse(0.5), numerics, **parts))
-    set_moving(simulator, (0.05, -0.02), 3.0)
-    return simulator
-
-
-RULES = [(scheme, 0.0) for scheme in SCHEMES] + [("implicit-midpoint", damping) for damping in (0.003, 0.5)]
-"""Schemes and their damping."""
-
-
-@pytest.mark.parametrize("newton_tolerance", [1e-4, 1e-10])
-@pytest.mark.parametrize("h", [0.05, 8e-3, 1e-3])
-@pytest.mark.parametrize("scheme, damping", RULES)
-def test_a_robot_with_a_lopsided_body_keeps_its_momentum_to_rounding(scheme, damping, h, newton_tolerance):
-    simulator = thrown(Numerics(scheme, h, newton_tolerance, damping=damping))
-    mass = simulator.coefficients.rods(0).mass.sum()
-    before, _ = momenta(simulator)
-    for pieces in (0.1, 0.033, 0.4):
-        simulator.advance(pieces, [[1.0, -0.5, 0.3]] if pieces == 0.1 else None)
-        after, _ = momenta(simulator)
-        assert np.abs(after - before).max() < 1e-11 * mass * np.abs(simulator.velocities).max()
-
-
-@pytest.mark.parametrize("scheme, damping", RULES)
-def test_weight_gives_a_lopsided_body_its_impulse_to_rounding(scheme, damping):
-    simulator = thrown(Numerics(scheme, 4e-3, 1e-10, damping=damping), gravity=(0.3, -0.5))
-    mass = simulator.coefficients.rods(0).mass.sum()
-    before, _ = momenta(simulator)
-    simulator.advance(0.3, [[1.0, -0.5, 0.3]])
-    impulse = mass * 0.3 * np.array([0.3, -0.5])
-    np.testing.assert_allclose(momenta(simulator)[0] - before, impulse, rtol=0.0, atol=1e-10 * mass)
-
-
-@pytest.mark.parametrize("h, share", [(8e-3, 1e-3), (4e-3, 1e-4), (1e-3, 5e-5)])
-def test_the_midpoint_rule_keeps_nearly_all_angular_momentum_of_a_robot_with_a_body(h, share):
-    simulator = thrown(Numerics("implicit-midpoint", h, 1e-10))
-    _, before = momenta(simulator)
-    simulator.advance(0.4, [[1.0, -0.5, 0.3]])
-    assert momenta(simulator)[1] == pytest.approx(before, rel=share)
-
-
-@pytest.mark.parametrize("scheme, order", [("implicit-midpoint", 2), ("implicit-euler", 1), ("sdirk2", 2)])
-def test_a_robot_with_a_lopsided_body_keeps_the_order_of_its_scheme(scheme, order):
-    """Angles and angular momentum, too, as steps get shorter; stiff edges ring, so limbs are soft."""
-    ends = []
-    for h in (2e-3, 1e-3, 2.5e-4):
-        simulator = thrown(Numerics(scheme, h, 1e-10))
-        _, spin = momenta(simulator)
-        simulator.advance(0.1, [[0.5, -0.3, 0.2]])
-        ends.append(np.array([*simulator.hub_position()[0], simulator.orientation()[0], momenta(simulator)[1] / spin]))
-    far, near = (np.abs(end[:3] - ends[-1][:3]) for end in ends[:-1])
-    assert np.linalg.norm(far) > 0.8 * 2**order * np.linalg.norm(near)
-    assert abs(ends[-1][3] - 1.0) < {1: 2e-2}.get(order, 1e-4)
 
 
 def complete_elliptic(k: float) -> float:
@@ -249,36 +174,3 @@ def test_a_uniform_current_carries_a_robot_along():
     drift = 0.3 * np.array([0.02, -0.01])
     np.testing.assert_allclose(carried.positions - drift, still.positions, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(carried.orientation(), still.orientation(), atol=1e-8)
-
-
-def test_a_turned_robot_swims_the_turned_path():
-    one, turned = Simulator(Scene(FOUR_LIMBS, numerics=MIDPOINT)), Simulator(Scene(FOUR_LIMBS, numerics=MIDPOINT))
-    turned.reset(heading=2.5)
-    for simulator in (one, turned):
-        simulator.advance(0.3, [[1, 0, 0.5, -1]])
-    c, s = math.cos(2.5), math.sin(2.5)
-    np.testing.assert_allclose(turned.positions[0], one.positions[0] @ [[c, s], [-s, c]], rtol=0.0, atol=1e-9)
-    assert turned.orientation()[0] == pytest.approx(one.orientation()[0] + 2.5, abs=1e-7)
-
-
-def test_a_state_with_orientation_continues_to_the_same_bits():
-    simulator, other = (Simulator(Scene(FOUR_LIMBS, numerics=MIDPOINT), 3) for _ in range(2))
-    simulator.reset(heading=[0.0, 4.0, -2.0])
-    simulator.stroke(np.eye(3, 4))
-    other.set_state(simulator.get_state())
-    for each in (simulator, other):
-        each.advance(0.1, -np.eye(3, 4))
-    np.testing.assert_array_equal(simulator.positions, other.positions)
-    np.testing.assert_array_equal(simulator.velocities, other.velocities)
-    np.testing.assert_array_equal(simulator.orientation(), other.orientation())
-
-
-@pytest.mark.slow
-def test_long_steps_of_violent_commands_end_well():
-    """Retried and regularised steps, the guard and its cuts."""
-    simulator = Simulator(Scene(FOUR_LIMBS, None, SmaPulse(1.5, 0.02, 0.1), Numerics("implicit-midpoint", 0.02)), 8)
-    rng = np.random.default_rng(0)
-    for _ in range(3):
-        report = simulator.stroke(rng.choice([-1.0, 1.0], (8, 4)))
-        assert (report.status == 0).all()
-    assert np.isfinite(simulator.positions).all() and report.halvings.sum() + report.regularised.sum() > 0

@@ -1,4 +1,4 @@
-"""The clock counts intervals, keeps the time of those that failed, and can be put back."""
+"""Time is counted without drift, and no time step straddles a corner of the pulse."""
 
 from fractions import Fraction
 
@@ -8,96 +8,26 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import oracle
-from hubs import TEN
-from seastar_gym import Numerics, Scene, Simulator
-from seastar_gym.simulator.clock import Clock
-from seastar_gym.simulator.schedule import step_times
-
-FAILED = np.array([False, True, False])
-NONE = np.zeros(3, dtype=bool)
-PERIOD = 0.1
-
-
-def after(n_strokes: int) -> Clock:
-    clock = Clock(3)
-    for _ in range(n_strokes):
-        clock.begin(PERIOD)
-        clock.end(NONE, np.full(3, PERIOD))
-    return clock
-
-
-def test_time_is_a_multiple_of_the_period_without_accumulated_rounding():
-    np.testing.assert_array_equal(after(1000).time, 1000 * PERIOD)
-    assert sum([PERIOD] * 1000) != 1000 * PERIOD
-
-
-def test_rounding_does_not_accumulate_over_intervals_of_changing_length():
-    clock, durations = Clock(3), [0.3, 0.7, 0.1]
-    for k in range(3000):
-        clock.begin(durations[k % 3])
-        clock.end(NONE, np.full(3, durations[k % 3]))
-    exact = float(1000 * sum(map(Fraction, durations)))
-    assert np.abs(clock.time - exact).max() <= 2.0 * np.spacing(exact)
-    assert abs(sum(durations * 1000) - exact) > 10.0 * np.spacing(exact)
-
-
-def test_time_within_a_stroke_is_what_has_been_covered():
-    clock = after(2)
-    clock.begin(PERIOD)
-    clock.advance_to(np.array([0.01, 0.02, 0.03]))
-    np.testing.assert_array_equal(clock.time, 2 * PERIOD + np.array([0.01, 0.02, 0.03]))
-    clock.end(NONE, np.full(3, PERIOD))
-    np.testing.assert_array_equal(clock.time, 3 * PERIOD)
-
-
-def test_a_failed_stroke_counts_by_the_time_that_it_covered():
-    clock = Clock(3)
-    clock.begin(PERIOD)
-    clock.end(FAILED, np.array([PERIOD, 0.03, PERIOD]))
-    np.testing.assert_array_equal(clock.time, [PERIOD, 0.03, PERIOD])
-    clock.begin(PERIOD)
-    np.testing.assert_array_equal(clock.time, [PERIOD, 0.03, PERIOD])
-    clock.end(FAILED, np.array([PERIOD, 0.0, PERIOD]))
-    np.testing.assert_array_equal(clock.time, [2 * PERIOD, 0.03, 2 * PERIOD])
-
-
-def test_time_is_set_for_the_chosen_robots_only():
-    clock = after(3)
-    clock.set(FAILED, 7.0)
-    np.testing.assert_array_equal(clock.time, [3 * PERIOD, 7.0, 3 * PERIOD])
-    clock.begin(PERIOD)
-    clock.end(NONE, np.full(3, PERIOD))
-    np.testing.assert_array_equal(clock.time, [4 * PERIOD, 7.0 + PERIOD, 4 * PERIOD])
-
-
-def test_what_a_clock_shows_can_be_kept_and_puts_it_back():
-    clock = after(3)
-    before = dict(vars(clock))
-    for _ in range(2):
-        clock.begin(2 * PERIOD)
-        clock.advance_to(np.full(3, 0.05))
-        clock.end(FAILED, np.full(3, 0.07))
-        clock.set(FAILED, 5.0)
-        assert (clock.time != 3 * PERIOD).all()
-        vars(clock).update(before)
-        np.testing.assert_array_equal(clock.time, 3 * PERIOD)
-
-
-# No time step straddles a corner of the pulse.
-
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse
+from seastar_gym.envs.swimming import first_after
+from seastar_gym.simulator.pauses import completed, pausing
+from seastar_gym.simulator.schedule import interval_times, step_times
 
 CHAPTER = (0.0, 0.1, 1.0)
 durations = st.floats(1e-3, 10.0)
 
 
-@pytest.mark.parametrize("step, n_heating, n_cooling", [(0.01, 10, 90), (0.003, 34, 300), (0.02, 5, 45), (0.25, 1, 4)])
-def test_a_stroke_takes_as_few_steps_as_its_corners_allow(step, n_heating, n_cooling):
-    times = step_times(CHAPTER, step)
-    assert len(times) == n_heating + n_cooling + 1
-    assert np.searchsorted(times, 0.1) == n_heating
+@pytest.mark.parametrize("intervals, ulps", [([0.1], 0.0), ([0.1 + 0.2], 0.0), ([0.3, 0.7, 0.1], 2.0)])
+def test_rounding_of_time_does_not_accumulate_over_intervals_equal_or_not(intervals, ulps):
+    simulator = Simulator(Scene(Seastar(1, 2), None, SmaPulse(0.0), Numerics("implicit-euler", 1.0)))
+    for duration in intervals * 1000:
+        simulator.advance(duration)
+    exact = 1000 * intervals[0] if len(intervals) == 1 else float(1000 * sum(map(Fraction, intervals)))
+    assert abs(simulator.time[0] - exact) <= ulps * np.spacing(exact)
+    assert abs(sum(intervals * 1000) - exact) > 10.0 * np.spacing(exact)
 
 
-@pytest.mark.parametrize("step", [1.0 / 3.0, 0.1, 0.05, 0.03, 0.003, 0.001, 0.0007, 1e-4])
+@pytest.mark.parametrize("step", [1.0 / 3.0, 0.25, 0.1, 0.05, 0.03, 0.02, 0.003, 0.001, 0.0007, 1e-4])
 def test_steps_are_those_of_the_oracle(step):
     starts, lengths = np.array(oracle.stroke_steps(step)).T
     times = step_times(CHAPTER, step)
@@ -127,13 +57,48 @@ def test_a_step_that_divides_the_ramps_up_to_rounding_leaves_no_sliver(n_heating
     np.testing.assert_allclose(np.diff(times), step, rtol=1e-8)
 
 
-@pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"])
-def test_a_step_longer_than_the_ramps_still_sees_both_corners(scheme):
-    """The robot ends where it ends with steps of exactly the ramps' lengths."""
-    ends = []
-    for step in (0.9, 5.0):
-        simulator = Simulator(Scene(TEN, numerics=Numerics(scheme, step)))
-        report = simulator.stroke([[0.0, 0.5, 0.0, 0.0, -0.5]])
-        assert report.covered[0] == pytest.approx(1.0)
-        ends.append(simulator.positions)
-    np.testing.assert_array_equal(*ends)
+def test_steps_of_an_interval_are_those_of_the_whole_and_one_of_its_ends_cuts_a_step_in_two():
+    whole = step_times(CHAPTER, 0.03)
+    np.testing.assert_array_equal(interval_times(CHAPTER, 0.03, 0.0, 1.0), whole)
+    pieces = [interval_times(CHAPTER, 0.03, begin, 0.1) for begin in np.arange(10) / 10]
+    seen = np.unique(np.round(np.concatenate(pieces), 12))
+    assert set(np.round(whole, 12)) <= set(seen) and len(seen) <= len(whole) + 9
+    on_grid = [*interval_times(CHAPTER, 0.01, 0.0, 0.1 + 0.2), *interval_times(CHAPTER, 0.01, 0.1 + 0.2, 0.7)[1:]]
+    np.testing.assert_array_equal(on_grid, step_times(CHAPTER, 0.01))
+    for begin, duration in ((0.0, 0.25), (0.07, 0.4), (0.0, 3.0), (0.99, 0.4)):
+        times = interval_times(CHAPTER, 0.03, begin, duration)
+        assert times[0] == begin and times[-1] == pytest.approx(begin + duration)
+        assert (np.diff(times) > 0.0).all() and np.diff(times).max() <= 0.03 + 1e-12
+        assert all(corner in times for corner in (0.1, 1.0) if begin < corner < begin + duration)
+
+
+# Intervals that pause are seen at every pause, return what they return, and are closed whatever happens.
+
+
+def interval(closed):
+    """Pauses at 1, 2 and 3; notes that it was closed."""
+    try:
+        yield from (1.0, 2.0, 3.0)
+    finally:
+        closed.append(True)
+    return "report"
+
+
+def test_an_interval_is_seen_at_every_pause_and_closed_by_its_end_with_its_pauses_and_by_what_goes_wrong():
+    seen, closed = [], []
+    assert completed(interval(closed), seen.append) == "report" and seen == [1.0, 2.0, 3.0] and closed == [True]
+    assert list(pausing(interval([]), lambda time: 10.0 * time if time != 2.0 else None)) == [10.0, 30.0]
+    pauses = pausing(interval(closed), float)
+    next(pauses)
+    pauses.close()
+    for run in (completed, lambda *given: list(pausing(*given))):
+        with pytest.raises(ZeroDivisionError):
+            run(interval(closed), lambda time: 1 / 0)
+    assert closed == [True] * 4
+
+
+@pytest.mark.parametrize(
+    "ends, expected", [([], []), ([1.5, 3.0], [2.0, 3.0]), ([0.5, 0.6, 1.0], [1.0]), ([2.0 + 1e-10], [2.0])]
+)
+def test_the_first_time_after_each_end_is_yielded(ends, expected):
+    assert list(pausing(interval([]), first_after(ends))) == expected

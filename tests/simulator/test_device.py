@@ -1,6 +1,7 @@
 """A device with a thread for each robot swims to the processor's bits: its twin "scalar" always, "cuda" with a GPU.
 
-A device's code is that of one mesh, so there are few scenes here: `python -m studies.gpu` has all others.
+A device's code is that of one mesh, so there are few scenes here and in test_bits.py: `python -m studies.gpu` has all
+others.
 """
 
 import pickle
@@ -14,26 +15,21 @@ import numba
 import numpy as np
 import pytest
 
+from refusals import assert_refused
 from seastar_gym import (
-    DomainRandomization,
     Numerics,
     Scene,
     Seastar,
     Simulator,
     SmaPulse,
-    SmaWires,
     StrokeReport,
-    Uniform,
 )
 from seastar_gym.envs.buffers import Buffers
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simulator import device_batch
 from seastar_gym.simulator.device_batch import DEVICES, DeviceBatch
-from seastar_gym.sweep.axes import Choices
 from seastar_gym.sweep.command import main as sweep_command
-from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.swimming import swim
 from strokes import assert_same, finished
 from studies.gpu import (
     EVERYTHING,
@@ -50,22 +46,25 @@ from studies.gpu_code import code_of, code_of_observations
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="devices have compiled code alone")
 
 SMALL = Scene(Seastar(nodes_per_limb=4), actuator=SmaPulse(0.4), numerics=Numerics.preset("fast"))
+OF_EACH = replace(SMALL, robot=replace(SMALL.robot, youngs_modulus=np.linspace(0.8e6, 1.2e6, 35)))
 AT_FAST = ("pairs", "continuous", "headings", "camera")
 """Environments of the same scene, whose code is compiled once."""
 N_ROBOTS = 35
 """Robots of a batch: more than one group of a device or a processor, the last of which is not full."""
 
 
-def has_gpu() -> bool:
+def require_gpu() -> None:
+    """Skip where there is none."""
     try:
         cuda.arrays()
-    except ValueError:
-        return False
-    return True
+    except ValueError as no_gpu:
+        pytest.skip(str(no_gpu))
 
 
-@pytest.fixture(params=["scalar", pytest.param("cuda", marks=pytest.mark.skipif(not has_gpu(), reason="no GPU"))])
+@pytest.fixture(params=["scalar", "cuda"])
 def device(request):
+    if request.param == "cuda":
+        require_gpu()
     return request.param
 
 
@@ -99,31 +98,34 @@ def test_every_term_scheme_and_actuator_has_the_bits_of_the_processor(name):
     assert compared(name, "scalar")["same"]
 
 
-def test_states_reports_and_work_are_those_of_the_processor(device):
-    both = pair(SMALL, device, error_bars=True)
-    for commands in commands_of(3):
-        assert_same_reports(*(simulator.stroke(commands) for simulator in both))
-        assert_same(*both)
-    for name in ("positions", "velocities"):
-        there = both[1].on_device(name)
-        assert isinstance(there, np.ndarray) == (device == "scalar")
-        np.testing.assert_array_equal(on_processor(there), getattr(both[0], name))
-
-
-def test_resets_states_and_strengths_reach_the_device(device):
-    both, commands = pair(SMALL, device), commands_of(4)
+def test_whatever_is_done_between_strokes_reaches_the_device(device):
+    """Resets, strengths, numbers of each robot, states, copies; one robot fails, alike and alone."""
+    both, commands = pair(SMALL, device, error_bars=True), commands_of(4)
     mask, heading = np.arange(N_ROBOTS) % 3 == 0, np.linspace(0.0, 1.0, N_ROBOTS)
     for simulator in both:
         simulator.stroke(commands[0])
         simulator.reset(mask, heading)
         simulator.set_limb_strengths(0.7)
-        simulator.stroke(commands[1])
+        state = simulator.get_state()
+        state.velocities[7] = 1e200
+        simulator.set_state(state)
+        report = simulator.stroke(commands[1])
+        assert report.status[7] > 0 and not np.delete(report.status, 7).any()
+        simulator.set_scene(OF_EACH, ~mask)
+        simulator.stroke(commands[2])
+        simulator.reset(mask)
     assert_same(*both)
+    for name in ("positions", "velocities"):
+        there = both[1].on_device(name)
+        assert isinstance(there, np.ndarray) == (device == "scalar")
+        np.testing.assert_array_equal(on_processor(there), getattr(both[0], name))
     other = pickle.loads(pickle.dumps(both[1]))
     assert other.device == device
     other.set_state(both[0].get_state())
-    for simulator in (*both, other):
-        simulator.stroke(commands[2])
+    both[0].set_state(both[0].get_state())
+    both[1].set_state(both[0].get_state())
+    assert_same_reports(*(simulator.stroke(commands[3]) for simulator in both))
+    other.stroke(commands[3])
     assert_same(*both)
     assert_same(both[0], other)
 
@@ -144,29 +146,6 @@ def test_parts_of_a_stroke_are_the_whole_and_one_that_is_dropped_is_undone(devic
     assert len({hub.tobytes() for hub in seen}) == 3
 
 
-def test_numbers_of_each_robot_may_change_between_strokes(device):
-    of_each = replace(SMALL, robot=replace(SMALL.robot, youngs_modulus=np.linspace(0.8e6, 1.2e6, N_ROBOTS)))
-    other = replace(of_each, robot=replace(of_each.robot, youngs_modulus=np.linspace(1.2e6, 0.8e6, N_ROBOTS)))
-    both, commands = pair(of_each, device), commands_of(2)
-    for simulator in both:
-        simulator.stroke(commands[0])
-        simulator.set_scene(other, np.arange(N_ROBOTS) % 2 == 0)
-        simulator.stroke(commands[1])
-    assert_same(*both)
-
-
-def test_a_robot_that_fails_fails_alike_and_alone(device):
-    both, commands = pair(SMALL, device), commands_of(2)
-    for simulator in both:
-        state = simulator.get_state()
-        state.velocities[7] = 1e200
-        simulator.set_state(state)
-        report = simulator.stroke(commands[0])
-        assert report.status[7] > 0 and not np.delete(report.status, 7).any()
-        simulator.stroke(commands[1])
-    assert_same(*both)
-
-
 @pytest.mark.parametrize(
     "name",
     [
@@ -178,51 +157,18 @@ def test_environments_observe_and_are_rewarded_alike(device, name):
     assert observed(name, device)["same"]
 
 
-ROBOTS = {
-    "three limbs, wires": {"scene": Scene(Seastar(3, nodes_per_limb=7), actuator=SmaWires()), "decision_period": 0.2},
-    "eight limbs": {"scene": Scene(Seastar(8, nodes_per_limb=13))},
-    "limbs in a row on a body": {"scene": scenes()["limbs in a row on a body"]},
-    "numbers of each robot": {"randomization": DomainRandomization({"robot.limb_length": Uniform(0.08, 0.12)})},
-}
-
-
-@pytest.mark.parametrize("options", ROBOTS.values(), ids=ROBOTS)
-def test_any_robot_in_any_state_is_observed_alike_on_the_device(device, options):
-    batch, rng = batch_on(device, N_ROBOTS, **options), np.random.default_rng(0)
-    batch.reset(seed=0)
-    for rows, size in ((batch.simulator.q, 0.01), (batch.simulator.v, 0.02)):
-        rows += rng.normal(0.0, size, rows.shape)
-    here, there = batch._task.observe(), batch._task.observe_on_device()
-    assert isinstance(there, np.ndarray) == (device == "scalar") and there.dtype == np.float32
-    np.testing.assert_array_equal(here, on_processor(there))
-    assert len(np.unique(here, axis=0)) == N_ROBOTS
-
-
-def test_the_state_stays_on_the_device_where_observations_do(device, monkeypatch):
+def test_states_and_observations_stay_on_the_device_where_torch_takes_them(device, monkeypatch):
     batch = batch_on(device, 5, on_device=True)
-    batch.reset(seed=0)
+    observations, _ = batch.reset(seed=0)
     actions = batch.action_space.sample()
     batch.step(actions)
     monkeypatch.setattr(DeviceBatch, "_fetched", Mock(side_effect=AssertionError))
     batch.step(actions)
-
-
-def test_torch_takes_observations_as_they_are(device):
     torch = pytest.importorskip("torch")
-    observations, _ = batch_on(device, 5, on_device=True).reset(seed=0)
     there = torch.from_dlpack(observations)
     assert there.shape == (5, 186) and there.dtype == torch.float32 and there.is_cuda == (device == "cuda")
     observations[0, 0] = 7.0
     assert there[0, 0] == 7.0
-
-
-def test_designs_of_a_sweep_swim_alike(device):
-    sweep = Sweep(SMALL, (Choices("robot.youngs_modulus", (0.8e6, 1.0e6, 1.2e6)),), settling=1, measured=1)
-    (cell,) = sweep.batches()
-    ours, theirs = swim(cell), swim(cell, device)
-    assert ours.keys() == theirs.keys() and not ours["status"].any()
-    for name, column in ours.items():
-        np.testing.assert_array_equal(column, theirs[name], err_msg=name)
 
 
 def test_first_strokes_in_two_threads_do_not_meet(device, monkeypatch):
@@ -239,7 +185,6 @@ def test_first_strokes_in_two_threads_do_not_meet(device, monkeypatch):
 
 def test_a_broken_off_read_and_a_full_memory_lose_nothing(device, monkeypatch):
     both, commands = pair(SMALL, device), commands_of(3)
-    of_each = replace(SMALL, robot=replace(SMALL.robot, youngs_modulus=np.linspace(0.8e6, 1.2e6, N_ROBOTS)))
     for simulator in both:
         simulator.stroke(commands[0])
     with monkeypatch.context() as full:
@@ -249,7 +194,7 @@ def test_a_broken_off_read_and_a_full_memory_lose_nothing(device, monkeypatch):
     assert_same(*both)
     for simulator in both:
         simulator.stroke(commands[1])
-        simulator.set_scene(of_each)
+        simulator.set_scene(OF_EACH)
     with monkeypatch.context() as full:
         full.setattr(both[1]._batch, "_arrays", Mock(zeros=Mock(side_effect=MemoryError)))
         with pytest.raises(MemoryError):
@@ -263,25 +208,26 @@ def test_a_broken_off_read_and_a_full_memory_lose_nothing(device, monkeypatch):
 # Refusals
 
 
-def test_a_device_that_is_not_there_is_refused_in_one_sentence(tmp_path, capsys):
-    with pytest.raises(ValueError, match="device must be one of 'cpu', 'cuda', 'scalar', not 'tpu'"):
-        Simulator(SMALL, device="tpu")
-    if not has_gpu():
-        with pytest.raises(ValueError, match=r'^device="cuda" (needs CuPy|finds no NVIDIA GPU).*\.$'):
-            Simulator(SMALL, device="cuda")
-        with pytest.raises(ValueError, match=r'^device="cuda" (needs CuPy|finds no NVIDIA GPU).*\.$'):
-            batch_on("cuda", 5, on_device=True)
+def test_a_gpu_that_is_not_there_is_refused_in_one_sentence(tmp_path, capsys):
+    try:
+        cuda.arrays()
+    except ValueError:
+        for make in (lambda: Simulator(SMALL, device="cuda"), lambda: batch_on("cuda", 5, on_device=True)):
+            with pytest.raises(ValueError, match=r'^device="cuda" (needs CuPy|finds no NVIDIA GPU).*\.$'):
+                make()
         assert sweep_command(["robot.n_limbs=3", "--device", "cuda", "--out", str(tmp_path)]) == 2
         assert capsys.readouterr().err.startswith('device="cuda" ')
+    else:
+        assert Simulator(SMALL, device="cuda").device == "cuda"
 
 
 def test_observations_on_a_device_are_refused_where_those_of_the_processor_are_needed():
-    with pytest.raises(ValueError, match="on_device must be True or False, not 'cuda'"):
+    with assert_refused("on_device must be True or False, not 'cuda'"):
         batch_on("cpu", 5, on_device="cuda")
     batch = batch_on("scalar", 5, on_device=True)
     observations, _ = batch.reset(seed=0)
     flags = np.zeros(5, bool)
-    with pytest.raises(ValueError, match="out takes observations of the processor: make the batch without on_device"):
+    with assert_refused("out takes observations of the processor: make the batch without on_device"):
         batch.step(np.zeros((5, 5)), out=Buffers(observations, np.zeros(5), flags, flags))
 
 
@@ -296,21 +242,12 @@ EXACT = re.compile(r"(neg|abs|mov|selp|min|max|setp\.\w+|cvt\.(rmi|rzi)(\.s64|\.
 CODES = {scheme: replace(SMALL, numerics=Numerics(scheme, 0.005)) for scheme in get_args(SchemeName)}
 
 
-@pytest.mark.parametrize(
-    "scene",
-    [*CODES.values(), pytest.param(scenes()[f"sdirk2, {EVERYTHING}"], marks=pytest.mark.slow)],
-    ids=[*CODES, "everything"],
-)
-def test_the_code_for_gpus_rounds_every_operation_by_itself_and_calls_nothing(scene):
-    assert_strict(code_of(scene))
+OBSERVED = "three limbs", "eight limbs in contact", "limbs in a row on a body"
 
 
-@pytest.mark.parametrize("name", ["three limbs", "eight limbs in contact", "limbs in a row on a body"])
-def test_so_does_the_code_of_observations(name):
-    assert_strict(code_of_observations(scenes()[name]))
-
-
-def assert_strict(code: str) -> None:
+@pytest.mark.parametrize("name", [*CODES, *OBSERVED, pytest.param(f"sdirk2, {EVERYTHING}", marks=pytest.mark.slow)])
+def test_the_code_for_gpus_rounds_every_operation_by_itself_and_calls_nothing(name):
+    code = code_of_observations(scenes()[name]) if name in OBSERVED else code_of(CODES.get(name) or scenes()[name])
     found = set(OF_DOUBLES.findall(code))
     assert {"add.rn.f64", "mul.rn.f64", "fma.rn.f64", "div.rn.f64", "sqrt.rn.f64"} <= found
     assert {name for name in found - ROUNDED_TO_NEAREST if not EXACT.fullmatch(name)} == set()

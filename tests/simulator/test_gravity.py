@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from hubs import TEN
-from refusals import assert_refused
 from seastar_gym import Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 
 G = (1.5, -9.81)
@@ -52,9 +51,3 @@ def test_weights_add_to_loads_and_differ_from_robot_to_robot():
     mass = 1000.0 * np.pi * 1.6e-3**2 * 0.5 * np.array([1.0, 2.0])
     centre = (simulator.velocities[..., 1] * simulator.coefficients.rods(0).mass[:, :2].T).sum(axis=1) / mass
     np.testing.assert_allclose(centre, 1e-3 / mass - 1.0, rtol=1e-6)
-
-
-@pytest.mark.parametrize("gravity", [(0.0,), (0.0, float("nan")), 9.81, (0.0, 0.0, -9.81), "down"])
-def test_gravity_that_is_not_two_numbers_is_refused(gravity):
-    with assert_refused("gravity"):
-        Scene(TEN, gravity=gravity)

@@ -16,7 +16,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from seastar_gym import DomainRandomization, Scene, Seastar, Simulator, SmaPulse, State, ThermalSma, Uniform
+from seastar_gym import DomainRandomization, Scene, Seastar, Simulator, SmaPulse, ThermalSma, Uniform
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.model.coefficients import Coefficients
@@ -100,28 +100,27 @@ def assert_not_begun(simulator: Simulator, other: Simulator) -> None:
     assert_same(simulator, other)
 
 
+def fail() -> None:
+    raise MemoryError
+
+
+HOOKS = {
+    f"{when} {nth}, {bars}": ({when: interrupt}, KeyboardInterrupt, nth, bars == "error bars")
+    for when in ("before", "after")
+    for nth, bars in ((1, "plain"), (3, "plain"), (1, "error bars"), (12, "error bars"))
+} | {"a part that fails": ({"before": fail}, MemoryError, 3, False)}
+
+
 @THREADS
-@pytest.mark.parametrize("when", ["before", "after"])
-@pytest.mark.parametrize("nth, bars", [(1, False), (3, False), (1, True), (12, True)])
+@pytest.mark.parametrize("hooks, error, nth, bars", HOOKS.values(), ids=HOOKS)
 @pytest.mark.parametrize("actuator", [SmaPulse(), ThermalSma()], ids=["pulse", "thermal"])
-def test_an_interrupted_stroke_is_as_if_it_had_not_begun(monkeypatch, threads, when, nth, bars, actuator):
+def test_an_interrupted_stroke_is_as_if_it_had_not_begun(monkeypatch, threads, hooks, error, nth, bars, actuator):
     """In the twin of error bars, too, and after it: its eleven parts come first."""
     scene = Scene(numerics=FAST, actuator=actuator)
     simulator = swimmers(threads, scene, bars)
-    with interrupted(simulator, Kernel(monkeypatch, nth=nth, **{when: interrupt})):
+    with interrupted(simulator, Kernel(monkeypatch, nth=nth, **hooks), error):
         simulator.stroke(COMMANDS[1])
     assert_not_begun(simulator, swimmers(1, scene, bars))
-
-
-@THREADS
-def test_a_part_that_fails_undoes_the_stroke(monkeypatch, threads):
-    def fail():
-        raise MemoryError
-
-    simulator = swimmers(threads)
-    with interrupted(simulator, Kernel(monkeypatch, before=fail), MemoryError):
-        simulator.stroke(COMMANDS[1])
-    assert_same(simulator, swimmers())
 
 
 @BARS
@@ -176,44 +175,48 @@ IN_THE_MIDDLE = {
 }
 
 
-@pytest.mark.parametrize("call", IN_THE_MIDDLE.values(), ids=IN_THE_MIDDLE)
-def test_whatever_comes_in_the_middle_of_a_stroke_in_parts_is_refused_and_changes_nothing(call):
-    simulator, other = swimmers(), swimmers()
-    parts = simulator.stroke_in_parts(COMMANDS[1], 3)
-    next(parts)
-    with pytest.raises(RuntimeError, match=r"^A stroke_in_parts .* under way: .*\.$"):
-        call(simulator)
-    for _ in parts:
-        pass
-    other.stroke(COMMANDS[1])
-    assert_same(simulator, other)
-    call(simulator)
-
-
-@pytest.mark.parametrize("call", IN_THE_MIDDLE.values(), ids=IN_THE_MIDDLE)
-@THREADS
-def test_whatever_another_thread_asks_in_the_middle_of_a_stroke_is_refused(monkeypatch, threads, call):
-    simulator, other = swimmers(threads), swimmers()
+@contextlib.contextmanager
+def swimming_elsewhere(monkeypatch, simulator: Simulator):
+    """Another thread is in the middle of a stroke; it ends afterwards."""
     begun, go_on = threading.Event(), threading.Event()
 
     def wait():
         begun.set()
         assert go_on.wait(60.0)
 
-    Kernel(monkeypatch, before=wait)
-    swimmer = threading.Thread(target=simulator.stroke, args=[COMMANDS[1]])
+    kernel, swimmer = Kernel(monkeypatch, before=wait), threading.Thread(target=simulator.stroke, args=[COMMANDS[1]])
     swimmer.start()
     try:
         assert begun.wait(60.0)
-        with pytest.raises(RuntimeError, match=r"^Another thread .*\.$"):
-            call(simulator)
-        with pytest.raises(RuntimeError, match="Another thread"):
-            simulator.get_state()
+        yield kernel
     finally:
         go_on.set()
         swimmer.join()
+
+
+@contextlib.contextmanager
+def paused(monkeypatch, simulator: Simulator):
+    parts = simulator.stroke_in_parts(COMMANDS[1], 3)
+    next(parts)
+    yield parts
+    for _ in parts:
+        pass
+
+
+@pytest.mark.parametrize("call", IN_THE_MIDDLE.values(), ids=IN_THE_MIDDLE)
+@pytest.mark.parametrize("threads, how", [(1, paused), (1, swimming_elsewhere), (3, swimming_elsewhere)])
+def test_whatever_comes_in_the_middle_of_a_stroke_is_refused_and_changes_nothing(monkeypatch, threads, how, call):
+    simulator, other = swimmers(threads), swimmers()
+    told = r"^A stroke_in_parts .* under way: .*\.$" if how is paused else r"^Another thread .*\.$"
+    with how(monkeypatch, simulator):
+        with pytest.raises(RuntimeError, match=told):
+            call(simulator)
+        if how is swimming_elsewhere:  # not even read
+            with pytest.raises(RuntimeError, match=told):
+                simulator.get_state()
     other.stroke(COMMANDS[1])
     assert_same(simulator, other)
+    call(simulator)
 
 
 def break_off(monkeypatch, what: str, change: Callable[[], Any]) -> None:
@@ -227,8 +230,9 @@ def break_off(monkeypatch, what: str, change: Callable[[], Any]) -> None:
             change()
 
 
+@pytest.mark.parametrize("cure", ["reset", "set_state"])
 @pytest.mark.parametrize("what", ["reset", "set_scene"])
-def test_a_change_that_was_broken_off_asks_for_a_reset_which_cures_it(monkeypatch, what):
+def test_a_change_that_was_broken_off_asks_for_a_reset_or_a_state_which_cures_it(monkeypatch, what, cure):
     simulator = swimmers()
     break_off(monkeypatch, what, lambda: IN_THE_MIDDLE[what](simulator))
     some = np.arange(N_ROBOTS) < 2
@@ -236,31 +240,23 @@ def test_a_change_that_was_broken_off_asks_for_a_reset_which_cures_it(monkeypatc
         for refused in (lambda: simulator.stroke(COMMANDS[0]), simulator.get_state, lambda: simulator.reset(some)):
             with pytest.raises(RuntimeError, match=r"^This simulator was interrupted .* reset\(\) .*\.$"):
                 refused()
-    simulator.reset()
-    simulator.stroke(COMMANDS[0])
-    assert_same(simulator, swimmers())
+    if cure == "reset":
+        simulator.reset()
+        simulator.stroke(COMMANDS[0])
+    else:
+        simulator.set_state(swimmers().get_state())
+    assert_not_begun(simulator, swimmers())
 
 
-def test_a_state_that_is_set_cures_a_reset_that_was_broken_off(monkeypatch):
-    simulator, other = swimmers(), swimmers()
-    break_off(monkeypatch, "reset", lambda: IN_THE_MIDDLE["reset"](simulator))
-    simulator.set_state(other.get_state())
-    simulator.stroke(COMMANDS[1])
-    other.stroke(COMMANDS[1])
-    assert_same(simulator, other)
+def test_robots_that_were_put_elsewhere_meanwhile_stay_there(monkeypatch):
+    def reset_and_fail():
+        simulator.reset()
+        raise MemoryError
 
-
-def test_what_is_refused_breaks_nothing_off():
     simulator = swimmers()
-    for name, refused in {
-        "set_scene": lambda: simulator.set_scene(Scene(Seastar(4), numerics=FAST)),
-        "limb_strengths": lambda: simulator.set_limb_strengths(2.0),
-        "heading": lambda: simulator.reset(heading=np.nan),
-        "State": lambda: simulator.set_state(State(*(np.zeros(1),) * 3)),
-    }.items():
-        with pytest.raises(ValueError, match=name):
-            refused()
-    assert_same(simulator, swimmers())
+    with interrupted(simulator, Kernel(monkeypatch, before=reset_and_fail, nth=1), MemoryError):
+        simulator.stroke(COMMANDS[1])
+    assert_not_begun(simulator, Simulator(Scene(numerics=FAST), N_ROBOTS, 1))
 
 
 SWIM_UNTIL_INTERRUPTED = """
@@ -310,52 +306,29 @@ def make(kind: str) -> SeastarSwimEnv | SeastarSwimVectorEnv:
     return SeastarSwimEnv(fidelity="fast", render_mode=None if kind == "one" else kind, randomization=RANDOM)
 
 
-KINDS = pytest.mark.parametrize("kind", ["one", "rgb_array_list", "batch"])
-
-
-@KINDS
-def test_an_interrupted_step_asks_for_a_reset_which_cures_it(monkeypatch, kind):
+@pytest.mark.parametrize("kind", ["one", "rgb_array_list", "batch"])
+@pytest.mark.parametrize("what", ["step", "reset", "set_scene"])
+def test_an_interrupted_environment_asks_for_a_reset_which_cures_it_and_a_refused_step_for_nothing(
+    monkeypatch, kind, what
+):
     env, fresh = make(kind), make(kind)
     action = env.action_space.sample()
     env.reset(seed=0)
+    with pytest.raises(ValueError, match="7"):
+        env.step(np.full_like(action, 7))
     env.step(action)
-    kernel = Kernel(monkeypatch, before=interrupt, nth=1)
-    try:
-        env.step(action)
-        time.sleep(1.0)
-    except KeyboardInterrupt:
-        kernel.remove()
-        with pytest.raises(gym.error.ResetNeeded, match=r"interrupted: call reset\(\)"):
+    if what == "step":
+        with interrupted(env.unwrapped.simulator, Kernel(monkeypatch, before=interrupt, nth=1)):
             env.step(action)
-        seen = env.reset(seed=1)[0]
-    np.testing.assert_array_equal(seen, fresh.reset(seed=1)[0])
-    np.testing.assert_array_equal(env.step(action)[0], fresh.step(action)[0])
-
-
-@KINDS
-def test_an_interrupted_reset_asks_for_another_which_cures_it(monkeypatch, kind):
-    env, fresh = make(kind), make(kind)
-    action = env.action_space.sample()
-    for what in ("reset", "set_scene"):
-        env.reset(seed=5)
+    else:
         break_off(monkeypatch, what, lambda: env.reset(seed=6))
-        with pytest.raises(gym.error.ResetNeeded, match=r"interrupted: call reset\(\)"):
-            env.step(action)
+    with pytest.raises(gym.error.ResetNeeded, match=r"interrupted: call reset\(\)"):
+        env.step(action)
     np.testing.assert_array_equal(env.reset(seed=1)[0], fresh.reset(seed=1)[0])
     np.testing.assert_array_equal(env.step(action)[0], fresh.step(action)[0])
 
 
-@KINDS
-def test_an_action_that_is_refused_interrupts_nothing(kind):
-    env = make(kind)
-    env.reset(seed=0)
-    action = env.action_space.sample()
-    with pytest.raises(ValueError, match="7"):
-        env.step(np.full_like(action, 7))
-    env.step(action)
-
-
-# Threads
+# Threads and processes
 
 
 def others() -> set[threading.Thread]:
@@ -363,40 +336,73 @@ def others() -> set[threading.Thread]:
     return set(threading.enumerate())
 
 
-def test_close_ends_the_threads_and_a_stroke_starts_them_again():
+@pytest.mark.parametrize("kind", ["simulator", "batch", "one"])
+def test_close_ends_the_threads_and_a_stroke_starts_them_again_and_one_robot_has_none(kind):
     before = others()
-    simulator = swimmers(2)
-    for _ in range(2):
-        assert 1 <= len(others() - before) <= 2  # a pool starts its second thread when the first is busy
-        simulator.close()
-        simulator.close()
+    user = Simulator(Scene(numerics=FAST), N_ROBOTS, 2) if kind == "simulator" else make(kind)
+    user.reset(**{} if kind == "simulator" else {"seed": 0})
+    for _ in range(3):
+        if kind == "simulator":
+            user.stroke(COMMANDS[1])
+        else:
+            user.step(user.action_space.sample())
+        # A pool starts its second thread when the first is busy.
+        assert (kind != "one") <= len(others() - before) <= 2 * (kind != "one")
+        user.close()
+        user.close()
         assert not others() - before
-        simulator.stroke(COMMANDS[1])
-    simulator.close()
 
 
-def test_threads_that_are_closed_within_a_stroke_in_parts_start_again():
+def passes_in_a_fork(promise: Callable[[], None]) -> bool:
+    """Whether a promise holds, within a minute, in a forked process, which has no other threads."""
+    child = os.fork()
+    if child == 0:
+        signal.alarm(60)
+        try:
+            promise()
+        except BaseException:
+            os._exit(1)
+        os._exit(0)
+    return os.waitpid(child, 0)[1] == 0
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+@pytest.mark.filterwarnings("ignore:This process.*is multi-threaded:DeprecationWarning")
+def test_a_fork_swims_with_threads_of_its_own_and_knows_strokes_that_are_under_way(monkeypatch):
+    """A paused one goes on. What another thread of the parent does nobody would end there: a reset repairs it."""
     simulator, other = swimmers(2), swimmers()
-    for _ in simulator.stroke_in_parts(COMMANDS[1], 3):
+
+    def swims_on(closes):
+        if closes:
+            simulator.close()  # threads of the parent, which do not run here
+        assert_not_begun(simulator, other)
+        assert threading.active_count() > 1
         simulator.close()
-    other.stroke(COMMANDS[1])
-    assert_same(simulator, other)
+        assert threading.active_count() == 1
 
+    def goes_on(parts):
+        with pytest.raises(RuntimeError, match="under way"):
+            simulator.stroke(COMMANDS[1])
+        thread = threading.Thread(target=lambda: [*parts])  # any thread resumes it
+        thread.start()
+        thread.join()
+        other.stroke(COMMANDS[1])
+        assert_not_begun(simulator, other)
 
-def test_close_of_the_batch_ends_its_threads_however_often_it_is_used_again():
-    before, env = others(), make("batch")
-    env.reset(seed=0)
+    def repaired(kernel):
+        kernel.remove()
+        with pytest.raises(RuntimeError, match="interrupted"):
+            simulator.stroke(COMMANDS[1])
+        simulator.reset()
+        simulator.stroke(COMMANDS[0])
+        assert_not_begun(simulator, swimmers())
+
+    for closes in (False, True):
+        assert passes_in_a_fork(lambda closes=closes: swims_on(closes))
+    with paused(monkeypatch, simulator) as parts:
+        assert passes_in_a_fork(lambda: goes_on(parts))
+    with swimming_elsewhere(monkeypatch, simulator) as kernel:
+        assert passes_in_a_fork(lambda: repaired(kernel))
     for _ in range(2):
-        env.step(env.action_space.sample())
-        assert 1 <= len(others() - before) <= 2  # a pool starts its second thread when the first is busy
-        env.close()
-        env.close()
-        assert not others() - before
-
-
-def test_an_environment_of_one_robot_has_no_threads():
-    before, env = others(), make("one")
-    env.reset(seed=0)
-    env.step(env.action_space.sample())
-    assert not others() - before
-    env.close()
+        other.stroke(COMMANDS[1])
+    assert_same(simulator, other)
