@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import oracle
+from exact.solutions import CANTILEVER_ROOTS, cantilever_shape, fitted_frequency, let_pass, pause
 from refusals import assert_refused
 from seastar_gym import (
     Body,
@@ -32,9 +33,6 @@ from seastar_gym.model.mesh import make_mesh
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.per_robot import numbers_of, unit_of, with_numbers
 from seastar_gym.scene.section import BROADSIDE, broadside
-from studies.verification import exact
-from studies.verification.clamped import fitted_frequency
-from studies.verification.unactuated import let_pass, pause
 from unlike import DIFFERENT, robot_and_star
 
 WIDTH, HEIGHT, E = 2e-3, 8e-3, 1e6
@@ -210,14 +208,14 @@ def test_a_robot_swims_as_one_of_discs_with_the_same_numbers(section):
 def test_a_clamped_limb_rings_with_the_frequency_of_the_beam(section):
     """In its first mode, and in vacuum."""
     found = cut_of(section)
-    root = exact.CANTILEVER_ROOTS[0]
+    root = CANTILEVER_ROOTS[0]
     omega = (root / 0.1) ** 2 * math.sqrt(found.EI / (1000.0 * found.inert))
     h = 2.0 * np.pi / omega / 200
     robot = star(section, n_limbs=2, nodes=20)
     pulse = SmaPulse(0.0, heating_time=50 * h, cooling_time=50 * h)
     simulator = Simulator(Scene(robot, None, pulse, Numerics("implicit-midpoint", h, 1e-12), held_nodes=(0,)))
     state = simulator.get_state()
-    state.positions[0, 1:, 1] += 2e-5 * np.tile(exact.cantilever_shape(root, np.arange(1, 20) / 19), 2)
+    state.positions[0, 1:, 1] += 2e-5 * np.tile(cantilever_shape(root, np.arange(1, 20) / 19), 2)
     simulator.set_state(state)
     simulator.stroke(np.zeros((1, 2)))  # half a period
     np.testing.assert_allclose(simulator.positions[0, 19, 1], -2e-5, rtol=2e-3)
@@ -244,7 +242,7 @@ def test_strips_touch_at_half_their_width():
 
 
 CLAMP = (0, 1)
-"""Held nodes: the limb is then clamped in the middle of its root edge, see studies/verification/unactuated.py."""
+"""Held nodes: the limb is then clamped in the middle of its root edge, see tests/exact/test_exact.py."""
 
 
 @pytest.mark.parametrize("name", DIFFERENT)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import oracle
+from exact.solutions import published_swim
 from hubs import HUBS, TEN, robot_with
 from momenta import momenta
 from seastar_gym import AlongLimb, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires, Water, relaxation_time
@@ -13,7 +14,6 @@ from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.actuators.actuator import Actuator
 from stages import robot_and_star
 from strokes import finished
-from studies.verification.published import published_swim
 
 CHAPTER = Seastar(discretisation="chapter")
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
