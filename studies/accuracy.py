@@ -544,7 +544,8 @@ def in_table(name: Fidelity, period: float | None = None) -> Setting:
     """Errors of a preset in strokes, or with a time between decisions [s]."""
     certificate = chapters_certificate() if period is None else timed_certificate(period)
     scene = Scene.preset(name) if period is None else replace(Scene.preset(name), actuator=SmaWires())
-    known = certificate and certificate.of(scene)
+    assert certificate is not None
+    known = certificate.of(scene)
     assert known is not None
     return known
 
@@ -627,8 +628,7 @@ def run(options: Options, results: Results) -> None:
         found = {name: exceeding(name, options.fresh) for name in ("fast", "balanced", "accurate")}
         rows = [[name, *(f"{100 * share:.1f} %" for share in each.values())] for name, each in found.items()]
         return show(markdown(["fidelity", *CLASSES], rows), "Sequences that exceed the error of their class")
-    plan, folder = QUICK if options.quick else Plan(), chapter.FOLDER if options.store else results.out
-    Path(folder).mkdir(parents=True, exist_ok=True)
+    plan, folder = QUICK if options.quick else Plan(), chapter.FOLDER if options.store else results.folder
     for period in options.periods:
         if period == 1.0:
             certificate, doubt = in_strokes(plan)
@@ -639,8 +639,11 @@ def run(options: Options, results: Results) -> None:
         else:
             certificate, file = every(period, plan), chapter.file_of(period, folder)
         certificate.save(file)
-        rows = [[each, *map(percent, each.errors.values())] for each in certificate.settings[: len(PRESETS)]]
-        show(markdown(["setting", *certificate.settings[0].errors], rows), f"Written: {file}")
+        shown = [
+            [name, *map(percent, each.errors.values())]
+            for name, each in zip(PRESETS, certificate.settings, strict=False)
+        ]
+        show(markdown(["fidelity", *certificate.settings[0].errors], shown), f"Written: {file}")
     return None
 
 

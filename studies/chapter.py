@@ -153,7 +153,8 @@ def computing_time(scene: Scene, n_robots: int, seconds: float) -> float:
 
     The shortest one counts, because other work of the machine can only add time.
     """
-    simulator, commands, found = Simulator(scene, n_robots, threads=1), np.tile(STRAIGHT, (n_robots, 1)), []
+    simulator, commands = Simulator(scene, n_robots, threads=1), np.tile(STRAIGHT, (n_robots, 1))
+    found: list[float] = []
     simulator.stroke(commands)
     while sum(found) < seconds or len(found) < 3:
         began = clock.perf_counter()
@@ -484,8 +485,7 @@ def pairs_table(results: Mapping[str, Any]) -> str:
 
 def run(options: Options, results: Results) -> None:
     """Swim, write the figures, print the statements, and keep distances and motions."""
-    out, pair_commands = results.out, np.tile(list(PAIRS.values()), (10, 1, 1))
-    out.mkdir(parents=True, exist_ok=True)
+    out, pair_commands = results.folder, np.tile(list(PAIRS.values()), (10, 1, 1))
     shortest, seconds, steps = (1e-3, 0.0, STEPS[3::2]) if options.quick else (0.0, 0.5, STEPS)
 
     def swims(settings: Iterable[Setting], commands: ArrayLike, samples: int) -> list[Swim]:

@@ -62,6 +62,12 @@ class Results(dict[str, Any]):
         if settings is not None:
             self.read()
 
+    @property
+    def folder(self) -> Path:
+        """The folder `out`, which is made."""
+        self.out.mkdir(parents=True, exist_ok=True)
+        return self.out
+
     def read(self) -> None:
         """Take what is in the file, if there is one; ValueError if it has other settings."""
         if self.file is not None and self.file.is_file():

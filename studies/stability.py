@@ -468,13 +468,11 @@ class Options:
 
 def run(options: Options, results: Results) -> None:
     """Run the atlas, draw it, and keep the summary."""
-    sweeps, steps = SWEEPS, STEPS
-    if options.quick:
-        sweeps, steps = tuple(each._replace(values=each.values[-1:]) for each in (SWEEPS[0], SWEEPS[5])), STEPS[7:]
+    sweeps = [each._replace(values=each.values[-1:]) for each in SWEEPS[:2] + SWEEPS[5:7]] if options.quick else SWEEPS
+    steps = STEPS[7::2] if options.quick else STEPS
     cells = atlas(sweeps, steps, options.scheme)
-    results.out.mkdir(parents=True, exist_ok=True)
     for name in ("needs", *NUMBERS):
-        draw(cells, sweeps, steps, options.scheme, results.out / f"stability_{name}.png")
+        draw(cells, sweeps, steps, options.scheme, results.folder / f"stability_{name}.png")
     results.update(scheme=options.scheme, columns=list(SUMMARY), summary=summarise(cells, sweeps))
 
 
