@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 import oracle
 from continuum_oracle import Continuum, ContinuumShaped
+from exact.solutions import published_swim
 from oracle import Array, Star
-from studies.verification.published import published_swim
 from unlike import DIFFERENT, robot_and_star
 
 HUBS = ("opening", "turning")

@@ -100,7 +100,7 @@ def test_every_extra_is_in_the_table_of_the_guide():
     ("folders", "extras"),
     [
         (["seastar_gym"], ["render", "studies", "train", "search", "ray", "slurm", "data", "export", "gpu"]),
-        (["studies"], ["train", "sweep", "test", "data", "mujoco"]),
+        (["studies"], ["train", "sweep", "test", "data"]),
         (["agents", "train.py"], ["train", "rllib"]),
         (["tests"], ["test", "browser", "ray", "learners"]),
         (["docs", "examples"], ["docs", "learners"]),

@@ -1,7 +1,7 @@
 """Certificates of the chapter's robot in the chapter's water, which come with the package.
 
-`python -m studies.accuracy --store` measures that of strokes, and `python -m studies.accuracy.timed --store` those of
-wires that are commanded several times a second, whose settings are the fidelities. Their classes of commands:
+`python -m studies.accuracy --store` measures that of strokes, and those of wires that are commanded several times a
+second, whose settings are the fidelities. Their classes of commands:
 
 random      of strokes: also the straight swim, the four pairs of Fig. 13.8 and the pentagon
 repeated    repetitions of a command and alternations of two, with half as much again for those that were not measured;

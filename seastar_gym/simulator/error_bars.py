@@ -8,8 +8,8 @@ space and of time. The estimate is
 
 With errors of second order, the error is 4/3 of the distance. Undamped limbs ring longer than steps resolve, and errors
 of space and time may cancel in one robot and not in the other, so the factors are larger: those that cover the true
-error in about 95 % of strokes of the robot that needs the largest, as `python -m studies.accuracy.error_bars` measures
-(docs/numerics.md).
+error in about 95 % of strokes of the robot that needs the largest, as `python -m studies.accuracy.error_bars` at commit
+055100c4 measured (docs/numerics.md).
 """
 
 from dataclasses import replace

@@ -17,18 +17,18 @@ from seastar_gym.accuracy.endurance import energy_growth
 from seastar_gym.accuracy.measure import Swims, errors, path_lengths, swim_all
 from seastar_gym.accuracy.measure import swim as swim_commands
 from seastar_gym.scene.numerics import PRESETS, Fidelity
-from studies.accuracy.cases import (
+from studies.accuracy import (
     Cases,
+    Plan,
     gaits,
     joined,
+    measured_over,
     pentagon,
     random_gaits,
     random_sequences,
     slow_sequences,
     swims,
 )
-from studies.accuracy.settings import Plan
-from studies.accuracy.tables import measured_over
 
 NAMES = get_args(Fidelity)
 TABLE = chapters_certificate()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import oracle
+from exact.solutions import fitted_frequency, let_pass, pause
 from seastar_gym import (
     Contact,
     Disc,
@@ -27,8 +28,6 @@ from seastar_gym.model.mesh import make_mesh
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.per_robot import numbers_of, unit_of, with_numbers
 from seastar_gym.scene.section import BROADSIDE, broadside
-from studies.verification.clamped import fitted_frequency
-from studies.verification.unactuated import let_pass, pause
 from unlike import DIFFERENT, robot_and_star
 
 WIDTH, HEIGHT, E = 2e-3, 8e-3, 1e6
@@ -184,7 +183,7 @@ def test_strips_touch_at_half_their_width():
 
 
 CLAMP = (0, 1)
-"""Held nodes: the limb is then clamped in the middle of its root edge, see studies/verification/unactuated.py."""
+"""Held nodes: the limb is then clamped in the middle of its root edge, see tests/exact/test_exact.py."""
 
 
 ACROSS = {"drag_coefficient": 1.3, "tangential_drag_coefficient": 0.2, "added_mass_coefficient": 0.8}

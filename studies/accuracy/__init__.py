@@ -1,1 +1,0 @@
-"""Accuracy and its cost: errors of every scheme and step against converged paths."""

@@ -1,1 +1,0 @@
-"""Comparison with beam theory, exact solutions and published codes."""
