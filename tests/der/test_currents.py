@@ -40,16 +40,14 @@ def test_a_vortex_has_its_circulation_far_from_its_core_and_turns_rigidly_within
         np.testing.assert_allclose(directions[0] * u[1] - directions[1] * u[0], speed, rtol=1e-6)
 
 
-def test_a_grid_is_bilinear_within_and_that_of_the_nearest_edge_beyond():
-    """What is no place is the first point."""
+def test_a_grid_is_bilinear_between_its_samples_and_that_of_the_nearest_edge_beyond():
+    """It is continuous across its cells, and what is no place is the first point."""
     current, inside = grid(bilinear), PLACES[:, np.abs(PLACES[1]) < 0.375]
     np.testing.assert_allclose(current_at(current, inside), bilinear(*inside), rtol=0.0, atol=1e-14)
     outside = np.array([[-9.0, 0.2, 9.0, np.nan], [0.1, 9.0, -9.0, np.nan]])
     nearest = np.array([[-0.5, 0.2, 0.5, -0.5], [0.1, 0.375, -0.375, -0.375]])
     np.testing.assert_allclose(current_at(current, outside), bilinear(*nearest), rtol=0.0, atol=1e-14)
 
-
-def test_a_grid_has_its_samples_and_is_continuous_across_its_cells():
     def rough(x, y):
         return np.sin(40.0 * x + y), np.cos(30.0 * y)
 

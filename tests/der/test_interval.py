@@ -145,16 +145,14 @@ def test_steps_are_halved_and_doubled(monkeypatch, name):
         assert found.size[0] >= found.sizes[-1] and np.all(found.size[1:] == options.get("last_size", EIGHTH))
 
 
-def test_robots_that_have_failed_before_are_left_alone(monkeypatch):
-    found = cover(monkeypatch, "a", alive=~FIRST)
-    assert not found.tried and not found.report[STEPS, 0]
-    np.testing.assert_array_equal(found.arrived, ~FIRST)
-
-
 @pytest.mark.parametrize("outcomes, arrives", [("s", False), ("a", True)])
 def test_a_robot_whose_iterations_are_spent_fails_when_it_is_stuck_and_not_before(monkeypatch, outcomes, arrives):
+    """And one that has failed before is left alone."""
     found = cover(monkeypatch, outcomes, iterations=MOST)
     assert len(found.tried) == 1 and found.arrived[0] == arrives
+    found = cover(monkeypatch, outcomes, alive=~FIRST)
+    assert not found.tried and not found.report[STEPS, 0]
+    np.testing.assert_array_equal(found.arrived, ~FIRST)
 
 
 @pytest.mark.parametrize("largest", 2.0 ** np.linspace(-4.9, -3.1, 8))

@@ -327,11 +327,12 @@ def test_a_term_that_is_not_there_changes_no_bit(name):
     assert kernel.plain(*args) is UNTOUCHED
 
 
-def test_forces_and_flows_that_are_not_there_are_zero():
+def test_forces_and_flows_that_are_not_there_are_zero_and_a_hub_without_any_preference_has_an_orientation():
     x, y = Lanes(3.0), Lanes(1.0)
     assert plain(contact_force.plain(NO_WORK, 1)) == plain(nodal_load.plain(NO_RODS, 2)) == (0.0, 0.0)
     assert plain(load_power.plain(NO_RODS, 2, x, y)) == plain(solver_iterations.plain(NO_WORK)) == 0.0
     assert relative.plain(NO_WORK, 1, x, y) == (x, y)
+    assert [float(plain(one)) for one in orientation.plain(Lanes(0.0), Lanes(0.0))] == [1.0, 0.0]
     for named in ("current", "added_mass", "body"):  # any step may gain energy
         assert may_gain.plain(NO_RODS._replace(**{named: object()}), None, None, None, EVERYONE) is EVERYONE
 
@@ -387,7 +388,3 @@ def test_what_is_natural_follows_the_limbs_linearly_in_time(hub):
     at = begin + 0.3 * (end - begin)
     np.testing.assert_allclose(natural(begin, end, 0.3), natural(at, at, 0.0), rtol=1e-12)
     np.testing.assert_array_equal(natural(begin, end, 0.0), natural(begin, 0.0 * end, 0.0))
-
-
-def test_a_hub_without_any_preference_has_an_orientation():
-    assert [float(plain(one)) for one in orientation.plain(Lanes(0.0), Lanes(0.0))] == [1.0, 0.0]
