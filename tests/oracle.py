@@ -157,11 +157,7 @@ class Star:
     @cached_property
     def edges(self) -> list[tuple[int, int]]:
         """Edges as (tail, head), limb by limb, from the hub outwards."""
-        return [
-            (self.node(limb, i), self.node(limb, i + 1))
-            for limb in range(self.n_limbs)
-            for i in range(self.nodes_per_limb - 1)
-        ]
+        return [(self.node(limb, i), self.node(limb, i + 1)) for limb, i in self.limb_edges]
 
     @cached_property
     def hinges(self) -> list[tuple[int, int, int]]:
@@ -170,23 +166,29 @@ class Star:
         The turning angle goes from sign * edge_a to edge_b. sign is -1 at a turning-angle hub alone, where edge_a is
         walked inwards before edge_b is walked outwards.
         """
-        inner = [
-            (self.edge(limb, i), self.edge(limb, i + 1), 1)
-            for limb in range(self.n_limbs)
-            for i in range(self.nodes_per_limb - 2)
-        ]
+        inner = [(self.edge(limb, i - 1), self.edge(limb, i), 1) for limb, i in self.limb_edges if i > 0]
         sign = {"opening": 1, "turning": -1}[self.hub_hinge]
         hub = [(self.edge(j, 0), self.edge((j + 1) % self.n_limbs, 0), sign) for j in range(self.n_hub_hinges)]
         return inner + hub
 
+    @property
+    def limb_edges(self) -> list[tuple[int, int]]:
+        """(limb, number from the hub) of every edge."""
+        return [(limb, i) for limb in range(self.n_limbs) for i in range(self.nodes_per_limb - 1)]
+
+    @property
+    def edges_before_the_arc(self) -> float:
+        """Edges from the hub to where a curved limb has its direction: its root edge has it."""
+        return 0.0
+
     @cached_property
     def rest(self) -> Array:
-        """Rest positions [m], shape (n_nodes, 2): straight limbs, limb 1 along +x, the others anti-clockwise."""
+        """Rest positions [m], shape (n_nodes, 2): limb 1 leaves along +x, the others anti-clockwise."""
         q = np.zeros((self.n_nodes, 2))
-        for limb in range(self.n_limbs):
-            angle = 2.0 * np.pi * limb / self.n_limbs
-            for i in range(1, self.nodes_per_limb):
-                q[self.node(limb, i)] = i * self.edge_length * np.array([np.cos(angle), np.sin(angle)])
+        for limb, i in self.limb_edges:
+            angle = self.limb_directions[limb] + (i + self.edges_before_the_arc) * self.natural_turns[limb]
+            edge = self.edge_lengths[self.edge(limb, i)] * np.array([np.cos(angle), np.sin(angle)])
+            q[self.node(limb, i + 1)] = q[self.node(limb, i)] + edge
         return q
 
     @cached_property
@@ -311,17 +313,13 @@ class Shaped(Star):
     def _between(self, ends: tuple[float, float], i: float) -> float:
         return ends[0] + (ends[1] - ends[0]) * i / (self.nodes_per_limb - 1)
 
-    @property
-    def _limb_edges(self) -> list[tuple[int, int]]:
-        return [(limb, i) for limb in range(self.n_limbs) for i in range(self.nodes_per_limb - 1)]
-
     @cached_property
     def edge_lengths(self) -> Array:
-        return np.array([self.lengths[limb] / (self.nodes_per_limb - 1) for limb, _ in self._limb_edges])
+        return np.array([self.lengths[limb] / (self.nodes_per_limb - 1) for limb, _ in self.limb_edges])
 
     @cached_property
     def edge_diameters(self) -> Array:
-        return np.array([2.0 * self.radius(limb, i + 0.5) for limb, i in self._limb_edges])
+        return np.array([2.0 * self.radius(limb, i + 0.5) for limb, i in self.limb_edges])
 
     @cached_property
     def edge_areas(self) -> Array:
@@ -329,9 +327,7 @@ class Shaped(Star):
 
     @cached_property
     def edge_EA(self) -> Array:
-        return np.array(
-            [self.modulus(limb, i + 0.5) * np.pi * self.radius(limb, i + 0.5) ** 2 for limb, i in self._limb_edges]
-        )
+        return np.array([self.modulus(limb, i + 0.5) for limb, i in self.limb_edges]) * self.edge_areas
 
     def node_EI(self, limb: int, i: int) -> float:
         return self.modulus(limb, i) * np.pi * self.radius(limb, i) ** 4 / 4.0
@@ -353,7 +349,7 @@ class Shaped(Star):
         """At a hub hinge the compliances of half a root edge of each limb add up."""
         stiffness = []
         for (a, b, _), dl in zip(self.hinges, self.hinge_dl, strict=True):
-            (limb_a, i_a), (limb_b, i_b) = self._limb_edges[a], self._limb_edges[b]
+            (limb_a, i_a), (limb_b, i_b) = self.limb_edges[a], self.limb_edges[b]
             at_a, at_b = (limb_b, i_b) if i_b > 0 else (limb_a, i_a), (limb_b, i_b)
             halves = 0.5 * self.edge_lengths[a] / self.node_EI(*at_a) + 0.5 * self.edge_lengths[b] / self.node_EI(*at_b)
             stiffness.append(dl / halves)
@@ -363,24 +359,10 @@ class Shaped(Star):
     def gaps(self) -> Array:
         return np.diff([*self.directions, 2.0 * np.pi])
 
-    @property
-    def edges_before_the_arc(self) -> float:
-        """Edges from the hub to where a curved limb has its direction: its root edge has it."""
-        return 0.0
-
-    @cached_property
-    def rest(self) -> Array:
-        q = np.zeros((self.n_nodes, 2))
-        for limb, i in self._limb_edges:
-            angle = self.directions[limb] + (i + self.edges_before_the_arc) * self.natural_turns[limb]
-            edge = self.edge_lengths[self.edge(limb, i)] * np.array([np.cos(angle), np.sin(angle)])
-            q[self.node(limb, i + 1)] = q[self.node(limb, i)] + edge
-        return q
-
     def _per_node(self, value: Any) -> Array:
         """What each half edge brings to its node, by the profile at that node."""
         total = np.zeros(self.n_nodes)
-        for (limb, i), (tail, head), length in zip(self._limb_edges, self.edges, self.edge_lengths, strict=True):
+        for (limb, i), (tail, head), length in zip(self.limb_edges, self.edges, self.edge_lengths, strict=True):
             total[tail] += 0.5 * length * value(self.radius(limb, i))
             total[head] += 0.5 * length * value(self.radius(limb, i + 1))
         return total
@@ -392,26 +374,6 @@ class Shaped(Star):
     @cached_property
     def drag(self) -> Array:
         return self._per_node(lambda r: 0.5 * self.fluid_density * self.isotropic_coefficient * 2.0 * r)
-
-
-def stretching_energy(e: Array, EA: float, length: float) -> float:
-    """Stretching energy of one edge [J] (13.2)."""
-    strain = np.linalg.norm(e) / length - 1.0
-    return float(0.5 * EA * strain**2 * length)
-
-
-def stretching_gradient(e: Array, EA: float, length: float) -> Array:
-    """Derivative of (13.2) in the edge vector [N], shape (2,): the axial force along the edge."""
-    size = float(np.linalg.norm(e))
-    return EA * (size / length - 1.0) * e / size
-
-
-def stretching_hessian(e: Array, EA: float, length: float) -> Array:
-    """Second derivative of (13.2) in the edge vector [N/m], shape (2, 2): along the edge, and across it."""
-    size = float(np.linalg.norm(e))
-    strain = size / length - 1.0
-    along = np.outer(e, e) / size**2
-    return EA / length * along + EA * strain / size * (np.eye(2) - along)
 
 
 def direction_gradient(e: Array) -> Array:
@@ -452,52 +414,63 @@ def edge_vectors(star: Star, q: Array) -> list[Array]:
     return [D @ q.ravel() for D in star.differences]
 
 
-def hinge_terms(star: Star, q: Array, delta_psi: ArrayLike) -> Iterator[tuple[int, int, float, float]]:
-    """For every hinge: edge_a, edge_b, phi [rad] and kappa - kappa_bar [1/m]."""
-    e = edge_vectors(star, q)
-    for (a, b, sign), phi_bar, dl in zip(star.hinges, natural_angles(star, delta_psi), star.hinge_dl, strict=True):
+def strains(star: Star, q: Array, curved: bool = True) -> Iterator[tuple[float, float, Array, Array]]:
+    """Of every edge (EA l, eps, grad eps, Hess eps), of every hinge (EI dl, kappa, grad kappa, Hess kappa).
+
+    curved: Whether the Hessians are asked for; else they are empty.
+    """
+    D, e, hessian = star.differences, edge_vectors(star, q), np.zeros(0)
+    for D_e, e_i, EA, length in zip(D, e, star.edge_EA, star.edge_lengths, strict=True):
+        size = float(np.linalg.norm(e_i))
+        along = e_i / size
+        if curved:
+            hessian = D_e.T @ (np.eye(2) - np.outer(along, along)) @ D_e / (size * length)
+        yield EA * length, size / length - 1.0, D_e.T @ along / length, hessian
+    for (a, b, sign), EI, dl in zip(star.hinges, star.hinge_EI, star.hinge_dl, strict=True):
         phi = turning_angle(sign * e[a], e[b])
-        yield a, b, phi, curvature(phi, dl) - curvature(phi_bar, dl)
+        t = np.tan(phi / 2.0)
+        slope = (1.0 + t**2) / dl
+        phi_q = D[b].T @ direction_gradient(e[b]) - D[a].T @ direction_gradient(e[a])
+        if curved:
+            phi_qq = D[b].T @ direction_hessian(e[b]) @ D[b] - D[a].T @ direction_hessian(e[a]) @ D[a]
+            hessian = slope * (phi_qq + t * np.outer(phi_q, phi_q))
+        yield EI * dl, curvature(phi, dl), slope * phi_q, hessian
+
+
+def natural_strains(star: Star, delta_psi: ArrayLike) -> list[float]:
+    """eps of every edge and kappa_bar of every hinge without stress."""
+    hinges = zip(natural_angles(star, delta_psi), star.hinge_dl, strict=True)
+    return [0.0] * len(star.edges) + [curvature(angle, dl) for angle, dl in hinges]
 
 
 def elastic_energy(star: Star, q: Array, delta_psi: ArrayLike) -> float:
     """Total elastic energy [J] (13.14), each hub hinge with the length dl that (13.13) lacks; or that of clamps."""
-    stretching = sum(map(stretching_energy, edge_vectors(star, q), star.edge_EA, star.edge_lengths))
-    hinges = zip(hinge_terms(star, q, delta_psi), star.hinge_EI, star.hinge_dl, strict=True)
-    bending = sum(0.5 * EI * bent**2 * dl for (*_, bent), EI, dl in hinges)
-    return float(stretching + bending + clamp_slopes(star, q, clamp_turns(star, q, delta_psi))[0])
+    springs = zip(strains(star, q, curved=False), natural_strains(star, delta_psi), strict=True)
+    energy = sum(0.5 * stiffness * (strain - natural) ** 2 for (stiffness, strain, *_), natural in springs)
+    return float(energy + clamp_slopes(star, q, clamp_turns(star, q, delta_psi))[0])
 
 
 def elastic_gradient(star: Star, q: Array, delta_psi: ArrayLike) -> Array:
     """Gradient of (13.14) [N], shape (n_nodes, 2): minus the internal force (13.6)."""
-    D, e = star.differences, edge_vectors(star, q)
-    gradient = np.zeros(2 * star.n_nodes)
-    for i in range(len(e)):
-        gradient += D[i].T @ stretching_gradient(e[i], star.edge_EA[i], star.edge_lengths[i])
-    hinges = zip(hinge_terms(star, q, delta_psi), star.hinge_EI, star.hinge_dl, strict=True)
-    for (a, b, phi, bent), EI, dl in hinges:
-        kappa_phi = (1.0 + np.tan(phi / 2.0) ** 2) / dl
-        phi_q = D[b].T @ direction_gradient(e[b]) - D[a].T @ direction_gradient(e[a])
-        gradient += EI * dl * bent * kappa_phi * phi_q
-    gradient += clamp_slopes(star, q, clamp_turns(star, q, delta_psi))[1]
+    springs = zip(strains(star, q, curved=False), natural_strains(star, delta_psi), strict=True)
+    gradient = sum(stiffness * (strain - natural) * slope for (stiffness, strain, slope, _), natural in springs)
+    gradient = gradient + clamp_slopes(star, q, clamp_turns(star, q, delta_psi))[1]
     return gradient.reshape(-1, 2)
 
 
-def elastic_hessian(star: Star, q: Array, delta_psi: ArrayLike) -> Array:
-    """Hessian of (13.14) [N/m], shape (2 n_nodes, 2 n_nodes): the second term of (13.12)."""
-    D, e = star.differences, edge_vectors(star, q)
-    hessian = np.zeros((2 * star.n_nodes, 2 * star.n_nodes))
-    for i in range(len(e)):
-        hessian += D[i].T @ stretching_hessian(e[i], star.edge_EA[i], star.edge_lengths[i]) @ D[i]
-    hinges = zip(hinge_terms(star, q, delta_psi), star.hinge_EI, star.hinge_dl, strict=True)
-    for (a, b, phi, bent), EI, dl in hinges:
-        t = np.tan(phi / 2.0)
-        kappa_phi, kappa_phi_phi = (1.0 + t**2) / dl, t * (1.0 + t**2) / dl
-        phi_q = D[b].T @ direction_gradient(e[b]) - D[a].T @ direction_gradient(e[a])
-        phi_qq = D[b].T @ direction_hessian(e[b]) @ D[b] - D[a].T @ direction_hessian(e[a]) @ D[a]
-        hessian += EI * dl * (kappa_phi**2 + bent * kappa_phi_phi) * np.outer(phi_q, phi_q)
-        hessian += EI * dl * bent * kappa_phi * phi_qq
-    return hessian + clamp_slopes(star, q, clamp_turns(star, q, delta_psi))[2]
+def elastic_hessian(star: Star, q: Array, delta_psi: ArrayLike, convex: bool = False) -> Array:
+    """Hessian of (13.14) [N/m], shape (2 n_nodes, 2 n_nodes): the second term of (13.12).
+
+    convex: Without what may be negative: compression, the curvature of hinges' angles, clamps beyond a quarter turn.
+    """
+    hessian = clamp_slopes(star, q, clamp_turns(star, q, delta_psi), convex)[2]
+    springs = zip(strains(star, q), natural_strains(star, delta_psi), strict=True)
+    for k, ((stiffness, strain, slope, bend), natural) in enumerate(springs):
+        stress = strain - natural
+        if convex:
+            stress = max(stress, 0.0) if k < len(star.edges) else 0.0
+        hessian += stiffness * (np.outer(slope, slope) + stress * bend)
+    return hessian
 
 
 def root_angles(star: Star, q: Array) -> Array:
@@ -523,7 +496,7 @@ def hub_orientation(turns: Array, K: Array) -> float:
     return float(phi)
 
 
-def clamp_slopes(star: Star, q: Array, turns: Array) -> tuple[float, Array, Array]:
+def clamp_slopes(star: Star, q: Array, turns: Array, convex: bool = False) -> tuple[float, Array, Array]:
     """min over Phi of sum K (1 - cos(turn - Phi)) [J] with its gradient, flat, and Hessian, of root edges so turned.
 
     At the least energy Phi adds nothing to the gradient, and takes its Schur complement from the Hessian.
@@ -535,12 +508,16 @@ def clamp_slopes(star: Star, q: Array, turns: Array) -> tuple[float, Array, Arra
     K, e = np.array([clamp.stiffness for clamp in star.clamps]), edge_vectors(star, q)
     off = turns - hub_orientation(turns, K)
     moments, stiffnesses = K * np.sin(off), K * np.cos(off)
+    if convex:
+        stiffnesses = np.maximum(stiffnesses, 0.0)
     coupling = np.zeros(n)
     for clamp, moment, stiffness in zip(star.clamps, moments, stiffnesses, strict=True):
         D = star.differences[clamp.edge]
         theta_q = D.T @ direction_gradient(e[clamp.edge])
         gradient += moment * theta_q
-        hessian += stiffness * np.outer(theta_q, theta_q) + moment * D.T @ direction_hessian(e[clamp.edge]) @ D
+        hessian += stiffness * np.outer(theta_q, theta_q)
+        if not convex:
+            hessian += moment * D.T @ direction_hessian(e[clamp.edge]) @ D
         coupling -= stiffness * theta_q
     energy = float(np.sum(2.0 * K * np.sin(off / 2.0) ** 2))
     return energy, gradient, hessian - np.outer(coupling, coupling) / np.sum(stiffnesses)
@@ -629,23 +606,6 @@ def mass_matrix(star: Star, frozen: Array | None) -> Array:
     return matrix
 
 
-def strains(star: Star, q: Array) -> Iterator[tuple[float, float, Array, Array]]:
-    """Of every edge (EA l, eps, grad eps, Hess eps), of every hinge (EI dl, kappa, grad kappa, Hess kappa)."""
-    D, e = star.differences, edge_vectors(star, q)
-    for D_e, e_i, EA, length in zip(D, e, star.edge_EA, star.edge_lengths, strict=True):
-        size = np.linalg.norm(e_i)
-        along = e_i / size
-        across = (np.eye(2) - np.outer(along, along)) / size
-        yield EA * length, float(size / length - 1.0), D_e.T @ along / length, D_e.T @ across @ D_e / length
-    phis = [phi for _, _, phi, _ in hinge_terms(star, q, np.zeros(star.n_limbs))]
-    for (a, b, sign), phi, EI, dl in zip(star.hinges, phis, star.hinge_EI, star.hinge_dl, strict=True):
-        t = np.tan(phi / 2.0)
-        phi_q = D[b].T @ direction_gradient(e[b]) - D[a].T @ direction_gradient(sign * e[a]) * sign
-        phi_qq = D[b].T @ direction_hessian(e[b]) @ D[b] - D[a].T @ direction_hessian(e[a]) @ D[a]
-        slope = (1.0 + t**2) / dl
-        yield EI * dl, curvature(phi, dl), slope * phi_q, slope * phi_qq + t * slope * np.outer(phi_q, phi_q)
-
-
 def damping_potential(star: Star, q: Array, q_hat: Array, gamma: float) -> tuple[float, Array, Array]:
     """gamma R [J] with its gradient, flat, and Hessian: 1/2 tau EA l (d eps/dt)^2 + 1/2 tau EI dl (d kappa/dt)^2.
 
@@ -678,7 +638,7 @@ def incremental_potential(
     """
     d = ((q - q_hat) / gamma - v_hat).ravel()
     inertia = float(0.5 * d @ mass_matrix(star, frozen) @ d) + damping_potential(star, q, q_hat, gamma)[0]
-    forced = elastic_energy(star, q, delta_psi) - float(np.sum(star.forces * q))
+    forced = elastic_energy(star, q, delta_psi) - gamma * float(star.forces.ravel() @ d)
     return inertia + forced + gamma * drag_potential(star, (q - q_hat) / gamma, frozen)
 
 
@@ -693,11 +653,18 @@ def incremental_gradient(
 
 
 def incremental_hessian(
-    star: Star, q: Array, q_hat: Array, gamma: float, delta_psi: ArrayLike, frozen: Array | None = None
+    star: Star,
+    q: Array,
+    q_hat: Array,
+    gamma: float,
+    delta_psi: ArrayLike,
+    frozen: Array | None = None,
+    convex: bool = False,
 ) -> Array:
-    """Hessian of Phi [N/m], shape (2 n_nodes, 2 n_nodes): the Jacobian J of (13.12)."""
+    """Hessian of Phi [N/m], shape (2 n_nodes, 2 n_nodes): the Jacobian J of (13.12). convex: See elastic_hessian."""
     inertia = mass_matrix(star, frozen) / gamma**2 + damping_potential(star, q, q_hat, gamma)[2]
-    return inertia + elastic_hessian(star, q, delta_psi) - drag_jacobian(star, (q - q_hat) / gamma, frozen) / gamma
+    drag = drag_jacobian(star, (q - q_hat) / gamma, frozen) / gamma
+    return inertia + elastic_hessian(star, q, delta_psi, convex) - drag
 
 
 def descent(hessian: Array, gradient: Array) -> Array:
@@ -811,17 +778,6 @@ def stroke_steps(h: float, heating_time: float = 0.1, cooling_time: float = 0.9)
         for k in range(count):
             steps.append((start + k * h, duration - k * h if k == count - 1 else h))
     return steps
-
-
-def swim(star: Star, command: ArrayLike, n_strokes: int, h: float, scheme: str) -> Array:
-    """Hub positions [m], shape (n_strokes + 1, 2), at rest and after every stroke with the chapter's pulse."""
-    q, v = star.rest, np.zeros_like(star.rest)
-    path = [q[0]]
-    for _ in range(n_strokes):
-        for t, length in stroke_steps(h):
-            q, v = step(star, q, v, t, length, command, scheme)
-        path.append(q[0])
-    return np.array(path)
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,13 @@
-"""Random stages for the kernels and for the oracle."""
+"""Random stages for the kernels, in plain Python, and for the oracle."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import oracle
+from along_oracle import Bent
 from continuum_oracle import Continuum
 from hubs import robot_with
 from oracle import Star
@@ -19,31 +21,13 @@ from seastar_gym.der.stepping.newton import move_along
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.der.terms.damping import freeze_strains
 from seastar_gym.der.terms.fluid import freeze_fluid
+from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.model.rods import make_rods
-from seastar_gym.simd.compilation import entry_point
-from seastar_gym.simd.lanes import N_LANES, any_lane, borrow, load, splat, store
-from seastar_gym.simd.numpy_lanes import Lanes
+from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.numpy_lanes import Lanes, Mask
+from slopes import nodes, plain, rows
 
-
-@entry_point
-def direction(rods, work, q, q_0, gamma, ahead, convex, result):
-    """What the terms keep is taken at work.q, in a step from q_0; the potential and its slopes are those at q."""
-    rods_rows, memory, out = borrow(rods), borrow(work), borrow(result)
-    h, mask = splat(gamma), load(borrow(convex), 0) > 0.0
-    stage = Stage(memory.q_hat, memory.v_hat, h, 1.0 / h, ahead)
-    freeze_fluid(rods_rows, memory)
-    freeze_contact(rods_rows, memory, stage, borrow(q_0))
-    freeze_strains(rods_rows, memory, memory.q_hat)
-    for row in range(q.shape[0]):
-        store(memory.q, row, load(borrow(q), row))
-    if any_lane(mask):
-        phi, decrement, pivot = factorise(rods_rows, memory, stage, mask)
-    else:
-        phi, decrement, pivot = factorise(rods_rows, memory, stage, None)
-    store(out, 0, phi)
-    store(out, 1, solve_coupled(rods_rows, memory, h > 0.0, decrement))
-    store(out, 2, pivot)
-    store(out, 3, move_along(rods_rows, memory, h > 0.0, h < 0.0, splat(1.0)))
+EVERYONE = Mask(np.ones(N_LANES, bool))
 
 
 def robot_and_star(n_limbs=5, nodes_per_limb=10, hub="rigid", fluid=True):
@@ -60,18 +44,17 @@ def rods_of(robot: Seastar, fluid: bool = True) -> Rods:
     return make_rods(Scene(robot=robot, fluid=Water() if fluid else None, actuator=pulse))
 
 
-def turn_limbs(work: Work, star: Star, delta_psi: np.ndarray) -> None:
-    """Fill `work` with what is natural at the hub of limbs turned by delta_psi [rad], shape (N_LANES, n_limbs)."""
-    if star.clamps:
-        natural = np.array([clamp.direction for clamp in star.clamps]) + delta_psi
-        work.hub_direction[:] = np.stack([np.cos(natural), np.sin(natural)], axis=2).reshape(N_LANES, -1).T
-    else:
-        natural = np.array([oracle.natural_angles(star, one)[-star.n_limbs :] for one in delta_psi])
-        work.hub_EI_kappa_bar[:] = star.EI * 2.0 * np.tan(natural.T / 2.0) / star.edge_length
+def turn_limbs(rods: Rods, work: Work, delta_psi: np.ndarray) -> None:
+    """Fill `work` with what is natural of limbs turned by delta_psi [rad], shape (N_LANES, n_limbs) or (n_limbs,)."""
+    turns = np.broadcast_to(delta_psi, (N_LANES, rods.n_limbs)).T.copy()
+    set_natural_hub_angles.plain(rods, work, Actuation(0.0 * turns, turns), Lanes(1.0))
 
 
 class RandomStages:
-    """One random stage per lane, moderate: limbs bent by some degrees, edges strained by some per mille."""
+    """One random stage per lane, moderate: limbs bent by some degrees, edges strained by some per mille.
+
+    A star `Bent` is the robot at rest, whose limbs are then bent by their rotations.
+    """
 
     def __init__(self, star: Star, gamma: float, bend=0.15, stretch=2e-3, speed=0.1, seed=0):
         rng = np.random.default_rng(seed)
@@ -82,14 +65,25 @@ class RandomStages:
         self.q_hat = self.q - gamma * speed * rng.standard_normal(self.q.shape)
         self.delta_psi = rng.uniform(-0.1, 0.1, (N_LANES, star.n_limbs))
 
+    def star_of(self, lane: int) -> tuple[Star, np.ndarray]:
+        """(star, rotations of its limbs at the hub [rad])."""
+        if isinstance(self.star, Bent):
+            return self.star.at(self.delta_psi[lane]), 0.0 * self.delta_psi[lane]
+        return self.star, self.delta_psi[lane]
+
     def data(self, lane: int):
-        return self.q_hat[lane], self.v_hat[lane], self.gamma, self.delta_psi[lane], self.frozen[lane]
+        return self.q_hat[lane], self.v_hat[lane], self.gamma, self.star_of(lane)[1], self.frozen[lane]
 
     def phi(self, lane: int) -> float:
-        return oracle.incremental_potential(self.star, self.q[lane], *self.data(lane))
+        return oracle.incremental_potential(self.star_of(lane)[0], self.q[lane], *self.data(lane))
 
     def gradient(self, lane: int) -> np.ndarray:
-        return oracle.incremental_gradient(self.star, self.q[lane], *self.data(lane))
+        return oracle.incremental_gradient(self.star_of(lane)[0], self.q[lane], *self.data(lane))
+
+    def hessian(self, lane: int, convex: bool = False) -> np.ndarray:
+        q_hat, _, gamma, delta_psi, frozen = self.data(lane)
+        star, _ = self.star_of(lane)
+        return oracle.incremental_hessian(star, self.q[lane], q_hat, gamma, delta_psi, frozen, convex)
 
     def assert_step(self, found: SimpleNamespace, lane: int, hessian: np.ndarray, accuracy: float) -> None:
         """Newton's direction and its decrement are those of a Hessian."""
@@ -99,72 +93,40 @@ class RandomStages:
         size = np.abs(direction).max()
         np.testing.assert_allclose(found.direction[lane], direction, rtol=0.0, atol=accuracy * size)
 
-    def assert_agree(self, found: SimpleNamespace, accuracy: float = 1e-11) -> None:
-        """Potential, Newton's direction and its decrement are those of the oracle in every lane."""
-        for lane in range(N_LANES):
-            assert found.phi[lane] == pytest.approx(self.phi(lane), rel=1e-12)
-            self.assert_step(found, lane, self.hessian(lane), accuracy)
+    def begin(self, rods: Rods, q: np.ndarray | None = None, q_0=None, ahead=False, again=False) -> tuple[Work, Stage]:
+        """(work, stage): what the terms keep is taken at the frozen places, in a step from q_0; the iterate is at q."""
+        work, gamma = make_work(rods, 1, again), Lanes(self.gamma)
+        work.q[:], work.q_hat[:], work.v_hat[:] = map(rows, (self.frozen, self.q_hat, self.v_hat))
+        turn_limbs(rods, work, self.delta_psi)
+        stage = Stage(work.q_hat, work.v_hat, gamma, 1.0 / gamma, ahead)
+        freeze_fluid.plain(rods, work)
+        freeze_contact.plain(rods, work, stage, rows(self.q if q_0 is None else q_0))
+        freeze_strains.plain(rods, work, work.q_hat)
+        work.q[:] = rows(self.q if q is None else q)
+        return work, stage
 
-    def hessian(self, lane: int) -> np.ndarray:
-        q_hat, _, gamma, delta_psi, frozen = self.data(lane)
-        return oracle.incremental_hessian(self.star, self.q[lane], q_hat, gamma, delta_psi, frozen)
-
-    def convex_hessian(self, lane: int) -> np.ndarray:
-        """The Hessian without what may be negative: compression, curvature of the angles, bending's second part."""
-        star, q = self.star, self.q[lane]
-        hessian = oracle.inertia_matrix(star) / self.gamma**2
-        hessian -= oracle.drag_jacobian(star, (q - self.q_hat[lane]) / self.gamma) / self.gamma
-        D, edges = star.differences, oracle.edge_vectors(star, q)
-        for D_e, e, EA, length in zip(D, edges, star.edge_EA, star.edge_lengths, strict=True):
-            size = np.linalg.norm(e)
-            along = np.outer(e, e) / size**2
-            pull = max(EA * (size / length - 1.0), 0.0) / size
-            hessian += D_e.T @ (EA / length * along + pull * (np.eye(2) - along)) @ D_e
-        hinges = zip(oracle.hinge_terms(star, q, self.delta_psi[lane]), star.hinge_EI, star.hinge_dl, strict=True)
-        for (a, b, phi, _), EI, dl in hinges:
-            kappa_q = D[b].T @ oracle.direction_gradient(edges[b]) - D[a].T @ oracle.direction_gradient(edges[a])
-            kappa_q *= (1.0 + np.tan(phi / 2.0) ** 2) / dl
-            hessian += EI * dl * np.outer(kappa_q, kappa_q)
-        return hessian + self.convex_clamps(lane) if star.clamps else hessian
-
-    def convex_clamps(self, lane: int) -> np.ndarray:
-        """Clamps without the curvature of angles, and those turned by more than a quarter without stiffness."""
-        star, edges = self.star, oracle.edge_vectors(self.star, self.q[lane])
-        turns = oracle.clamp_turns(star, self.q[lane], self.delta_psi[lane])
-        K = np.array([clamp.stiffness for clamp in star.clamps])
-        C = np.maximum(K * np.cos(turns - oracle.hub_orientation(turns, K)), 0.0)
-        roots = [clamp.edge for clamp in star.clamps]
-        theta_q = np.array([star.differences[e].T @ oracle.direction_gradient(edges[e]) for e in roots])
-        return theta_q.T @ (np.diag(C) - np.outer(C, C) / C.sum()) @ theta_q
-
-    def run(self, rods: Rods, convex=0.0, q=None, q_0=None, ahead=False):
+    def run(self, rods: Rods, convex: Mask | None = None, **places: Any) -> SimpleNamespace:
         """Phi, decrement and pivot per lane, and the Newton direction, shape (N_LANES, n_nodes, 2)."""
-        star, q = self.star, self.q if q is None else q
-        work = make_work(rods, 1)
-        for rows, nodes in ((work.q, self.frozen), (work.q_hat, self.q_hat), (work.v_hat, self.v_hat)):
-            rows[:] = nodes.reshape(N_LANES, -1).T
-        turn_limbs(work, star, self.delta_psi)
-        result = np.zeros((4, N_LANES))
-        rows, rows_0 = (np.ascontiguousarray(x.reshape(N_LANES, -1).T) for x in (q, self.q if q_0 is None else q_0))
-        direction(rods, work, rows, rows_0, self.gamma, ahead, np.full((1, N_LANES), convex), result)
+        work, stage = self.begin(rods, **places)
+        before = work.q.copy()
+        phi, decrement, pivot = factorise.plain(rods, work, stage, convex)
+        decrement = solve_coupled.plain(rods, work, EVERYONE, decrement)
+        largest = move_along.plain(rods, work, EVERYONE, None, Lanes(1.0))
+        phi, decrement, pivot, largest = (np.broadcast_to(plain(x), N_LANES) for x in (phi, decrement, pivot, largest))
         return SimpleNamespace(
-            phi=result[0],
-            decrement=result[1],
-            pivot=result[2],
-            largest=result[3],
-            direction=-work.step.T.reshape(N_LANES, -1, 2),
-            moved=work.q.T.reshape(N_LANES, -1, 2) - q,
-        )
+            phi=phi, decrement=decrement, pivot=pivot, largest=largest, direction=-nodes(work.step),
+            moved=nodes(work.q - before),
+        )  # fmt: skip
 
 
 def random_shape(star: Star, bend: float, stretch: float, rng: np.random.Generator) -> np.ndarray:
     """Limbs whose hinges turn by about `bend` [rad] and whose edges are strained by about `stretch`."""
     q = np.zeros((star.n_nodes, 2)) + 0.05 * rng.standard_normal(2)
-    for limb in range(star.n_limbs):
-        angle = 2.0 * np.pi * limb / star.n_limbs
+    for limb, direction in enumerate(star.limb_directions):
+        angle = direction
         for i in range(1, star.nodes_per_limb):
-            angle += bend * rng.standard_normal()
-            length = star.edge_length * (1.0 + stretch * rng.standard_normal())
+            angle += bend * rng.standard_normal() + (i > 1) * star.natural_turns[limb]
+            length = star.edge_lengths[star.edge(limb, i - 1)] * (1.0 + stretch * rng.standard_normal())
             step = length * np.array([np.cos(angle), np.sin(angle)])
             q[star.node(limb, i)] = q[star.node(limb, i - 1)] + step
     return q
@@ -187,13 +149,15 @@ def unknowns(rods: Rods, rows: np.ndarray) -> np.ndarray:
     return np.append(rows[:n, 0], rows[n, 0] / rods.body.scale[0])
 
 
-def begun_on_body(rods: Rods, directions: np.ndarray, stage: SimpleNamespace, ahead: bool) -> tuple[Work, Stage]:
+def begun_on_body(
+    rods: Rods, directions: np.ndarray, stage: SimpleNamespace, ahead: bool, n_stages: int = 1
+) -> tuple[Work, Stage]:
     """(work, stage) of kernels where the first guess of a stage is frozen, and the iterate is at its u.
 
     stage: u, u_hat, v_hat and first, unknowns; gamma [s]; delta_psi, rotations of limbs [rad]. directions: Of limbs at
         rest [rad].
     """
-    work, gamma = make_work(rods, 1), Lanes(stage.gamma)
+    work, gamma = make_work(rods, n_stages), Lanes(stage.gamma)
     q_hat, v_hat = unknown_rows(rods, stage.u_hat), unknown_rows(rods, stage.v_hat)
     move_roots.plain(rods, q_hat, v_hat)
     begun = Stage(q_hat, v_hat, gamma, 1.0 / gamma, ahead)

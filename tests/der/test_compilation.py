@@ -83,23 +83,10 @@ def test_an_edited_kernel_never_runs_from_the_cache_and_an_unchanged_one_always_
     assert copy.run() == [energy, 1, 0]
 
 
-def test_a_kernel_is_compiled_before_any_entry_point_is(copy):
-    """As for a device."""
-    code = "from seastar_gym.der.geometry import convex_part as part\nfrom seastar_gym.simd.lanes import lanes, mask\n"
-    assert copy.run(code + "part.compile((mask, lanes)); print(len(part.overloads))") == [1]
-
-
 def test_code_of_another_lane_width_is_another_code(copy):
     results = [copy.run(SEASTAR_LANES=width) for width in ("2", "4")]
     assert [misses for _, _, misses in results] == [1, 1]
     assert len({energy for energy, _, _ in results}) == 1
-
-
-def test_without_a_folder_to_write_to_the_kernels_are_compiled_anew(copy):
-    copy.cache.write_text("a file where the folder should be")
-    home = copy.folder / "home"
-    home.write_text("and another one")
-    assert copy.run(HOME=str(home), XDG_CACHE_HOME=str(home))[0] == pytest.approx(STRETCHED, rel=1e-9)
 
 
 def test_an_edited_entry_point_outside_the_package_does_not_run_from_the_cache_either(copy):
@@ -244,14 +231,6 @@ def test_a_folder_that_is_lost_within_a_process_does_no_harm(fresh):
     assert number(1.0) == 2.5
 
 
-def test_a_real_kernel_whose_files_are_damaged_gives_the_same_bits(copy):
-    energy, *_ = copy.run()
-    for file, damage in zip(copy.cache.rglob("*energies*"), ("cut off", "garbage"), strict=True):
-        DAMAGE[damage](file)
-    assert copy.run() == [energy, 0, 1]
-    assert copy.run() == [energy, 1, 0]
-
-
 # Whoever waits is told
 
 NUMBERS = """
@@ -273,21 +252,16 @@ def said(tmp_path: Path, cache: str, before: str = "") -> str:
 
 
 def test_the_first_compilation_says_so_once_wherever_it_runs(tmp_path):
+    """Unless logging is told otherwise; where no code can be kept it says in every process what to do."""
+    silent = "import logging; logging.getLogger('seastar_gym').setLevel('ERROR')\n"
+    assert said(tmp_path, "silent", silent) == ""
     first = said(tmp_path, "cache")
-    assert first.count("\n") == 1 and "compiles" in first and "10 to 30 s" in first
+    assert first.count("\n") == 1 and "compiles" in first
     assert said(tmp_path, "cache") == ""
-
-
-def test_where_no_code_can_be_kept_the_sentence_says_what_to_do(tmp_path):
     (tmp_path / "file").write_text("")
     home = f"import os; os.environ.update(dict.fromkeys(('HOME', 'XDG_CACHE_HOME'), {str(tmp_path / 'file')!r}))\n"
     for _ in range(2):
-        assert said(tmp_path, "file", home).endswith("set NUMBA_CACHE_DIR.\n")
-
-
-def test_logging_decides_where_the_sentence_goes(tmp_path):
-    silent = "import logging; logging.getLogger('seastar_gym').setLevel('ERROR')\n"
-    assert said(tmp_path, "cache", silent) == ""
+        assert "set NUMBA_CACHE_DIR" in said(tmp_path, "file", home)
 
 
 def test_the_sentence_needs_no_standard_error(fresh, monkeypatch):
@@ -302,12 +276,9 @@ def test_the_sentence_needs_no_standard_error(fresh, monkeypatch):
 
 def test_digest_covers_every_file_that_defines_kernels():
     sources = kernel_sources()
-    assert set(sources) >= set((PACKAGE / "der").glob("*.py"))
-    defining = {
-        path for path in PACKAGE.rglob("*.py") if "@kernel" in path.read_text() or "@entry_point" in path.read_text()
-    }
-    assert PACKAGE / "envs" / "observation.py" in defining
-    assert defining <= set(sources)
+    assert set(sources) >= {*(PACKAGE / "der").glob("*.py"), PACKAGE / "envs" / "observation.py"}
+    texts = {path: path.read_text() for path in PACKAGE.rglob("*.py")}
+    assert {path for path, text in texts.items() if "@kernel" in text or "@entry_point" in text} <= set(sources)
 
 
 @pytest.mark.parametrize("change", ["content", "name", "new file", "numba", "numpy", "lanes"])

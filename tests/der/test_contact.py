@@ -1,10 +1,10 @@
-"""Contact between limbs against the dense oracle: who touches whom, energy, forces, and the step with the Hessian."""
+"""Contact between limbs: energy, forces and step are the oracle's; who touches whom, and who came to cross whom."""
 
 import numpy as np
 import pytest
 
 import oracle
-from hubs import HUBS, TEN
+from hubs import HUBS
 from oracle import Star
 from seastar_gym import Contact, Scene, Seastar, SmaPulse
 from seastar_gym.der.contact.broad_phase import freeze_contact, share_of_edge
@@ -13,9 +13,6 @@ from seastar_gym.der.contact.contact import (
     STIFFNESS,
     add_contact,
     add_contact_energy,
-    add_gap_gradient,
-    contact_force,
-    gap,
     members,
     n_listed,
     not_touching,
@@ -31,12 +28,14 @@ from seastar_gym.der.contact.crossing import deepest_overlap, edges_cross, on_th
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import make_work
+from seastar_gym.der.stepping.guard import add_held_energy
+from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from slopes import NO_RODS, NO_WORK, nodes, plain, rotated, rows, slope
-from stages import RandomStages, robot_and_star
+from slopes import nodes, plain, rotated, rows
+from stages import EVERYONE, RandomStages, robot_and_star
 from touching import touching_limbs
 
 ANGLE = 0.3
@@ -53,8 +52,7 @@ def folded(star: Star, stages: RandomStages, turn: float) -> np.ndarray:
         nodes = [star.node(limb, i) for i in range(1, star.nodes_per_limb)]
         # Of an odd number the last limb meets the first, in the order of elimination the ends of the ring.
         angle = turn if (limb + star.n_limbs % 2) % star.n_limbs % 2 == 0 else -turn
-        rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        q[:, nodes] = q[:, :1] + (q[:, nodes] - q[:, :1]) @ rotation.T
+        q[:, nodes] = q[:, :1] + rotated(q[:, nodes] - q[:, :1], angle)
     return q
 
 
@@ -125,25 +123,8 @@ def test_a_tip_at_a_root_edge_of_its_neighbour_is_met(nodes_per_limb, side):
 # Contact between limbs: its forces are the slopes of its energy, cancel, and come from those alone that touch.
 
 
-EVERYONE = Mask(np.ones(N_LANES, bool))
-
-
-def energy(touching, q=None) -> np.ndarray:
-    work, own = touching.work, touching.work.q.copy()
-    work.q[:] = own if q is None else q
-    found = plain(add_contact.plain(touching.rods, work, touching.stage, None, Lanes(0.0)))
-    work.q[:] = own
-    return found
-
-
-@pytest.mark.parametrize("ahead", [False, True])
-def test_forces_are_the_slopes_of_the_energy(ahead):
-    touching = touching_limbs(ahead)
-    assert np.all(energy(touching) > 0.0)
-    force = touching.work.contact.force.copy()
-    q, direction = touching.work.q.copy(), np.random.default_rng(1).standard_normal(force.shape)
-    along = slope(lambda s: energy(touching, q + s * direction), 0.0, 1e-7)
-    np.testing.assert_allclose(-(force * direction).sum(axis=0), along, rtol=1e-5)
+def energy(touching) -> np.ndarray:
+    return plain(add_contact.plain(touching.rods, touching.work, touching.stage, None, Lanes(0.0)))
 
 
 def test_forces_neither_push_nor_turn_the_robot():
@@ -193,55 +174,16 @@ def test_edges_of_a_hinge_share_a_node_and_a_limb_ends_beyond_its_ends():
     assert [share(0, 0.0), share(0, -0.125), share(0, -0.25)] == pytest.approx([1.0, 0.5, 0.0])
 
 
-def test_a_gap_is_linear_and_its_gradient_what_is_added_to_rows():
+def test_limbs_that_press_each_other_store_the_same_where_a_stage_asks_and_where_a_state_ends():
+    """Without looking ahead; and it counts at the end of steps whose scheme gives it back."""
     touching = touching_limbs()
-    rods, work = touching.rods, touching.work
-    direction = np.random.default_rng(2).standard_normal(work.q.shape)
-    assert n_listed.plain(work) > 0
-    for slot in range(n_listed.plain(work)):
-        gradient = np.zeros_like(work.q)
-        add_gap_gradient.plain(rods, work, slot, Lanes(1.0), gradient)
-        one, two = (plain(gap.plain(rods, work, slot, work.q + share * direction)) for share in (1.0, 2.0))
-        start = plain(gap.plain(rods, work, slot, work.q))
-        np.testing.assert_allclose(two - start, 2.0 * (one - start), rtol=1e-9, atol=1e-12)
-        np.testing.assert_allclose(one - start, (gradient * direction).sum(axis=0), rtol=1e-9, atol=1e-12)
-        i, j, k = members.plain(rods, work, slot)
-        assert len({i, j, k}) == 3 and set(np.flatnonzero(gradient.any(axis=1)) // 2) <= {i, j, k}
-
-
-def test_robots_apart_have_no_forces_whoever_touches_beside_them():
-    touching = touching_limbs(apart=2)
-    found = energy(touching)
-    assert not found[:2].any() and np.all(found[2:] > 0.0)
-    assert not touching.work.contact.force[:, :2].any()
-    np.testing.assert_array_equal(plain(not_touching.plain(touching.work, EVERYONE)), np.arange(N_LANES) < 2)
-
-
-def test_where_the_stage_is_asked_and_where_the_state_ends_is_the_same_energy_without_looking_ahead():
-    touching = touching_limbs()
-    args = touching.rods, touching.work, touching.work.q, Lanes(0.0)
-    np.testing.assert_allclose(plain(add_contact_energy.plain(*args)), energy(touching), rtol=1e-9)
-
-
-def test_edges_cross_where_each_cuts_the_other_and_not_at_their_ends():
-    rods = make_rods(Scene(TEN))
-    q = np.zeros((46, 2))
-    q[1], q[2], q[10] = [0.0, 0.0], [1.0, 0.0], [0.5, 1.0]
-    for y, crossing in ((-0.5, True), (0.5, False), (0.0, False)):
-        q[11] = [0.5, y]
-        found = plain(edges_cross.plain(rods, rows(q), 1, 10))
-        assert np.all(found == crossing)
-
-
-def test_without_contact_nothing_is_added_nobody_is_left_out_and_the_decrement_is_the_stars():
-    assert add_contact.plain(NO_RODS, NO_WORK, None, None, 3.0) == 3.0
-    assert add_contact_energy.plain(NO_RODS, NO_WORK, None, 3.0) == 3.0
-    assert plain(contact_force.plain(NO_WORK, 1)) == (0.0, 0.0)
-    assert not_touching.plain(NO_WORK, EVERYONE) is EVERYONE
-    assert without_new_crossings.plain(NO_RODS, None, None, None, EVERYONE) is EVERYONE
-    one = Lanes(1.0)
-    assert solve_coupled.plain(None, NO_WORK, None, one) is one
-    assert not plain(solver_iterations.plain(NO_WORK)).any()
+    args = touching.rods, touching.work
+    stored = plain(add_contact_energy.plain(*args, touching.work.q, Lanes(0.0)))
+    np.testing.assert_allclose(stored, energy(touching), rtol=1e-9)
+    assert np.all(stored > 0.0)
+    for name, scheme in SCHEMES.items():
+        found = plain(add_held_energy.plain(*args, scheme, touching.work.q, Lanes(0.0)))
+        np.testing.assert_array_equal(found, stored if name == "implicit-euler" else 0.0)
 
 
 # Limbs that came to cross: told from limbs that touch, that part, or that crossed before.
@@ -281,11 +223,8 @@ def test_limbs_that_came_to_cross_are_seen_in_their_own_robot_alone(limbs, away,
     assert not found(q_1, REST + away, ahead, robots=ODD).any()
 
 
-def test_limbs_that_crossed_before_may_part_again():
+def test_limbs_that_crossed_before_may_part_again_and_robots_whose_pairs_were_not_all_listed_are_left_out():
     assert found(crossed(), crossed()).all() and found(REST, crossed()).all()
-
-
-def test_robots_whose_pairs_were_not_all_listed_are_left_out():
     np.testing.assert_array_equal(found(REST, REST, missed=ODD), ~ODD)
 
 
@@ -303,7 +242,9 @@ def test_limbs_are_on_their_sides_of_a_line_across_the_difference_of_their_roots
 
 
 def test_edges_cross_where_the_lines_through_them_meet_within_both():
+    """And not at their ends."""
     q = RNG.standard_normal((40, N_LANES, ROBOT.n_nodes, 2))
+    q[0, :, [1, 2, 5, 6]] = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0], [0.5, 0.0]])[:, None]
     for each in q:
         seen = plain(edges_cross.plain(RODS, rows(each), 1, 5))
         for lane in range(N_LANES):
@@ -331,7 +272,7 @@ def test_the_deepest_overlap_is_the_depth_over_the_distance_at_which_limbs_touch
 
 
 def steps(touching, robots=EVERYONE):
-    """(the star's step, the coupled one, their decrements)."""
+    """(the star's step, the coupled one, their decrements) [m], [J]."""
     rods, work = touching.rods, touching.work
     _, alone, _ = factorise.plain(rods, work, touching.stage, None)
     star = np.zeros_like(work.q)
@@ -341,61 +282,34 @@ def steps(touching, robots=EVERYONE):
 
 
 @pytest.mark.parametrize("discretisation", ["chapter", "continuum"])
-def test_the_step_solves_the_star_and_contact_together(discretisation):
-    """H x + C K C^T x = H x_star: what contact takes, solved by the star, is where the two steps differ."""
+def test_the_step_solves_the_star_and_contact_together_and_derivatives_do_to_rounding(discretisation):
+    """H x + C K C^T x = H x_star: what contact takes, solved by the star, is where the two differ."""
     touching = touching_limbs(discretisation=discretisation)
-    star, x, _, _ = steps(touching)
-    taken, moved = np.zeros_like(x), np.zeros_like(x)
-    add_contact_product.plain(touching.rods, touching.work, x, -1.0, taken)
-    solve_again.plain(touching.rods, touching.work, taken, moved)
-    assert np.abs(x - star).max() > 1e-2 * np.abs(star).max()
-    np.testing.assert_allclose(x - star, moved, rtol=0.0, atol=1e-5 * np.abs(moved).max())
-    assert not touching.work.contact.missed.any()
-
-
-def test_derivatives_are_solved_to_rounding():
-    touching = touching_limbs()
     rods, work = touching.rods, touching.work
     star, x, _, _ = steps(touching)
-    iterations, found = plain(solver_iterations.plain(work)), star.copy()
-    solve_again_coupled.plain(rods, work, found)
-    taken, moved = np.zeros_like(x), np.zeros_like(x)
-    add_contact_product.plain(rods, work, found, -1.0, taken)
-    solve_again.plain(rods, work, taken, moved)
-    np.testing.assert_allclose(found - star, moved, rtol=0.0, atol=1e-9 * np.abs(moved).max())
-    np.testing.assert_allclose(found, x, rtol=0.0, atol=1e-4 * np.abs(x).max())
+    iterations, derivatives = plain(solver_iterations.plain(work)), star.copy()
+    solve_again_coupled.plain(rods, work, derivatives)
+    assert np.abs(x - star).max() > 1e-2 * np.abs(star).max()
+    for found, close in ((x, 1e-5), (derivatives, 1e-9)):
+        taken, moved = np.zeros_like(x), np.zeros_like(x)
+        add_contact_product.plain(rods, work, found, -1.0, taken)
+        solve_again.plain(rods, work, taken, moved)
+        np.testing.assert_allclose(found - star, moved, rtol=0.0, atol=close * np.abs(moved).max())
+    assert not work.contact.missed.any()
     np.testing.assert_array_equal(plain(solver_iterations.plain(work)), iterations)
 
 
-def test_contact_makes_the_matrix_stiffer_so_its_decrement_is_smaller():
-    _, _, alone, together = steps(touching_limbs())
-    assert np.all((together > 0.0) & (together < alone))
-
-
 def test_robots_that_do_not_touch_or_are_not_asked_keep_the_stars_step_to_the_last_bit():
+    """Whoever touches beside them."""
     asked = np.arange(N_LANES) != N_LANES - 1
-    star, x, alone, together = steps(touching_limbs(apart=1), Mask(asked))
+    touching = touching_limbs(apart=1)
+    star, x, alone, together = steps(touching, Mask(asked))
+    assert not touching.work.contact.force[:, 0].any()
+    np.testing.assert_array_equal(plain(not_touching.plain(touching.work, EVERYONE)), np.arange(N_LANES) == 0)
     kept = [0, N_LANES - 1]
     np.testing.assert_array_equal(x[:, kept], star[:, kept])
     np.testing.assert_array_equal(together[kept], alone[kept])
     assert np.all(together[1:-1] != alone[1:-1])
-
-
-def test_contacts_matrix_is_symmetric_and_never_negative():
-    touching = touching_limbs()
-    steps(touching)
-    a, b = np.random.default_rng(0).standard_normal((2, *touching.work.q.shape))
-    of_a, of_b = np.zeros_like(a), np.zeros_like(b)
-    add_contact_product.plain(touching.rods, touching.work, a, 1.0, of_a)
-    add_contact_product.plain(touching.rods, touching.work, b, 1.0, of_b)
-    np.testing.assert_allclose((a * of_b).sum(axis=0), (b * of_a).sum(axis=0), rtol=1e-9)
-    assert np.all((a * of_a).sum(axis=0) > 0.0)
-
-
-def test_dot_is_the_product_of_rows_robot_by_robot():
-    touching = touching_limbs()
-    a, b = np.random.default_rng(0).standard_normal((2, *touching.work.q.shape))
-    np.testing.assert_allclose(plain(dot.plain(touching.rods, a, b)), (a * b).sum(axis=0), rtol=1e-12)
 
 
 def test_few_iterations_solve_it_as_exactly_as_a_step_of_5_ms_allows(monkeypatch):

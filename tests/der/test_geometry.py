@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seastar_gym.der.geometry import edge_geometry, half_angle, tangent
+from seastar_gym.der.geometry import edge_geometry, half_angle, rotation, tangent
 from seastar_gym.simd.numpy_lanes import Lanes
 from slopes import gradient, plain
 
@@ -47,15 +47,6 @@ def test_half_angle_is_the_tangent_of_half_the_angle_from_the_first_edge_or_its_
     np.testing.assert_allclose(np.arctan(t), 0.5 * angle(side * EDGES, OTHERS), rtol=0.0, atol=1e-12)
 
 
-def test_half_angle_knows_no_length_and_changes_its_sign_in_a_mirror():
-    def t(a, b):
-        return plain(half_angle.plain(geometry(a), geometry(b), 1.0))
-
-    mirror = np.array([[1.0], [-1.0]])
-    np.testing.assert_allclose(t(3.0 * EDGES, 0.1 * OTHERS), t(EDGES, OTHERS), rtol=1e-9)
-    np.testing.assert_allclose(t(mirror * EDGES, mirror * OTHERS), -t(EDGES, OTHERS), rtol=1e-9)
-
-
 # The tangent
 
 
@@ -83,3 +74,10 @@ def test_tangent_is_that_of_an_angle_a_few_units_in_the_last_place_away_up_to_th
 def test_tangent_is_odd():
     x = np.linspace(0.0, 1.5, 1001)
     np.testing.assert_array_equal(tangents(-x), -tangents(x))
+
+
+@pytest.mark.parametrize("turns", [0.0, 1e-9, 0.3, 3.1, 3.2, -7.0, 100.0, -1e4])
+def test_rotations_are_those_of_any_angle(turns):
+    c, s = plain(rotation.plain(Lanes(np.array([turns]))))
+    assert c[0] == pytest.approx(np.cos(turns), abs=1e-12) and s[0] == pytest.approx(np.sin(turns), abs=1e-12)
+    assert c[0] ** 2 + s[0] ** 2 == pytest.approx(1.0, abs=1e-15)

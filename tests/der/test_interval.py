@@ -8,7 +8,7 @@ import pytest
 
 from seastar_gym import Scene, Seastar
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.interval import FALLBACK_AFTER, cover_interval, note_hub_angles
+from seastar_gym.der.stepping.interval import cover_interval, note_hub_angles
 from seastar_gym.der.stepping.report import (
     BACKTRACKS,
     COVERED,
@@ -24,21 +24,11 @@ from seastar_gym.der.stepping.report import (
 from seastar_gym.der.stepping.scales import Limits
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import LAST_STEP, SIZE, memory_row
-from seastar_gym.der.stepping.steps import (
-    MOST_HALVINGS,
-    SMALLEST_FRACTION,
-    TURNABLE,
-    Step,
-    end_guarded_step,
-    solve_stages,
-    try_step,
-)
-from seastar_gym.der.stepping.stroke import advance
+from seastar_gym.der.stepping.steps import Step, end_guarded_step, solve_stages, try_step
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from seastar_gym.simd.plain import plain_kernels
 from slopes import plain, rotated, rows
 
 ROBOT = Seastar(5, 3)
@@ -62,7 +52,7 @@ class Script:
     """
 
     def __init__(self, outcomes: str | Callable[[SimpleNamespace], float], iterations: float = 0.0):
-        self.outcomes, self.iterations, self.tried = outcomes, iterations, []
+        self.outcomes, self.iterations, self.tried, self.accepted = outcomes, iterations, [], []
 
     def __call__(self, rods, work, tableau, actuation, q, v, a, step, going, limits, report):
         going = going.robots
@@ -76,6 +66,7 @@ class Script:
             )  # fmt: skip
             good[0], error[0] = self.outcome()
             accepted[0] = good[0] and error[0] <= LIMIT
+            self.accepted.append(bool(accepted[0]))
         report[NEWTON_ITERATIONS] += self.iterations * going
         return Mask(good), Mask(accepted), Lanes(error)
 
@@ -97,95 +88,75 @@ def cover(monkeypatch, outcomes, adaptive=False, last_size=0.0, iterations=0.0, 
     args = RODS, make_work(RODS, 1), MIDPOINT, EULER, None, rows(ROBOT.nodes()), None, a, DURATION
     arrived = lanes(cover_interval.plain(*args, Mask(alive), limits, report))
     return SimpleNamespace(
-        tried=script.tried, arrived=arrived, report=report, sizes=[step.size for step in script.tried],
+        tried=script.tried, accepted=script.accepted, arrived=arrived, report=report,
+        sizes=[step.size for step in script.tried], halvings=[round(step.most / 20.0) - 1 for step in script.tried],
         size=a[memory_row.plain(RODS, MIDPOINT, SIZE)],
     )  # fmt: skip
 
 
-def test_robots_without_trouble_take_one_step(monkeypatch):
-    found = cover(monkeypatch, "a")
-    (step,) = found.tried
-    assert (step.start, step.size, step.h, step.most, step.retrying) == (0.0, 1.0, DURATION, 20.0, False)
-    assert found.arrived.all() and np.all(found.report[STEPS] == 1.0) and not found.report[HALVINGS].any()
-    np.testing.assert_allclose(found.report[COVERED], DURATION)
+EIGHTH, SIXTEENTH, SHORTEST = 2.0**-3, 2.0**-4, 2.0**-12
+STORIES = {
+    "no trouble": ("a", {}, [1.0]),
+    "stuck: halves its step and covers the rest in small ones": ("ssa", {}, [1.0, 0.5] + 4 * [0.25]),
+    "stuck at the shortest step: fails": ("s", {}, [0.5**k for k in range(13)]),
+    "adapted: begins with an eighth and doubles on the grid of its own size": ("+", {}, [EIGHTH, EIGHTH, 0.25, 0.5]),
+    "adapted: goes on with the last step's length": ("a", {"last_size": 0.5}, [0.5, 0.5]),
+    "adapted: an error that is too large halves it": ("ra", {"last_size": 0.5}, [0.5] + 4 * [0.25]),
+    "adapted: doubles four accepted steps after a halving": (
+        "s+", {"last_size": SIXTEENTH}, [SIXTEENTH] + 4 * [SIXTEENTH / 2] + [SIXTEENTH],
+    ),
+    "adapted: the next doubling waits twice as long": (
+        "ss+", {"last_size": EIGHTH}, [EIGHTH, SIXTEENTH] + 4 * [SIXTEENTH / 2] + 8 * [SIXTEENTH] + [EIGHTH],
+    ),
+    "adapted: and so after the next halving": (
+        "s++++s+", {"last_size": SIXTEENTH},
+        [SIXTEENTH] + 4 * [SIXTEENTH / 2] + [SIXTEENTH] + 8 * [SIXTEENTH / 2] + [SIXTEENTH],
+    ),
+    "adapted: no doubling leads back from the fallback": (
+        "ssss+", {"last_size": 1.0}, [1.0, 0.5, 0.25, EIGHTH] + 16 * [SIXTEENTH],
+    ),
+    "adapted: stuck at the shortest step, it tries again": (
+        "ss" + 100 * "a", {"last_size": SHORTEST}, 4 * [SHORTEST],
+    ),
+}  # fmt: skip
+"""Outcomes of robot 0's steps, and the sizes of the first ones that it takes, as shares of the interval."""
 
 
-def test_robots_that_have_failed_before_are_left_alone(monkeypatch):
-    found = cover(monkeypatch, "a", alive=~FIRST)
+@pytest.mark.parametrize("name", STORIES)
+def test_steps_are_halved_and_doubled(monkeypatch, name):
+    """Every halving of a robot that is stuck gives it more iterations, and after four of them it goes on with the
+    fallback; those of an error that is too large do not count. Other robots take their own steps."""
+    outcomes, options, sizes = STORIES[name]
+    found = cover(monkeypatch, outcomes, adaptive="adapted" in name, **options)
+    assert found.sizes[: len(sizes)] == sizes
+    assert len(found.sizes) == len(sizes) or "adapted" in name
+    starts = np.cumsum([0.0, *(size * good for size, good in zip(found.sizes, found.accepted, strict=True))])[:-1]
+    np.testing.assert_array_equal([step.start for step in found.tried], starts)
+    halvings, n_stuck = found.halvings, outcomes.count("s") if len(outcomes) > 1 else 13 * (outcomes == "s")
+    assert [step.most for step in found.tried[:n_stuck]] == [20.0 * (1 + k) for k in range(n_stuck)]
+    assert [step.fallback for step in found.tried] == [k >= 4 for k in halvings]
+    assert [step.retrying for step in found.tried] == [k > 0 for k in halvings]
+    np.testing.assert_array_equal(found.report[HALVINGS], n_stuck * FIRST)
+    np.testing.assert_array_equal(found.report[REJECTIONS], outcomes.count("r") * FIRST)
+    np.testing.assert_array_equal(found.arrived, EVERYONE if outcomes != "s" else ~FIRST)
+    assert found.report[STEPS, 0] == sum(found.accepted)
+    np.testing.assert_allclose(found.report[COVERED], DURATION * (found.arrived | ~FIRST))
+    if "adapted" in name:  # the next interval goes on with these
+        assert found.size[0] >= found.sizes[-1] and np.all(found.size[1:] == options.get("last_size", EIGHTH))
+
+
+@pytest.mark.parametrize("outcomes, arrives", [("s", False), ("a", True)])
+def test_a_robot_whose_iterations_are_spent_fails_when_it_is_stuck_and_not_before(monkeypatch, outcomes, arrives):
+    """And one that has failed before is left alone."""
+    found = cover(monkeypatch, outcomes, iterations=MOST)
+    assert len(found.tried) == 1 and found.arrived[0] == arrives
+    found = cover(monkeypatch, outcomes, alive=~FIRST)
     assert not found.tried and not found.report[STEPS, 0]
     np.testing.assert_array_equal(found.arrived, ~FIRST)
 
 
-def test_a_robot_that_is_stuck_halves_its_step_has_more_iterations_and_covers_the_rest_in_small_ones(monkeypatch):
-    found = cover(monkeypatch, "ssa")
-    assert found.sizes == [1.0, 0.5, 0.25, 0.25, 0.25, 0.25] and found.arrived.all()
-    assert [step.start for step in found.tried] == [0.0, 0.0, 0.0, 0.25, 0.5, 0.75]
-    assert [step.most for step in found.tried] == [20.0, 40.0, 60.0, 60.0, 60.0, 60.0]
-    assert [step.retrying for step in found.tried] == [False, True, True, True, True, True]
-    np.testing.assert_array_equal(found.report[HALVINGS], 2.0 * FIRST)
-    np.testing.assert_array_equal(found.report[STEPS], 1.0 + 3.0 * FIRST)
-    np.testing.assert_allclose(found.report[COVERED], DURATION)
-
-
-def test_after_four_halvings_a_robot_goes_on_with_the_fallback(monkeypatch):
-    found = cover(monkeypatch, "ssssa")
-    assert [step.fallback for step in found.tried] == 4 * [False] + 16 * [True]
-    assert found.report[STEPS, 0] == 16.0
-
-
-def test_a_robot_that_is_stuck_at_the_shortest_step_has_failed_and_keeps_nobody(monkeypatch):
-    found = cover(monkeypatch, "s")
-    assert found.sizes == [0.5**k for k in range(13)] and found.report[HALVINGS, 0] == 13.0
-    assert [step.fallback for step in found.tried] == 4 * [False] + 9 * [True]
-    np.testing.assert_array_equal(found.arrived, ~FIRST)
-
-
-def test_a_robot_is_first_helped_by_short_steps_then_by_the_fallback_then_by_letting_hinges_go_through_poles():
-    assert 1.0 <= FALLBACK_AFTER < TURNABLE < MOST_HALVINGS == -np.log2(SMALLEST_FRACTION)
-
-
-def test_a_robot_whose_iterations_are_spent_fails_when_it_is_stuck_and_not_before(monkeypatch):
-    for outcomes, arrives in (("s", False), ("a", True)):
-        found = cover(monkeypatch, outcomes, iterations=MOST)
-        assert len(found.tried) == 1 and found.arrived[0] == arrives
-
-
-# Steps adapted to their error
-
-
-def test_adapted_steps_begin_with_an_eighth_and_double_on_the_grid_of_their_own_size(monkeypatch):
-    found = cover(monkeypatch, "+", adaptive=True)
-    assert found.sizes == [0.125, 0.125, 0.25, 0.5] and found.size[0] == 1.0
-    assert np.all(found.report[STEPS, 1:] == 8.0) and np.all(found.size[1:] == 0.125)
-
-
-def test_adapted_steps_go_on_with_the_last_ones_length(monkeypatch):
-    assert cover(monkeypatch, "a", adaptive=True, last_size=0.5).sizes == [0.5, 0.5]
-    assert cover(monkeypatch, "+", adaptive=True, last_size=1.0).size[0] == 1.0
-
-
-def test_a_step_whose_error_is_too_large_is_halved_and_is_no_halving_of_a_robot_in_trouble(monkeypatch):
-    found = cover(monkeypatch, "ra", adaptive=True, last_size=0.5)
-    assert found.sizes == [0.5, 0.25, 0.25, 0.25, 0.25] and not any(step.retrying for step in found.tried)
-    assert found.report[REJECTIONS, 0] == 1.0 and found.report[HALVINGS, 0] == 0.0
-    assert not found.report[REJECTIONS, 1:].any()
-
-
-def test_after_a_halving_adapted_steps_double_after_four_accepted_steps(monkeypatch):
-    found = cover(monkeypatch, "s+", adaptive=True, last_size=2.0**-4)
-    shorter = 2.0**-5
-    assert found.sizes[:6] == [2.0**-4] + 4 * [shorter] + [2 * shorter]
-    assert not found.tried[5].retrying and found.tried[4].retrying
-
-
-def test_the_next_doubling_waits_twice_as_long(monkeypatch):
-    found = cover(monkeypatch, "ss+", adaptive=True, last_size=2.0**-3)
-    assert found.sizes[2:7] == [2.0**-5] * 4 + [2.0**-4]
-    assert found.sizes[6:15] == [2.0**-4] * 8 + [2.0**-3]
-
-
 @pytest.mark.parametrize("largest", 2.0 ** np.linspace(-4.9, -3.1, 8))
-def test_steps_grow_to_where_their_errors_let_them_and_are_not_refused_there(monkeypatch, largest):
+def test_adapted_steps_grow_to_where_their_errors_let_them_and_are_not_refused_there(monkeypatch, largest):
     """The error per time of a step that is twice as long is four times as large; a quarter of the interval is hard."""
 
     def error(step):
@@ -194,22 +165,6 @@ def test_steps_grow_to_where_their_errors_let_them_and_are_not_refused_there(mon
     found = cover(monkeypatch, error, adaptive=True)
     settled = np.array([step.size for step in found.tried if step.start > 0.5])
     assert found.arrived.all() and np.all((settled > 0.4 * largest) & (settled <= largest))
-
-
-def test_after_a_second_halving_they_double_after_eight_accepted_steps(monkeypatch):
-    found = cover(monkeypatch, "s++++s+", adaptive=True, last_size=2.0**-4)
-    again = [step.retrying for step in found.tried[6:]]
-    assert again[:8] == 8 * [True] and not any(again[8:])
-
-
-def test_no_doubling_leads_back_from_the_fallback(monkeypatch):
-    found = cover(monkeypatch, "ssss+", adaptive=True, last_size=1.0)
-    assert found.sizes[4:] == 16 * [2.0**-4] and all(step.fallback for step in found.tried[4:])
-
-
-def test_a_robot_that_is_stuck_at_the_smallest_fraction_tries_again_with_more_iterations(monkeypatch):
-    found = cover(monkeypatch, "ss" + 100 * "a", adaptive=True, last_size=2.0**-12)
-    assert found.sizes[:3] == 3 * [2.0**-12] and [step.most for step in found.tried[:3]] == [20.0, 40.0, 60.0]
 
 
 # One step
@@ -302,38 +257,6 @@ def test_the_guard_is_milder_after_eight_halvings_and_after_twelve(monkeypatch, 
     np.testing.assert_array_equal(asked["held"], FIRST)
     np.testing.assert_array_equal(asked["turnable"], FIRST & turns_back)
     np.testing.assert_array_equal(report[REPORT_ROWS.index("energy_cuts")], 1.0)
-
-
-# A stroke
-
-
-@pytest.mark.parametrize("alike", [True, False])
-def test_every_group_follows_its_own_peaks_through_all_intervals_and_says_why_it_failed(monkeypatch, alike):
-    covered, stroke = [], plain_kernels()(advance)
-
-    def cover(rods, work, scheme, fallback, rotation, q, v, a, duration, alive, limits, report):
-        covered.append((rotation.delta_psi_start.copy(), rotation.delta_psi_end.copy(), duration, q[0, 0]))
-        report[[NEWTON_ITERATIONS, SOLVER_ITERATIONS]] += 0.25 * MOST * (np.arange(N_LANES) == 1)
-        return alive & Mask(np.arange(N_LANES) > 1)
-
-    monkeypatch.setitem(stroke.__wrapped__.__globals__, "cover_interval", cover)
-    rng = np.random.default_rng(0)
-    peaks, times = rng.standard_normal((2, 5, N_LANES)), np.array([0.0, 0.1, 0.4])
-    shape = rng.standard_normal(3) if alike else rng.standard_normal((2, 3, 5, N_LANES))
-    failed, report = np.zeros((2, 1, N_LANES)), np.zeros((2, len(REPORT_ROWS), N_LANES))
-    failed[0, 0, -1] = 2.0
-    rotation, q = Actuation(*np.zeros((2, 5, N_LANES))), np.arange(2.0)[:, None, None] * np.ones((2, 1, N_LANES))
-    rows, n_turning = (shape, 0) if alike else (shape.reshape(2, -1, N_LANES), 5)
-    state = q, q, q, peaks, times, rows, n_turning, failed
-    stroke(RODS, None, MIDPOINT, EULER, rotation, *state, report, stroke_limits(), SILENT)
-    assert [group for *_, group in covered] == [0.0, 0.0, 1.0, 1.0]
-    np.testing.assert_allclose([duration for *_, duration, _ in covered], [0.1, 0.3, 0.1, 0.3])
-    for k, (start, end, *_) in enumerate(covered):
-        group, interval = divmod(k, 2)
-        turned = peaks[group] * (shape[:, None, None] if alike else shape[group])
-        np.testing.assert_allclose([start, end], turned[interval : interval + 2])
-    np.testing.assert_array_equal(failed[:, 0, :3], [[1.0, 3.0, 0.0]] * 2)
-    np.testing.assert_array_equal(failed[:, 0, -1], [2.0, 0.0])
 
 
 # Hub angles

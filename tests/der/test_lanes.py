@@ -44,11 +44,11 @@ def operands():
     return SimpleNamespace(a=rows_of(a), b=rows_of(b), c=rows_of(c))
 
 
-def assert_same_bits(found, expected):
+def assert_same_bits(found, expected, line=""):
     """Equal numbers, equal signs of zero, NaN where NaN is expected."""
-    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(found, expected, err_msg=line)
     known = ~np.isnan(expected)
-    np.testing.assert_array_equal(np.signbit(found)[known], np.signbit(expected)[known])
+    np.testing.assert_array_equal(np.signbit(found)[known], np.signbit(expected)[known], err_msg=line)
 
 
 ARITHMETIC = {
@@ -67,6 +67,11 @@ ARITHMETIC = {
     "a / 3": lambda a, b, c: a / 3,
     "a * b + c": lambda a, b, c: a * b + c,
     "a * b - a * c": lambda a, b, c: a * b - a * c,
+    "sqrt(a)": lambda a, b, c: np.sqrt(a),
+    "absolute(a)": lambda a, b, c: np.abs(a),
+    "select(a < b, a, b)": lambda a, b, c: np.where(a < b, a, b),
+    "select(a < b, 2, b)": lambda a, b, c: np.where(a < b, 2.0, b),
+    "select(a < b, a, 2.0)": lambda a, b, c: np.where(a < b, a, 2.0),
 }
 COMPARISONS = {
     "a < b": lambda a, b: a < b,
@@ -131,10 +136,7 @@ def test_arithmetic_is_that_of_float64_to_the_last_bit_with_no_hidden_contractio
     found = run_all("{}", list(ARITHMETIC), operands)
     with np.errstate(all="ignore"):
         for value, (line, function) in zip(found, ARITHMETIC.items(), strict=True):
-            expected = function(operands.a, operands.b, operands.c)
-            known = ~np.isnan(expected)
-            np.testing.assert_array_equal(value, expected, err_msg=line)
-            np.testing.assert_array_equal(np.signbit(value)[known], np.signbit(expected)[known], err_msg=line)
+            assert_same_bits(value, function(operands.a, operands.b, operands.c), line)
 
 
 AUGMENTED = """\
@@ -156,13 +158,6 @@ def test_augmented_assignments_are_the_operators_and_make_new_values(run_all, op
     with np.errstate(all="ignore"):
         for value, expected in zip(found, [a + b + 1.0, a - b - 2, a * b * 3.0, a / b / 7, a], strict=True):
             assert_same_bits(value, expected)
-
-
-def test_square_root_and_absolute_value_are_exactly_rounded(run_all, operands):
-    root, size = run_all("{}", ["sqrt(a)", "absolute(a)"], operands)
-    with np.errstate(invalid="ignore"):
-        assert_same_bits(root, np.sqrt(operands.a))
-    assert_same_bits(size, np.abs(operands.a))
 
 
 def exact_product_sum(c: float, a: float, b: float) -> float:
@@ -195,15 +190,13 @@ def test_product_sums_are_rounded_once(run_all, twin):
 def test_product_sums_keep_the_signs_of_zero_and_pass_nan_on(run_all, operands):
     plus, minus = run_all("{}", ["add_product(c, a, b)", "subtract_product(c, a, b)"], operands)
     # Where neither the product nor the sum is rounded, two operations give what one gives.
-    small = np.isin(operands.a, [0, 1, -1, np.inf, -np.inf, np.nan]) & np.isin(operands.c, SPECIAL)
+    exact = np.isin(operands.a, [0, 1, -1, np.inf, -np.inf, np.nan]) & np.isin(operands.c, SPECIAL)
+    exact &= np.abs(operands.b) != 5e-324
+    assert exact.sum() > 500
+    a, b, c = operands.a[exact], operands.b[exact], operands.c[exact]
     with np.errstate(all="ignore"):
-        exact = small & (np.abs(operands.b) != 5e-324)
-        assert exact.sum() > 500
-        for found, expected in (
-            (plus, operands.c + operands.a * operands.b),
-            (minus, operands.c - operands.a * operands.b),
-        ):
-            assert_same_bits(found[exact], expected[exact])
+        assert_same_bits(plus[exact], c + a * b)
+        assert_same_bits(minus[exact], c - a * b)
 
 
 # Masks
@@ -216,29 +209,15 @@ def test_comparisons_and_masks_are_those_of_numpy_and_nan_compares_false(run_all
         assert set(np.unique(value)) == {0.0, 1.0}
 
 
-def test_select_takes_lanes_or_numbers_on_either_side(run_all, operands):
-    lines = ["select(a < b, a, b)", "select(a < b, 2, b)", "select(a < b, a, 2.0)"]
-    both, left, right = run_all("{}", lines, operands)
-    below = operands.a < operands.b
-    assert_same_bits(both, np.where(below, operands.a, operands.b))
-    assert_same_bits(left, np.where(below, 2.0, operands.b))
-    assert_same_bits(right, np.where(below, operands.a, 2.0))
-
-
 def test_any_looks_at_every_lane():
     @numba.njit
     def function(rows):
-        pointer = borrow(rows)
-        condition = load(pointer, 0) > 0.0
+        condition = load(borrow(rows), 0) > 0.0
         return any_lane(condition), any_lane(~condition)
 
-    assert function(np.zeros((1, N_LANES))) == (False, True)
-    assert function(np.ones((1, N_LANES))) == (True, False)
-    for lane in range(N_LANES):
-        only = np.zeros((1, N_LANES))
-        only[0, lane] = 1.0
-        assert function(only) == (True, True)
-        assert function(1.0 - only) == (True, True)
+    for rows in (np.zeros((1, N_LANES)), *np.eye(N_LANES)[:, None]):
+        assert function(rows) == (rows.any(), True)
+        assert function(1.0 - rows) == (True, rows.any())
 
 
 # Memory
@@ -287,47 +266,17 @@ def test_rows_need_no_alignment(operands):
 # Refusals
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        "a ** 2",
-        "a // 2.0",
-        "a % 2.0",
-        "a + None",
-        "a + 'one'",
-        "a + True",
-        "a + 1j",
-        "select(a < b, a, 1j)",
-        "a + (a < b)",
-        "(a < b) + 1.0",
-        "(a < b) & True",
-        "a & b",
-        "~a",
-        "-(a < b)",
-        "(a < b) == (a < c)",
-        "a != b",
-        "abs(a)",
-        "max(a, b)",
-        "a if a < b else b",
-        "(a < b) and (a < c)",
-        "select(a, b, c)",
-        "select(True, a, b)",
-        "select(a < b, 1.0, 2.0)",
-        "select(a < b, a < b, a < c)",
-        "sqrt(2.0)",
-        "absolute(a < b)",
-        "add_product(1.0, 2.0, 3.0)",
-        "add_product(a, b, a < b)",
-        "splat('one')",
-        "splat(True)",
-        "load(a_in, 1.5)",
-        "load(a_rows, 0)",
-        "load_number(a_in, 0)",
-        "splat(any_lane(a))",
-        "splat(any_lane(1.0))",
-        "a < b",
-    ],
-)
+REFUSED = [
+    "a ** 2", "a // 2.0", "a % 2.0", "a + None", "a + 'one'", "a + True", "a + 1j", "select(a < b, a, 1j)",
+    "a + (a < b)", "(a < b) + 1.0", "(a < b) & True", "a & b", "~a", "-(a < b)", "(a < b) == (a < c)", "a != b",
+    "abs(a)", "max(a, b)", "a if a < b else b", "(a < b) and (a < c)", "select(a, b, c)", "select(True, a, b)",
+    "select(a < b, 1.0, 2.0)", "select(a < b, a < b, a < c)", "sqrt(2.0)", "absolute(a < b)",
+    "add_product(1.0, 2.0, 3.0)", "add_product(a, b, a < b)", "splat('one')", "splat(True)", "load(a_in, 1.5)",
+    "load(a_rows, 0)", "load_number(a_in, 0)", "splat(any_lane(a))", "splat(any_lane(1.0))", "a < b",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("line", REFUSED)
 def test_what_lanes_cannot_do_is_a_typing_error_at_compilation_and_a_type_error_in_plain_python(line, twin):
     one = np.ones((1, N_LANES))
     if line == "load(a_rows, 0)" and (twin == "plain" or numba.config.DISABLE_JIT):
@@ -350,50 +299,32 @@ def test_what_lanes_cannot_do_is_a_typing_error_at_compilation_and_a_type_error_
     ],
     ids=["float32", "int64", "transposed", "strided", "three axes", "plain tuple", "string"],
 )
-def test_only_contiguous_float64_rows_and_named_tuples_of_them_can_be_borrowed(array):
+def test_only_contiguous_float64_rows_and_named_tuples_of_them_can_be_borrowed_and_shared_ones_not_written(array):
     @numba.njit
     def function(rows):
         return any_lane(load(borrow(rows), 0) > 0.0)
 
-    with pytest.raises(TypingError):
-        function(array)
-
-
-@ONLY_COMPILED
-def test_shared_rows_cannot_be_written():
     @numba.njit
-    def function(rows):
+    def write(rows):
         store(borrow(rows), 0, 1.0)
 
     with pytest.raises(TypingError):
-        function(np.zeros(3))
+        function(array)
+    with pytest.raises(TypingError):
+        write(np.zeros(3))  # shared
 
 
 # The width
 
 
-def test_vectors_and_masks_have_the_same_possible_width():
-    assert N_LANES in {2, 4, 8, 16}
-    assert lanes.VECTOR.count == lanes.MASK.count == N_LANES
-
-
-def in_subprocess(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-
-
 @pytest.mark.parametrize("width", ["3", "eight", ""])
-def test_an_impossible_width_is_refused_with_one_sentence(width):
-    answer = in_subprocess("from seastar_gym import Simulator", SEASTAR_LANES=width)
+def test_an_impossible_width_is_refused(width):
+    environment = {**os.environ, "SEASTAR_LANES": width}
+    command = [sys.executable, "-c", "from seastar_gym import Simulator"]
+    answer = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
     assert answer.returncode == 1
     last = answer.stderr.strip().splitlines()[-1]
-    assert last == f"ValueError: SEASTAR_LANES={width!r} is not a lane width: use 2, 4, 8 or 16."
+    assert f"SEASTAR_LANES={width!r}" in last and "2, 4, 8 or 16" in last
 
 
 # A kernel asks a bundle whether a term is there, and what it does with one that is not need not compile.

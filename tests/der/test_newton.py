@@ -6,220 +6,161 @@ import numpy as np
 import pytest
 
 import oracle
-from seastar_gym import Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+from continuum_oracle import Continuum
+from hubs import TEN
+from oracle import Star
+from seastar_gym import Contact, Scene, Seastar, SmaPulse, Water
 from seastar_gym.der.contact.contact import SLOT_ROWS
-from seastar_gym.der.geometry import larger
-from seastar_gym.der.potential import factorise
-from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.newton import minimise, move_node, step_scale, take_step
-from seastar_gym.der.stepping.report import NEWTON_ITERATIONS, REPORT_ROWS
-from seastar_gym.der.stepping.schemes import SCHEMES
-from seastar_gym.der.stepping.skip_last import EASY, LATE, quadratic_length
-from seastar_gym.der.stepping.stages import Stage, begin_stage, end_stage, end_step
-from seastar_gym.der.stepping.stroke import advance
-from seastar_gym.der.terms.hub import set_natural_hub_angles
-from seastar_gym.model.rods import make_limits, make_rods
-from seastar_gym.simd.compilation import entry_point, inlined_kernel
-from seastar_gym.simd.lanes import N_LANES, any_lane, borrow, load, load_number, select, splat, store
+from seastar_gym.der.rods import Rods, make_work
+from seastar_gym.der.stepping.newton import minimise
+from seastar_gym.der.stepping.scales import MOST_CURVED, PREDICTABLE_STRAIN, SLENDER
+from seastar_gym.der.stepping.skip_last import CURVATURE, EASY, FORESEEABLE_T, LATE, can_skip, quadratic_length
+from seastar_gym.model.rods import make_rods
+from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from seastar_gym.simd.rows import aligned_rows, to_rows
-from seastar_gym.simulator.schedule import step_times
-from slopes import nodes, plain, rows
-from stages import RandomStages, robot_and_star, rods_of, turn_limbs
+from slopes import nodes, plain
+from stages import EVERYONE, RandomStages, robot_and_star, rods_of
+from touching import touching_limbs
 
 ROBOT, STAR = robot_and_star(5, 4)
-RODS, GAMMA = rods_of(ROBOT), 5e-3
-EVERYONE = np.ones(N_LANES, bool)
+RODS = rods_of(ROBOT)
+MILD, WILD = {"gamma": 5e-3, "bend": 0.05, "speed": 0.05}, {"gamma": 0.05, "bend": 0.5, "speed": 1.0}
 
 
-def minimised(active=EVERYONE, tolerance=1e-13, limit=60.0, speed=0.05, bend=0.05, gamma=GAMMA):
-    stages, work = RandomStages(STAR, gamma, bend=bend, speed=speed), make_work(RODS, 1)
-    work.q[:], work.q_hat[:], work.v_hat[:] = rows(stages.q), rows(stages.q_hat), rows(stages.v_hat)
-    turn_limbs(work, STAR, stages.delta_psi)
-    stage = Stage(work.q_hat, work.v_hat, Lanes(gamma), Lanes(1.0 / gamma), False)
-    found = minimise.plain(RODS, work, stage, Mask(active), Lanes(tolerance), Lanes(limit))
+def minimised(active=EVERYONE, tolerance=1e-13, limit=500.0, rods: Rods = RODS, star: Star = STAR, **size):
+    stages = RandomStages(star, **size)
+    stages.frozen = stages.q
+    work, stage = stages.begin(rods)
+    found = minimise.plain(rods, work, stage, active, Lanes(tolerance), Lanes(limit))
     converged, phi, iterations, regularised, backtracks = plain(found)
     return SimpleNamespace(
-        stages=stages, q=nodes(work.q), converged=converged, phi=phi, iterations=iterations, regularised=regularised,
-        backtracks=backtracks, length=plain(quadratic_length.plain(RODS, stage)),
+        stages=stages, q=nodes(work.q), converged=converged, phi=phi, iterations=iterations,
+        helped=regularised + backtracks,
     )  # fmt: skip
 
 
-def test_it_ends_at_a_minimum_of_the_oracles_potential():
-    found = minimised()
-    assert found.converged.all()
+@pytest.mark.parametrize("size", [MILD, WILD], ids=["mild", "wild"])
+def test_it_ends_at_a_minimum_of_the_oracles_potential(size):
+    """Wild robots are helped by convex matrices or shorter steps."""
+    found = minimised(**size)
+    assert found.converged.all() and np.all((found.helped > 0.0) == (size is WILD))
     for lane in range(N_LANES):
-        data = found.stages.data(lane)
-        residual = oracle.incremental_gradient(STAR, found.q[lane], *data)
-        before = oracle.incremental_gradient(STAR, found.stages.q[lane], *data)
+        q_hat, v_hat, gamma, delta_psi, _ = found.stages.data(lane)
+        residual, before = (
+            oracle.incremental_gradient(STAR, q, q_hat, v_hat, gamma, delta_psi)
+            for q in (found.q[lane], found.stages.q[lane])
+        )
         assert np.abs(residual).max() < 1e-9 * np.abs(before).max()
-        hessian = oracle.incremental_hessian(STAR, found.q[lane], data[0], GAMMA, data[3])
-        assert np.linalg.eigvalsh(hessian)[0] > 0.0
-
-
-def test_a_step_that_can_be_foreseen_is_left_out_and_would_have_been_as_small_as_asked():
-    tolerance = 1e-7
-    loose, tight = minimised(tolerance=tolerance, bend=0.01), minimised(bend=0.01)
-    assert loose.iterations.sum() < tight.iterations.sum()
-    assert np.linalg.norm(loose.q - tight.q, axis=2).max() < tolerance
+        assert np.linalg.eigvalsh(oracle.incremental_hessian(STAR, found.q[lane], q_hat, gamma, delta_psi))[0] > 0.0
 
 
 def test_robots_that_are_not_active_keep_their_bits_and_cost_no_iteration():
     active = np.arange(N_LANES) % 2 == 0
-    found, all_of_them = minimised(active), minimised()
+    found, all_of_them = minimised(Mask(active), **MILD), minimised(**MILD)
     np.testing.assert_array_equal(found.q[active], all_of_them.q[active])
     np.testing.assert_array_equal(found.q[~active], found.stages.q[~active])
     assert not found.iterations[~active].any() and not found.converged[~active].any()
 
 
 def test_nobody_takes_more_iterations_than_allowed():
-    found = minimised(limit=2.0, speed=1.0, bend=0.5)
+    found = minimised(limit=2.0, **WILD)
     assert found.iterations.max() == 2.0 and not found.converged.all()
-
-
-def test_wild_robots_are_helped_by_convex_matrices_or_shorter_steps_and_arrive():
-    found = minimised(speed=1.0, bend=0.5, limit=500.0, gamma=0.05)
-    assert found.converged.all() and np.all(found.regularised + found.backtracks > 0.0)
-
-
-def test_a_node_moves_by_its_new_step_or_back_along_its_last():
-    work = make_work(RODS, 1)
-    stepping, shortening = Mask(np.arange(N_LANES) == 0), Mask(np.arange(N_LANES) == 1)
-    work.step[2], work.step[3] = 0.4, 0.2
-    scale = step_scale.plain(stepping, shortening, Lanes(0.5))
-    squared = plain(move_node.plain(work, 1, (Lanes(-1.0), Lanes(0.5)), shortening, scale))
-    np.testing.assert_array_equal(work.q[2:4, :3], [[1.0, -0.2, 0.0], [-0.5, -0.1, 0.0]])
-    np.testing.assert_allclose(squared[:3], [1.25, 0.05, 0.0])
-
-
-def test_nothing_is_foreseen_further_than_edges_are_long():
-    assert 0.0 < minimised().length < STAR.edge_length
-
-
-def test_larger_is_the_larger():
-    np.testing.assert_array_equal(plain(larger.plain(Lanes(np.array([1.0, 3.0])), Lanes(2.0))), [2.0, 3.0])
 
 
 @pytest.mark.parametrize("lane", [0, N_LANES - 1])
 def test_a_robot_whose_state_is_not_a_number_does_not_converge_and_stops_nobody(lane):
-    work, stages = make_work(RODS, 1), RandomStages(STAR, GAMMA, bend=0.05)
-    work.q[:], work.q_hat[:], work.v_hat[:] = rows(stages.q), rows(stages.q_hat), rows(stages.v_hat)
-    turn_limbs(work, STAR, stages.delta_psi)
+    stages = RandomStages(STAR, **MILD)
+    work, stage = stages.begin(RODS)
     work.q[5, lane] = np.nan
-    stage = Stage(work.q_hat, work.v_hat, Lanes(GAMMA), Lanes(1.0 / GAMMA), False)
-    converged = plain(minimise.plain(RODS, work, stage, Mask(EVERYONE), Lanes(1e-10), Lanes(60.0))[0])
+    converged = plain(minimise.plain(RODS, work, stage, EVERYONE, Lanes(1e-10), Lanes(60.0))[0])
     np.testing.assert_array_equal(converged, np.arange(N_LANES) != lane)
 
 
-# Safeguards do nothing to robots that need none: the simulator's stroke has the bits of plain Newton.
+# The last step is left out where it can be foreseen to be small enough
 
 
-ROBOTS = 64
+@pytest.mark.parametrize("tolerance", [1e-9, 1e-7, 1e-5])
+@pytest.mark.parametrize("radius", [1e-4, 1.6e-3, 8e-3], ids=["slender", "ordinary", "thick"])
+@pytest.mark.parametrize("gamma", [1e-4, 5e-3])
+def test_robots_end_as_near_to_the_minimum_as_asked_though_a_step_is_left_out(radius, gamma, tolerance):
+    star = Continuum(5, 4, rod_radius=radius)
+    rods, size = make_rods(Scene(Seastar(5, 4, rod_radius=radius))), {"gamma": gamma, "bend": 0.01, "stretch": 1e-4}
+    loose, tight = (minimised(tolerance=x, rods=rods, star=star, speed=0.01, **size) for x in (tolerance, 1e-14))
+    assert np.all(loose.iterations < tight.iterations + (tolerance < 1e-6))
+    assert np.linalg.norm(loose.q - tight.q, axis=2).max() < tolerance
 
 
-@inlined_kernel
-def newton(rods, work, stage, tolerance, iteration_limit):
-    """Plain Newton (13.11): full steps until one is below the tolerance; returns the iterations."""
-    one, zero = splat(1.0), splat(0.0)
-    iterations, running = zero, zero < one
-    length = quadratic_length(rods, stage)
-    while any_lane(running):
-        factorise(rods, work, stage, None)
-        move = take_step(rods, work, running, None, zero)
-        iterations += select(running, one, zero)
-        late = select(iterations < EASY, one, LATE)
-        foreseen = (iterations <= EASY) & (late * move * move <= tolerance * length)
-        running = running & ~((move <= tolerance) | foreseen) & (iterations < iteration_limit)
-    return iterations
+TEN_RODS, EDGE = make_rods(Scene(TEN)), TEN.limb_length / 9
+ENERGY = PREDICTABLE_STRAIN * TEN.youngs_modulus * np.pi * TEN.rod_radius**2 * 5 * TEN.limb_length
+"""Joule: the strain energy up to which steps are predictable."""
 
 
-@entry_point
-def advance_plainly(rods, work, scheme, actuation, q, v, a, peaks, times, shape, report, limits):
-    """Stroke of `advance` without line search, regularised matrix, guard, substeps and status."""
-    rods_rows, memory, rotation, tableau = borrow(rods), borrow(work), borrow(actuation), borrow(scheme)
-    zero, last, tolerance = splat(0.0), scheme.n_stages - 1, load(borrow(limits).tolerance, 0)
-    everyone = zero < splat(1.0)
-    for group in range(q.shape[0]):
-        q_rows, v_rows, a_rows, peak_rows = borrow(q[group]), borrow(v[group]), borrow(a[group]), borrow(peaks[group])
-        report_rows = borrow(report[group])
-        for k in range(times.shape[0] - 1):
-            for limb in range(rods.n_limbs):
-                peak = load(peak_rows, limb)
-                store(rotation.delta_psi_start, limb, peak * shape[k])
-                store(rotation.delta_psi_end, limb, peak * shape[k + 1])
-            h = splat(times[k + 1] - times[k])
-            for i in range(scheme.n_stages):
-                stage = begin_stage(rods_rows, memory, tableau, i, q_rows, v_rows, a_rows, h)
-                set_natural_hub_angles(rods_rows, memory, rotation, zero + load_number(tableau.c, i))
-                n = newton(rods_rows, memory, stage, tolerance, 1.0 * limits.max_iterations)
-                store(report_rows, NEWTON_ITERATIONS, load(report_rows, NEWTON_ITERATIONS) + n)
-                if i < last:
-                    end_stage(rods_rows, memory, tableau, i, stage, a_rows, everyone)
-                else:
-                    end_step(rods_rows, memory, tableau, stage, q_rows, v_rows, a_rows, h, everyone)
+def foreseen(iterations=1.0, setbacks=0.0, phi=0.0, move=0.99e-5, t=1.0):
+    """Whether the next step is left out, of one robot in all lanes, the last hub hinge of which has this t."""
+    work = make_work(TEN_RODS, 1)
+    work.hub_t[:], work.hub_t[-1] = 0.5, t
+    mask = plain(can_skip.plain(TEN_RODS, work, *map(Lanes, (iterations, setbacks, phi, move, 1e-10))))
+    assert mask.all() == mask.any()
+    return bool(mask.all())
 
 
 @pytest.mark.parametrize(
-    "numerics", [Numerics("implicit-euler", 3e-3), Numerics("sdirk2", 20e-3), Numerics("implicit-midpoint", 5e-3)],
-    ids=lambda numerics: numerics.scheme,
-)  # fmt: skip
-def test_the_safeguards_change_no_bit_of_a_stroke_that_needs_none(numerics):
-    scene, scheme = Scene(Seastar(nodes_per_limb=10), numerics=numerics), SCHEMES[numerics.scheme]
-    simulator = Simulator(scene, ROBOTS, threads=1)
-    *before, commands = np.random.default_rng(0).integers(-1, 2, (4, ROBOTS, 5)).astype(float)
-    for command in before:
-        simulator.stroke(command)
-    rods, limits, (work, actuation) = make_rods(scene), make_limits(scene), simulator.memory[0]
-    n_groups, rows, lanes = simulator.q.shape
-    times = step_times(scene.actuator.corners, numerics.step)
-    shape, peaks = np.asarray(scene.actuator.delta_psi(times)), to_rows(commands)
-    ends = []
-    for safeguarded in (True, False):
-        q, v = simulator.q.copy(), simulator.v.copy()
-        a = aligned_rows(n_groups, (rows + 1) * scheme.n_stages + 2, lanes)
-        report = np.zeros((n_groups, len(REPORT_ROWS), lanes))
-        if safeguarded:
-            failed, no_effort = np.zeros((n_groups, 1, lanes)), np.zeros((n_groups, 0, lanes))
-            advance(
-                rods, work, scheme, SCHEMES["implicit-euler"], actuation, q, v, a, peaks, times, shape, 0, failed,
-                report, limits, no_effort,
-            )  # fmt: skip
-        else:
-            advance_plainly(rods, work, scheme, actuation, q, v, a, peaks, times, shape, report, limits)
-        ends.append((q, v, report[:, NEWTON_ITERATIONS]))
-    for one, other in zip(*ends, strict=True):
-        np.testing.assert_array_equal(one, other)
-    assert not np.array_equal(ends[0][0], simulator.q)
+    "inside, outside",
+    [
+        ({}, {"move": 1.01e-5}),  # the step left out would be larger than the tolerance
+        ({"iterations": EASY - 1.0}, {"iterations": EASY, "move": 1.01e-5 / np.sqrt(LATE)}),  # convergence is worse
+        ({"iterations": EASY, "move": 0.99e-5 / np.sqrt(LATE)}, {"iterations": EASY + 1.0, "move": 1e-9}),  # or none
+        ({"setbacks": 0.0}, {"setbacks": 1.0}),  # the potential is not convex on the way
+        ({"phi": 0.99 * ENERGY}, {"phi": 1.01 * ENERGY}),  # the step may create energy
+        ({"t": 0.99 * FORESEEABLE_T}, {"t": FORESEEABLE_T}),  # a hinge is near its pole
+        ({}, {"move": np.nan}),
+        ({}, {"phi": np.nan}),
+    ],
+)
+def test_a_step_is_left_out_up_to_every_threshold_and_not_beyond(inside, outside):
+    assert foreseen(**inside) and not foreseen(**outside)
 
 
-# Scales of a robot and sizes of its memory: which steps are looked at, and how many pairs of nodes may be near.
+def test_limbs_that_touch_are_not_predictable():
+    touching = touching_limbs(apart=3)
+    touching.work.contact.touching[0] = np.arange(N_LANES) >= 3
+    mask = plain(can_skip.plain(touching.rods, touching.work, *map(Lanes, (1.0, 0.0, 0.0, 1e-9, 1.0))))
+    np.testing.assert_array_equal(mask, np.arange(N_LANES) < 3)
 
 
-THICK = Seastar(4, 5, limb_length=0.08, rod_radius=2e-3, density=1200.0, youngs_modulus=5e5)
-EDGE, AREA = 0.02, np.pi * 2e-3**2
-DEFAULT_RODS = make_rods(Scene(THICK, Water(900.0, 1.5)))
+@pytest.mark.parametrize("radius, share", [(1e-5, 1.0), (1e-3, (EDGE / 1e-3) ** 2 / SLENDER)])
+@pytest.mark.parametrize("gamma", [1e-9, 0.1])
+def test_the_foreseeable_length_is_a_fraction_of_an_edge_that_falls_as_it_is_stiffer_than_inertia(gamma, radius, share):
+    rods = make_rods(Scene(Seastar(nodes_per_limb=10, rod_radius=radius)))
+    rate = share * TEN.youngs_modulus / TEN.density / EDGE**2
+    found = float(np.max(plain(quadratic_length.plain(rods, SimpleNamespace(gamma=Lanes(gamma))))))
+    assert found == pytest.approx(EDGE / (CURVATURE + rate * gamma**2))
 
 
-def test_drag_takes_more_than_a_step_creates_up_to_a_share_of_the_predictable_energy():
-    """Drag of a limb that moves by its length over its inertia: 1/2 rho_f C_d 2 r l/(rho A)."""
-    share = 0.5 * 900.0 * 1.5 * 2.0 * 2e-3 * 0.08 / (1200.0 * AREA)
-    assert share > 1.0 and DEFAULT_RODS.scales.damped == pytest.approx(DEFAULT_RODS.scales.predictable)
-    thin_water = make_rods(Scene(THICK, Water(9.0, 1.5))).scales
-    assert thin_water.damped == pytest.approx(float(DEFAULT_RODS.scales.predictable[0]) * 0.01 * share)
+# Scales of a robot and sizes of its memory
 
 
-def test_edges_are_stiffer_than_inertia_by_the_square_of_their_number_and_of_the_speed_of_sound_over_their_length():
-    """Most at the tips, which have half an edge; in vacuum every step is looked at."""
-    rate = 5e5 / (1200.0 * EDGE**2) * 2.0 * 4**2
-    assert DEFAULT_RODS.scales.stiffness_ratio == pytest.approx(rate)
-    vacuum = make_rods(Scene(THICK, None)).scales
+def test_scales_are_those_of_drag_and_of_edges_over_inertia():
+    """Drag of a limb that moves by its length over its inertia; edges are stiffest at the tips. In vacuum
+    every step is looked at, and where drag curves the potential most, none is predictable.
+    """
+    robot = Seastar(4, 5, limb_length=0.08, rod_radius=2e-3, density=1200.0, youngs_modulus=5e5)
+    water, thin, vacuum = (make_rods(Scene(robot, one)).scales for one in (Water(900.0, 1.5), Water(9.0, 1.5), None))
+    share = 0.5 * 900.0 * 1.5 * 2.0 * 2e-3 * 0.08 / (1200.0 * np.pi * 2e-3**2)
+    assert share > 1.0 and water.damped == pytest.approx(water.predictable)
+    assert thin.damped == pytest.approx(float(water.predictable[0]) * 0.01 * share)
+    assert water.stiffness_ratio == pytest.approx(5e5 / (1200.0 * 0.02**2) * 2.0 * 4**2)
     assert vacuum.stiffness_ratio == np.inf and vacuum.damped == 0.0
-    assert not vacuum.held and make_rods(Scene(THICK, held_nodes=(0,))).scales.held
+    assert not vacuum.held and make_rods(Scene(robot, held_nodes=(0,))).scales.held
+    for over, predictable in ((0.9, True), (1.1, False)):
+        drag = over * MOST_CURVED * CURVATURE * 1200.0 * np.pi * 2e-3**2 / (0.04 * 0.5 * 900.0 * 2.0 * 2e-3)
+        found = make_rods(Scene(robot, Water(900.0, drag))).scales.predictable[0]
+        assert np.isfinite(found) == predictable
 
 
 @pytest.mark.parametrize("edges, near", [(23, 23), (24, 24), (25, 3)])
 def test_every_node_has_room_for_all_edges_of_another_limb_or_for_three_where_they_are_many(edges, near):
     rods = make_rods(Scene(Seastar(5, edges + 1), actuator=SmaPulse(0.1), contact=Contact()))
-    work, nodes = make_work(rods, 1).contact, 2 * rods.contact.n_pairs * edges
-    assert work.share == nodes * near
-    assert len(work.slots) == SLOT_ROWS * nodes * min(edges, near * N_LANES)
+    work, n_nodes = make_work(rods, 1).contact, 2 * rods.contact.n_pairs * edges
+    assert work.share == n_nodes * near
+    assert len(work.slots) == SLOT_ROWS * n_nodes * min(edges, near * N_LANES)

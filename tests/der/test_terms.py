@@ -1,0 +1,390 @@
+"""Every term of a stage, alone and with others, in plain Python: potential, slopes and Hessian are a dense oracle's.
+
+The oracle is shown to have the derivatives of its energies in tests/test_oracle.py; here, the kernels have those of
+theirs, know nothing of where a robot lies, and do without a term that a scene does not name. Rows of other rooms:
+test_body.py, test_contact.py.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import oracle
+from along_oracle import Bent
+from continuum_oracle import Continuum, ContinuumShaped
+from currents import CURRENTS, velocity
+from hubs import HUBS, robot_with
+from oracle import Star
+from seastar_gym import AlongLimb, Body, Limb, Scene, Seastar, SmaPulse, Stiffening, Water
+from seastar_gym.der.body.body import place_roots
+from seastar_gym.der.contact.contact import add_contact, add_contact_energy, contact_force, not_touching
+from seastar_gym.der.contact.coupled import solve_coupled, solver_iterations
+from seastar_gym.der.contact.crossing import without_new_crossings
+from seastar_gym.der.energy import elastic_energy, energies, fill_moments
+from seastar_gym.der.linear.star_solution import solve_again, substitute_star
+from seastar_gym.der.motion import relative
+from seastar_gym.der.potential import factorise
+from seastar_gym.der.rods import make_work
+from seastar_gym.der.stepping.guard import add_held_energy, may_gain
+from seastar_gym.der.terms.added_mass import add_fluid_energy, add_fluid_inertia, subtract_edge_fluid_inertia
+from seastar_gym.der.terms.along import add_moved_energy
+from seastar_gym.der.terms.clamp import orientation
+from seastar_gym.der.terms.damping import damped_energy, damped_stiffness, damped_stress
+from seastar_gym.der.terms.drag import add_cross_flow
+from seastar_gym.der.terms.fluid import add_work_of_current
+from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
+from seastar_gym.der.terms.inertia import kinetic_energy, subtract_edge_inertia
+from seastar_gym.der.terms.load import load_power, nodal_load
+from seastar_gym.model.rods import make_rods
+from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.numpy_lanes import Lanes, Mask
+from seastar_gym.simd.plain import plain_kernels
+from slopes import NO_RODS, NO_WORK, gradient, plain, rotated, rows
+from stages import EVERYONE, RandomStages, robot_and_star, rods_of
+from unlike import DIFFERENT
+from unlike import robot_and_star as unlike_limbs
+
+ACROSS = {"drag_coefficient": 1.3, "tangential_drag_coefficient": 0.1}
+MASS, DAMPING = {"added_mass_coefficient": 0.8}, {"relaxation_time": 4e-3}
+PULLED = {"gravity": (1.0, -9.81), "loads": ((3, 1e-3, -2e-3), (3, 1e-3, 0.0), (1, 0.0, 1e-3))}
+SHAPES = [(5, 10), (5, 2), (3, 3), (4, 4), (6, 5), (12, 3)]
+"""(n_limbs, nodes_per_limb)"""
+
+
+class Term(NamedTuple):
+    """A scene for the kernels and for the oracle."""
+
+    scene: Scene
+    star: Star
+
+
+def scene_of(robot: Seastar, water: dict[str, Any] | None, gravity=None, loads=()) -> Scene:
+    fluid = None if water is None else Water(**water)
+    pulse = SmaPulse(0.1 if robot.n_limbs > 1 else 0.0)  # one limb has nothing to turn against
+    return Scene(robot, fluid, pulse, gravity=gravity, loads=loads)
+
+
+def alike(hub="rigid", n_limbs=5, nodes_per_limb=4, current=None, relaxation_time=None, vacuum=False, **terms) -> Term:
+    """Equal limbs. terms: Of `Water`, gravity and loads."""
+    shape = {"n_limbs": n_limbs, "nodes_per_limb": nodes_per_limb}
+    pull = {name: terms.pop(name) for name in PULLED if name in terms}
+    flow = {} if current is None else {"current": lambda places: velocity(current, places)}
+    of_hub = {} if hub == "rigid" else {"hub_hinge": hub}
+    star = (Continuum if hub == "rigid" else Star)(
+        **shape, **of_hub, **flow, **pull, relaxation_time=relaxation_time or 0.0,
+        **{"fluid_density" if name == "density" else name: value for name, value in terms.items()},
+        **{"drag_coefficient": 0.0, "fluid_density": 0.0} if vacuum else {},
+    )  # fmt: skip
+    water = None if vacuum else {"current": CURRENTS.get(current)} | terms
+    return Term(scene_of(robot_with(hub, **shape, relaxation_time=relaxation_time), water, **pull), star)
+
+
+def unlike(name: str) -> Term:
+    """Limbs that taper, bend and differ, with the chapter's hinges, and terms that look at each edge's radius."""
+    robot, star = unlike_limbs(name, 4, fluid_density=950.0, **ACROSS, **MASS, **PULLED)
+    return Term(scene_of(robot, {"density": 950.0} | ACROSS | MASS, **PULLED), star)
+
+
+def curved(bent: bool = False) -> Term:
+    """Limbs that taper, curve and differ on a rigid hub; bent: Whose actuators bend them along their length."""
+    profile = (1.0, 3.0, 0.5)
+    shapes = [(2.0 * k, 0.1 - 0.01 * k, (2e-3, 1e-3 + 2e-4 * k), (1e6, 8e5), (4.0, 0.0, -3.0)[k]) for k in range(3)]
+    directions, lengths, radii, moduli, curvatures = zip(*shapes, strict=True)
+    own, actuators = {}, {}
+    if bent:
+        actuators = {"along": AlongLimb(0.8, profile), "stiffening": Stiffening(2.5, 0.4, 0.1)}
+        own = {"profile": lambda s: np.interp(s, (0.0, 0.5, 1.0), profile), "share": 0.8, "peak": 0.1}
+        own |= {"ratio": 2.5, "middle": 0.4, "width": 0.1}
+    star = (Bent if bent else ContinuumShaped)(
+        3, 4, directions=directions, lengths=lengths, radii=radii, moduli=moduli, curvatures=curvatures,
+        **ACROSS, **MASS, **DAMPING, **own,
+    )  # fmt: skip
+    robot = Seastar(3, 4, limbs=tuple(Limb(*shape) for shape in shapes), **DAMPING, **actuators)
+    return Term(scene_of(robot, ACROSS | MASS), star)
+
+
+EVERYTHING = {"density": 950.0, "drag_coefficient": 1.3, **MASS, **DAMPING, **PULLED}
+TERMS = {
+    **{f"{hub} hub, {n} x {m}": alike(hub, n, m) for hub in HUBS for n, m in SHAPES},
+    **{f"rigid hub, {n} x {m}": alike("rigid", n, m) for n, m in ((1, 4), (2, 3), (3, 2))},
+    **{f"{hub} hub in vacuum": alike(hub, 5, 10, vacuum=True) for hub in HUBS},
+    **{f"damping, {hub} hub": alike(hub, 3, **DAMPING) for hub in HUBS},
+    "damping that is none": alike(n_limbs=3, relaxation_time=0.0),
+    "drag along limbs": alike(n_limbs=3, **ACROSS),
+    "drag across limbs alone": alike(n_limbs=3, tangential_drag_coefficient=0.0),
+    "added mass": alike(n_limbs=3, **MASS),
+    "weight and loads": alike(n_limbs=3, density=950.0, **PULLED),
+    **{
+        f"everything, {current}, {hub} hub": alike(hub, current=current, tangential_drag_coefficient=C_t, **EVERYTHING)
+        for hub in HUBS[:2]
+        for current, C_t in (("uniform", 0.0), ("shear", 0.02), ("vortex", 0.1), ("grid", 1.3))
+    },
+    "everything, 2 x 3": alike("rigid", 2, 3, current="shear", tangential_drag_coefficient=0.02, **EVERYTHING),
+    "everything, 3 x 2": alike("rigid", 3, 2, current="vortex", tangential_drag_coefficient=1.3, **EVERYTHING),
+    **{name: unlike(name) for name in DIFFERENT},
+    "curved limbs": curved(),
+    "limbs bent along": curved(bent=True),
+}  # fmt: skip
+EVERY_TERM, EVERY_HUB = pytest.mark.parametrize("name", TERMS), pytest.mark.parametrize("hub", HUBS)
+
+
+# The table
+
+
+@EVERY_TERM
+@pytest.mark.parametrize("gamma", [1e-3, 1e-2])
+def test_potential_step_and_decrement_are_those_of_the_oracle(name, gamma):
+    """The potential falls along the step, which is taken whole, as fast as the decrement says: its own slope, too."""
+    (scene, star), stages = TERMS[name], RandomStages(TERMS[name].star, gamma, bend=0.05)
+    rods = make_rods(scene)
+    found, few = stages.run(rods), star.n_limbs < 3 or star.nodes_per_limb < 3
+    for lane in range(N_LANES):
+        assert found.phi[lane] == pytest.approx(stages.phi(lane), rel=1e-12)
+        stages.assert_step(found, lane, stages.hessian(lane), 1e-10 if few else 1e-11)
+    np.testing.assert_allclose(found.moved, -found.direction, rtol=0.0, atol=1e-16)
+    np.testing.assert_allclose(found.largest, np.linalg.norm(found.direction, axis=2).max(axis=1), rtol=1e-14)
+    ahead, behind = (stages.run(rods, q=stages.q + share * found.direction).phi for share in (-1e-4, 1e-4))
+    np.testing.assert_allclose((behind - ahead) / 2e-4, found.decrement, rtol=1e-4)
+
+
+@EVERY_TERM
+def test_other_right_hand_sides_are_solved_with_the_oracles_matrix(name):
+    """As sensitivities are, and contact; the solution found last is the one that is written."""
+    rods, stages = make_rods(TERMS[name].scene), RandomStages(TERMS[name].star, 1e-3, bend=0.05)
+    work, stage = stages.begin(rods, again=True)
+    factorise.plain(rods, work, stage, None)
+    r, (x, written) = np.random.default_rng(0).standard_normal(work.q.shape), np.zeros((2, *work.q.shape))
+    solve_again.plain(rods, work, r, x)
+    for lane in range(N_LANES):
+        expected = np.linalg.solve(stages.hessian(lane), r[:, lane])
+        np.testing.assert_allclose(x[:, lane], expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
+    substitute_star.plain(rods, work, written)
+    np.testing.assert_array_equal(written, x)
+
+
+@EVERY_TERM
+def test_energies_of_a_state_are_those_of_the_oracle_at_the_rotations_of_its_limbs(name):
+    scene, star = TERMS[name]
+    rods, stages = make_rods(scene), RandomStages(star, 1.0, bend=0.3)
+    v, (elastic, kinetic) = np.random.default_rng(1).standard_normal(stages.q.shape), np.zeros((2, 1, N_LANES))
+    actuation = Actuation(np.zeros((star.n_limbs, N_LANES)), stages.delta_psi.T.copy())
+    plain_kernels()(energies)(rods, make_work(rods, 1), actuation, rows(stages.q), rows(v), elastic, kinetic)
+    for lane in range(N_LANES):
+        expected = oracle.elastic_energy(stages.star_of(lane)[0], stages.q[lane], stages.star_of(lane)[1])
+        assert elastic[0, lane] == pytest.approx(expected, rel=1e-10)
+        assert kinetic[0, lane] == pytest.approx(oracle.kinetic_energy(star, v[lane]), rel=1e-12)
+    frame = (0.3, -0.7)
+    seen = plain(kinetic_energy.plain(rods, rows(v), frame))
+    np.testing.assert_allclose(seen, [oracle.kinetic_energy(star, one - frame) for one in v], rtol=1e-12)
+
+
+@EVERY_TERM
+def test_a_robot_that_rests_stays(name):
+    """With no flow past it, whose drag has no direction; but for weight and currents."""
+    scene, star = TERMS[name]
+    stages = RandomStages(star, 1e-2)
+    stages.q[:] = stages.frozen[:] = stages.q_hat[:] = scene.robot.nodes()
+    stages.v_hat[:], stages.delta_psi[:] = 0.0, 0.0
+    found = stages.run(make_rods(scene))
+    assert np.isfinite(found.direction).all() and np.all(found.pivot > 0.0)
+    if star.current is None and not np.any(star.gravity):
+        assert np.abs(found.phi).max() < 1e-25 and found.largest.max() < 1e-13
+
+
+CARRIED = [name for name, (_, star) in TERMS.items() if star.current is None and not star.loads]
+
+
+@pytest.mark.parametrize("name", CARRIED)
+def test_where_a_robot_lies_and_how_it_is_turned_changes_no_potential_and_turns_its_step(name):
+    (scene, star), angle, place = TERMS[name], 1.3, [0.2, -0.5]
+    stages, turned = (RandomStages(star, 1e-2, bend=0.1) for _ in range(2))
+    for places in ("q", "frozen", "q_hat"):
+        setattr(turned, places, rotated(getattr(stages, places), angle) + place)
+    turned.v_hat = rotated(stages.v_hat, angle)
+    there, here = turned.run(make_rods(scene)), stages.run(make_rods(scene))
+    np.testing.assert_allclose(there.phi, here.phi, rtol=1e-9)
+    size = np.abs(here.direction).max()
+    np.testing.assert_allclose(there.direction, rotated(here.direction, angle), rtol=0.0, atol=1e-8 * size)
+
+
+@EVERY_HUB
+def test_a_mirrored_robot_has_the_mirrored_step(hub):
+    """Limbs 2 and 5, 3 and 4 change places, and turn the other way."""
+    rods, star = rods_of(robot_and_star(5, 4, hub)[0]), robot_and_star(5, 4, hub)[1]
+    limbs, (stages, mirrored) = [0, 4, 3, 2, 1], (RandomStages(star, 1e-2, bend=0.1) for _ in range(2))
+    order = np.concatenate([[0], *(3 * limb + np.arange(1, 4) for limb in limbs)])
+    for each in ("q", "frozen", "q_hat", "v_hat"):
+        setattr(mirrored, each, getattr(stages, each)[:, order] * [1.0, -1.0])
+    mirrored.delta_psi = -stages.delta_psi[:, limbs]
+    there, here = mirrored.run(rods), stages.run(rods)
+    np.testing.assert_allclose(there.phi, here.phi, rtol=1e-10)
+    size = np.abs(here.direction).max()
+    np.testing.assert_allclose(there.direction, here.direction[:, order] * [1.0, -1.0], rtol=0.0, atol=1e-8 * size)
+
+
+@EVERY_TERM
+def test_a_regularised_matrix_is_positive_definite_however_wild_robots_are(name):
+    """It is the sum of the convex parts, of the robots that are asked about alone; damping has none of its own."""
+    scene, star = TERMS[name]
+    stages = RandomStages(star, 0.05, bend=0.8, stretch=0.2, speed=1.0)
+    asked = np.arange(N_LANES) % 2 == 0
+    found = stages.run(make_rods(scene), Mask(asked))
+    assert np.all(found.pivot[asked] > 0.0) and np.all(found.decrement[asked] > 0.0)
+    if star.relaxation_time == 0.0:
+        for lane in range(N_LANES):
+            if found.pivot[lane] > 0.0:
+                stages.assert_step(found, lane, stages.hessian(lane, convex=asked[lane]), 1e-8)
+
+
+@EVERY_HUB
+def test_newton_direction_of_wildly_bent_robots_is_as_good_as_their_matrix_allows(hub):
+    """Limbs turned by more than a quarter from where a rigid hub would have them, too."""
+    robot, star = robot_and_star(5, 4, hub)
+    stages = RandomStages(star, 1e-3, bend=0.8, stretch=0.1, speed=1.0, seed=1)
+    found = stages.run(rods_of(robot))
+    for lane in range(N_LANES):
+        hessian = stages.hessian(lane)
+        direction = np.linalg.solve(hessian, stages.gradient(lane).ravel()).reshape(-1, 2)
+        error = np.abs(found.direction[lane] - direction).max() / np.abs(direction).max()
+        assert error < 1e-14 * np.linalg.cond(hessian)
+    turns = [oracle.clamp_turns(star, *pose) for pose in zip(stages.q, stages.delta_psi, strict=True)]
+    assert hub != "rigid" or np.abs(turns).max() > np.pi / 2.0
+
+
+@EVERY_HUB
+@pytest.mark.parametrize("gamma", [3e-3, 4e-3, 5e-3])
+def test_smallest_pivot_is_positive_exactly_where_the_hessian_is_positive_definite(hub, gamma):
+    robot, star = robot_and_star(5, 4, hub)
+    definite = []
+    for seed in range(64 // N_LANES):
+        stages = RandomStages(star, gamma, bend=0.3, stretch=0.02, seed=seed)
+        found = stages.run(rods_of(robot))
+        smallest = [np.linalg.eigvalsh(stages.hessian(lane))[0] for lane in range(N_LANES)]
+        np.testing.assert_array_equal(found.pivot > 0.0, np.array(smallest) > 0.0)
+        definite += list(found.pivot > 0.0)
+    assert 0 < sum(definite) < len(definite)
+
+
+def test_a_matrix_that_is_not_a_number_does_not_pass_for_positive_definite():
+    robot, star = robot_and_star(5, 4)
+    for node in range(star.n_nodes):
+        stages = RandomStages(star, 1e-3)
+        stages.q[1, node] = np.nan
+        found = stages.run(rods_of(robot))
+        assert not found.pivot[1] > 0.0
+        others = np.arange(N_LANES) != 1
+        assert np.all(found.pivot[others] > 0.0) and np.isfinite(found.direction[others]).all()
+
+
+def test_every_robot_may_have_coefficients_of_its_own():
+    shared, (stiffness, weight) = (
+        make_rods(Scene(Seastar(nodes_per_limb=4))),
+        np.linspace(1.0, 3.0, 2 * N_LANES).reshape(2, -1),
+    )
+
+    def scaled(part, **scales):
+        return part._replace(**{field: getattr(part, field)[:, None] * scale for field, scale in scales.items()})
+
+    own = scaled(shared, mass=weight, edge_mass=weight)._replace(
+        stretching=scaled(shared.stretching, EA=stiffness, EA_over_l=stiffness, l_over_EA=1.0 / stiffness),
+        bending=scaled(shared.bending, EI_over_dl=stiffness, dl_over_EI=1.0 / stiffness),
+    )
+    stages = RandomStages(Continuum(nodes_per_limb=4), 0.01)
+    found = stages.run(own)
+    for lane in range(N_LANES):
+        stages.star = Continuum(nodes_per_limb=4, youngs_modulus=1e6 * stiffness[lane], density=1000.0 * weight[lane])
+        stages.assert_step(found, lane, stages.hessian(lane), 1e-11)
+
+
+# What a scene does not name
+
+
+UNTOUCHED = object()
+ABSENT = {
+    "inertia of edges": (subtract_edge_inertia, (NO_RODS, None, 1, None, None, UNTOUCHED)),
+    "added mass": (add_fluid_inertia, (NO_WORK, 1, None, None, None, UNTOUCHED)),
+    "added mass of edges": (subtract_edge_fluid_inertia, (NO_RODS, None, None, 1, None, None, UNTOUCHED)),
+    "energy of added mass": (add_fluid_energy, (NO_RODS, NO_WORK, None, None, UNTOUCHED)),
+    "work of a current": (add_work_of_current, (NO_RODS, NO_WORK, None, None, None, UNTOUCHED)),
+    "drag across": (add_cross_flow, (NO_RODS, None, 1, None, None, None, None, UNTOUCHED)),
+    "damped stress": (damped_stress, (NO_RODS, None, 0, None, UNTOUCHED, None)),
+    "damped energy": (damped_energy, (NO_RODS, None, 0, None, None, None, None, UNTOUCHED)),
+    "damped stiffness": (damped_stiffness, (NO_RODS, None, UNTOUCHED)),
+    "actuators along": (add_moved_energy, (NO_RODS, None, None, None, None, UNTOUCHED)),
+    "contact": (add_contact, (NO_RODS, NO_WORK, None, None, UNTOUCHED)),
+    "energy of contact": (add_contact_energy, (NO_RODS, NO_WORK, None, UNTOUCHED)),
+    "energy that contact holds": (add_held_energy, (NO_RODS, None, None, None, UNTOUCHED)),
+    "limbs that touch": (not_touching, (NO_WORK, UNTOUCHED)),
+    "limbs that cross": (without_new_crossings, (NO_RODS, None, None, None, UNTOUCHED)),
+    "coupled steps": (solve_coupled, (None, NO_WORK, None, UNTOUCHED)),
+}
+
+
+@pytest.mark.parametrize("name", ABSENT)
+def test_a_term_that_is_not_there_changes_no_bit(name):
+    kernel, args = ABSENT[name]
+    assert kernel.plain(*args) is UNTOUCHED
+
+
+def test_forces_and_flows_that_are_not_there_are_zero_and_a_hub_without_any_preference_has_an_orientation():
+    x, y = Lanes(3.0), Lanes(1.0)
+    assert plain(contact_force.plain(NO_WORK, 1)) == plain(nodal_load.plain(NO_RODS, 2)) == (0.0, 0.0)
+    assert plain(load_power.plain(NO_RODS, 2, x, y)) == plain(solver_iterations.plain(NO_WORK)) == 0.0
+    assert relative.plain(NO_WORK, 1, x, y) == (x, y)
+    assert [float(plain(one)) for one in orientation.plain(Lanes(0.0), Lanes(0.0))] == [1.0, 0.0]
+    for named in ("current", "added_mass", "body"):  # any step may gain energy
+        assert may_gain.plain(NO_RODS._replace(**{named: object()}), None, None, None, EVERYONE) is EVERYONE
+
+
+# Actuators
+
+
+ACTUATED = {
+    "rigid hub": Seastar(3, 4),
+    "limbs bent": Seastar(3, 4, limbs=tuple(Limb(natural_curvature=k) for k in (4.0, 0.0, -3.0))),
+    "bent along": Seastar(3, 4, along=AlongLimb(0.7, (1.0, 3.0, 0.5))),
+    "bent along and stiffer": Seastar(3, 4, along=AlongLimb(0.7), stiffening=Stiffening(2.5, 0.4, 0.1)),
+    "stiffer only": Seastar(3, 4, stiffening=Stiffening(2.5, 0.4, 0.1)),
+    "body": Seastar(3, 4, body=Body(radius=0.02)),
+    "opening": robot_with("opening", n_limbs=4, nodes_per_limb=4),
+    "turning": robot_with("turning", nodes_per_limb=4),
+    "one hub hinge": robot_with("turning", n_limbs=2, nodes_per_limb=4),
+}
+
+
+@pytest.mark.parametrize("name", ACTUATED)
+def test_the_moment_that_resists_an_actuator_is_the_slope_of_the_energy_in_its_rotation(name):
+    robot = ACTUATED[name]
+    rods, rng = make_rods(Scene(robot, actuator=SmaPulse(0.3))), np.random.default_rng(0)
+    q = rows(robot.nodes() + 2e-3 * rng.standard_normal((robot.n_nodes, 2)))
+    if robot.has_body:
+        q = np.vstack([q, np.full((1, N_LANES), 2e-3), np.zeros((1 + 2 * robot.n_limbs, N_LANES))])
+        place_roots.plain(rods, q)
+    work, turns, moments = make_work(rods, 1), rng.uniform(-0.2, 0.2, robot.n_limbs), np.zeros((robot.n_limbs, N_LANES))
+
+    def actuation(turns):
+        return Actuation(*(np.tile(turns[:, None], N_LANES) for _ in range(2)))
+
+    def energy(turns):
+        set_natural_hub_angles.plain(rods, work, actuation(turns), Lanes(0.0))
+        return plain(elastic_energy.plain(rods, work, q))[0]
+
+    fill_moments.plain(rods, work, actuation(turns), q, moments)
+    np.testing.assert_allclose(moments[:, 0], gradient(energy, turns, 1e-3), rtol=1e-6)
+
+
+@EVERY_HUB
+def test_what_is_natural_follows_the_limbs_linearly_in_time(hub):
+    """And at both ends of an interval the other end does not matter."""
+    rods = make_rods(Scene(robot_with(hub, nodes_per_limb=4), actuator=SmaPulse(0.3)))
+    begin, end = np.random.default_rng(0).uniform(-0.3, 0.3, (2, 5, N_LANES))
+
+    def natural(begin, end, fraction):
+        work = make_work(rods, 1)
+        set_natural_hub_angles.plain(rods, work, Actuation(begin, end), Lanes(fraction))
+        return work.hub_EI_kappa_bar if rods.clamp is None else work.hub_direction
+
+    at = begin + 0.3 * (end - begin)
+    np.testing.assert_allclose(natural(begin, end, 0.3), natural(at, at, 0.0), rtol=1e-12)
+    np.testing.assert_array_equal(natural(begin, end, 0.0), natural(begin, 0.0 * end, 0.0))
