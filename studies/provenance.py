@@ -40,13 +40,7 @@ def _processor() -> str:
 
 
 COMMANDS = {
-    "gaits/gaits.json": "python -m studies.gaits",
-    "gaits/heading.json": "python -m studies.learning.heading",
-    "designs/hub.json": "python -m studies.designs.hub",
-    "validation/limbs.json": "python -m studies.measurements.limbs",
     "accuracy/promises.json": "python -m studies.accuracy.promises",
-    "tasks/tasks.json": "python -m studies.tasks",
-    "validation/validation.json": "python -m studies.validation",
 }
 """Commands of files that were written before studies recorded them."""
 
@@ -54,13 +48,14 @@ COMMANDS = {
 FINAL = {
     file: commit
     for commit, files in {
-        "0e818f3": "accuracy/damping.json accuracy/damping.png learning/fidelities.json learning/fidelities.png "
-        "gaits/gaits.json gaits/gaits_directions.png gaits/gaits_front.png gaits/gaits_lag.png "
-        "gaits/pentagon_from_rest.json gaits/pentagon_reheated.json",
-        "9cd3be4": "learning/ablations.json learning/ablations.png accuracy/ringing.json accuracy/ringing.png",
-        "71299f4": "gaits/heading.json gaits/heading.png designs/hub.json designs/hub.png "
-        "accuracy/numerical_damping.json",
-        "60498ae": "learning/in_time.json learning/in_time.png",
+        "0e818f3": "accuracy/damping.json accuracy/damping.png learning/fidelities.png gaits/gaits_directions.png "
+        "gaits/gaits_front.png gaits/gaits_lag.png gaits/pentagon_from_rest.json gaits/pentagon_reheated.json",
+        "9cd3be4": "learning/ablations.png accuracy/ringing.json accuracy/ringing.png",
+        "71299f4": "gaits/heading.png designs/hub.png accuracy/numerical_damping.json",
+        "60498ae": "learning/in_time.png",
+        "055100c4": "designs/designs.png designs/front.png gradients/gradients.png learning/bound.json "
+        "learning/bound.png learning/pentagon.png speed/throughput.png tasks/tasks.png validation/limbs.png "
+        "validation/validation.png",
     }.items()
     for file in files.split()
 }

@@ -11,7 +11,6 @@ Times are processor times of one thread per robot and stroke, the best of severa
 numbers (JSON) and a picture. A robot whose numbers are in the file is not swum again.
 """
 
-import time
 from functools import partial
 from typing import Any
 
@@ -21,19 +20,18 @@ from seastar_gym.accuracy.commands import CLASSES, PROMISED, draw_classes
 from seastar_gym.accuracy.measure import errors, path_lengths, swim
 from seastar_gym.accuracy.setting import at
 from seastar_gym.gaits import STRAIGHT
-from seastar_gym.scene import Contact, Numerics, Scene, Seastar, SmaPulse
+from seastar_gym.scene import Contact, Numerics, Scene, Seastar, SmaPulse, relaxation_time
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from studies.accuracy.settings import MILLI
 from studies.accuracy.work_precision_page import draw, of_presets, of_settings
+from studies.benchmark import repeat
 from studies.frame import Floats, Results, Study
-from studies.speed.strokes import repeat
-from studies.speed.terms import SILICONE
 
 PROBLEMS: dict[str, Scene] = {
     "chapter's robot": Scene(),
-    "silicone": Scene(Seastar(relaxation_time=SILICONE)),
+    "silicone": Scene(Seastar(relaxation_time=relaxation_time(0.1, 10.0))),
     "thermal actuators": Scene(actuator=ThermalSma()),
     "contact": Scene(contact=Contact()),
     "three limbs": Scene(Seastar(3), actuator=SmaPulse(0.4)),
@@ -72,7 +70,7 @@ def cost(scene: Scene, n_robots: int = BATCH, error_bars: bool = False) -> float
     def stroke() -> None:
         simulator.stroke(rng.integers(-1, 2, (n_robots, scene.robot.n_limbs)).astype(float))
 
-    return min(repeat(stroke, 0.0, STROKES, time.thread_time)) / n_robots
+    return min(repeat(stroke, 0.0)) / n_robots
 
 
 def finite(number: float) -> float | None:

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator, SolverStatus
+from studies.benchmark import repeat
 from studies.frame import Floats
-from studies.speed.strokes import repeat
 from studies.style import MS
 
 
@@ -127,7 +127,7 @@ def computing_seconds(simulator: Simulator, seconds: float) -> float:
     The shortest one counts, because other work of the machine can only add time.
     """
     commands = np.tile(STRAIGHT, (simulator.n_robots, 1))
-    return min(repeat(lambda: simulator.stroke(commands), seconds, at_least=3))
+    return min(repeat(lambda: simulator.stroke(commands), seconds))
 
 
 def needs_regularisation(scene: Scene) -> bool:

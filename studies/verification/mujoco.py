@@ -18,9 +18,9 @@ from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simulator import Simulator, State
+from studies.benchmark import repeat
 from studies.frame import Floats, Results, Study, rounded
 from studies.pages import markdown
-from studies.speed.strokes import repeat
 from studies.style import COLOURS, FAINT, MS, PERCENT, subplots
 from studies.verification import exact
 from studies.verification.unactuated import HUB, let_pass, pause
@@ -127,7 +127,7 @@ class Rod:
 
     def seconds_per_step(self) -> float:
         """Processor time of a step [s], the best of five goes from where the rod is."""
-        return min(repeat(lambda: self.advance(TIMED_STEPS), 0.0, clock=time.process_time)) / TIMED_STEPS
+        return min(repeat(lambda: self.advance(TIMED_STEPS), 0.0)) / TIMED_STEPS
 
 
 def our_scene(nodes: int, duration: float, numerics: Numerics, **others: Any) -> Scene:

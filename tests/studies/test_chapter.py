@@ -16,7 +16,6 @@ from studies.chapter.study import STUDY
 from studies.chapter.swims import CHAPTER, swim
 from studies.continuum import NAMES, scene
 from studies.frame import DOCS, as_json, keep, rounded
-from studies.learning import traces
 from studies.pages import numbers
 
 COARSE = replace(swims.CHAPTER, numerics=Numerics("implicit-euler", 10e-3))
@@ -330,12 +329,3 @@ def test_a_swim_of_the_chapter_comes_back():
         at = swum.at(time)
         np.testing.assert_allclose(again.positions[at, 0], swum.positions[at, 0], atol=chapter.UNIT)
     assert np.isnan(again.positions[3, 0, 1:]).all()
-
-
-def test_ways_round_the_pentagon_come_back():
-    swims = traces.swims(max_strokes=3)
-    results = json.loads(as_json(traces.as_data(swims)))
-    for before, after in zip(swims, traces.from_data(results), strict=True):
-        assert (after.agent, after.strokes, after.result) == (before.agent, 3, before.result)
-        np.testing.assert_allclose(after.hub, before.hub, atol=traces.UNIT)
-        np.testing.assert_allclose(after.waypoints, before.waypoints, atol=1e-6)

@@ -133,7 +133,7 @@ def test_the_list_has_every_study_with_a_line(capsys):
     printed = capsys.readouterr().out
     for name, line in declared().items():
         assert f"    {name} " in printed and line and line in printed
-    assert {"tasks", "designs.certificates", "scenes.gallery", "learning.bound", "accuracy"} <= set(declared())
+    assert {"tasks", "gallery", "benchmark", "accuracy"} <= set(declared())
 
 
 @pytest.mark.parametrize("name", declared())
@@ -155,9 +155,9 @@ def test_help_names_the_command_and_shows_the_docstring_in_the_width_of_the_term
 def test_a_study_is_run_by_the_name_of_its_module_too():
     done = [
         subprocess.run([sys.executable, "-m", *words, "--help"], capture_output=True, text=True, check=True).stdout
-        for words in (["studies", "scenes.thermal"], ["studies.scenes.thermal"])
+        for words in (["studies", "fit"], ["studies.fit"])
     ]
-    assert done[0] == done[1] and "usage: python -m studies.scenes.thermal [" in done[0]
+    assert done[0] == done[1] and "usage: python -m studies.fit [" in done[0]
 
 
 # All studies draw in one style.
@@ -169,7 +169,7 @@ STUDIES = Path(__file__).parents[2] / "studies"
 def test_pictures_begin_with_the_style():
     """Nobody else makes figures, so that a change of the style changes all pictures."""
     texts = {file: file.read_text(encoding="utf-8") for file in STUDIES.rglob("*.py") if file.name != "style.py"}
-    assert len(texts) > 50
+    assert len(texts) > 20
     assert not [file for file, text in texts.items() if "pyplot" in text or "Figure(figsize" in text]
 
 
