@@ -14,7 +14,7 @@ from seastar_gym import AlongLimb, Limited, Scene, Seastar, SmaLimb, SmaPulse, S
 from seastar_gym.scene.actuators.actuator import check_actuator
 from seastar_gym.scene.actuators.pulse import pulse
 from seastar_gym.scene.actuators.sma_limb import MEASURED
-from studies.measurements.curves import curvature
+from studies.fit import curvature
 
 WIRES = SmaWires()
 PEAK = WIRES.peak_angle
@@ -249,9 +249,8 @@ def test_temperature_solves_the_heat_equation_after_the_delay(command):
 def test_repeated_commands_tend_to_the_closed_form_of_the_periodic_state(liquid_metal, frequency):
     limb = SmaLimb.preset(liquid_metal, period=1.0 / frequency)
     t = np.linspace(0.0, limb.period, 50)
-    numbers = {"width" if n == "heating_time" else n: x for n, x in MEASURED[liquid_metal]._asdict().items()}
     found = limb.curvature(limb.temperatures(t, np.ones(()), periodic(limb))[:, 0])
-    np.testing.assert_allclose(found, curvature(numbers, frequency, t), rtol=1e-9)
+    np.testing.assert_allclose(found, curvature(MEASURED[liquid_metal], frequency, t), rtol=1e-9)
 
 
 def test_a_new_command_waits_no_longer():
