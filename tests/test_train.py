@@ -119,6 +119,7 @@ def scalars(folder):
 
 
 def test_a_run_leaves_everything_in_its_folder(finished):
+    """Among it the model of the last checkpoint, and the policy of that model with what it was trained by."""
     files = {str(file.relative_to(finished)) for file in finished.rglob("*") if file.is_file()}
     expected = {
         "config.json", "model.zip", "progress.csv", "efficiency.json", "policy.json", "policy.safetensors",
@@ -126,28 +127,29 @@ def test_a_run_leaves_everything_in_its_folder(finished):
         "evaluation/evaluation.csv", "evaluation/traces.png", "evaluation/report.html",
     }  # fmt: skip
     logs = {file for file in files if file.startswith("tensorboard/")}
-    assert files - logs == expected
-    assert len(logs) == 1
+    assert files - logs == expected and len(logs) == 1
+    model = (finished / "model.zip").read_bytes()
+    assert model == (finished / "checkpoints" / "model_000000512.zip").read_bytes()
+    policy, model = policies.load(finished / "policy.safetensors"), load(finished / "model.zip")
+    assert model.actions == "pairs"
+    for name, array in model.weights.items():
+        np.testing.assert_array_equal(policy.weights[name], array)
+    config = json.loads((finished / "config.json").read_text())
+    assert policy.training["commands"] == config["commands"] and policy.training["versions"] == config["versions"]
+    assert (policy.training["seed"], policy.training["strokes"]) == (4, 512)
+    assert [trained for trained, *_ in policy.training["progress"]] == [0, 256, 512]
 
 
-def test_the_config_says_which_command_made_it(finished):
+def test_the_config_says_which_command_made_it_and_logs_have_the_customary_names(finished):
     config = json.loads((finished / "config.json").read_text())
     (command,) = config["commands"]
-    assert shlex.split(command)[:2] == ["python", "train.py"]
-    again = read_options(shlex.split(command)[2:])
-    assert again == Options(
-        **{**saved_options(finished).__dict__, "resume": None},
-    )
-    assert config["versions"]["stable_baselines3"]
-
-
-def test_logs_have_the_customary_names(finished):
+    assert shlex.split(command)[:2] == ["python", "train.py"] and config["versions"]["stable_baselines3"]
+    assert read_options(shlex.split(command)[2:]) == Options(**{**saved_options(finished).__dict__, "resume": None})
     logs = scalars(finished)
     for tag in ("rollout/ep_rew_mean", "rollout/success_rate", "time/fps", "eval/pentagon_strokes", "train/loss"):
         assert logs[tag], tag
     shares = [logs[f"time/share_{name}"][-1][1] for name in ("simulator", "policy", "update")]
-    assert sum(shares) == pytest.approx(1.0)
-    assert min(shares) > 0.0
+    assert sum(shares) == pytest.approx(1.0) and min(shares) > 0.0
 
 
 def test_the_report_has_the_numbers_of_the_table(finished):
@@ -165,38 +167,11 @@ def test_the_report_has_the_numbers_of_the_table(finished):
     assert 'id="curves"' in report
 
 
-def test_the_model_is_that_of_the_last_checkpoint(finished):
-    model = (finished / "model.zip").read_bytes()
-    assert model == (finished / "checkpoints" / "model_000000512.zip").read_bytes()
-    assert load(finished / "model.zip").actions == "pairs"
-
-
-def test_the_exported_policy_is_the_model_s(finished):
-    policy, model = policies.load(finished / "policy.safetensors"), load(finished / "model.zip")
-    for name, array in model.weights.items():
-        np.testing.assert_array_equal(policy.weights[name], array)
-    config = json.loads((finished / "config.json").read_text())
-    assert policy.training["commands"] == config["commands"]
-    assert policy.training["versions"] == config["versions"]
-    assert (policy.training["seed"], policy.training["strokes"]) == (4, 512)
-    assert [trained for trained, *_ in policy.training["progress"]] == [0, 256, 512]
-
-
 @pytest.fixture
 def short_cards(monkeypatch):
     """Cards that are written in a second: test_cards.py looks at whole ones."""
     monkeypatch.setattr("agents.cards.FIDELITIES", ("fast",))
     monkeypatch.setattr("agents.cards.HELD_OUT_PATHS", 1)
-
-
-def test_one_option_puts_the_policy_in_the_box(finished, tmp_path, monkeypatch, short_cards):
-    shutil.copytree(finished, tmp_path / "tiny")
-    monkeypatch.setattr(publishing, "BUNDLED", tmp_path / "box" / "strokes.safetensors")
-    assert train.main(["--resume", str(tmp_path / "tiny")]) == 0
-    assert not (tmp_path / "box").exists()
-    assert train.main(["--resume", str(tmp_path / "tiny"), "--publish"]) == 0
-    shipped = policies.load(tmp_path / "box" / "strokes.safetensors")
-    assert shipped.training["seed"] == 4
 
 
 def test_a_finished_run_can_be_trained_for_more_strokes(finished, tmp_path, capsys):
@@ -266,42 +241,16 @@ def test_ctrl_c_leaves_a_usable_model_and_says_how_to_go_on(tmp_path, stopped, s
     assert "Learned against scripted" in (folder / "evaluation" / "report.html").read_text()
 
 
-@pytest.mark.parametrize(
-    "make, sentence",
-    [
-        (lambda folder: None, "There is no run to continue in"),
-        (lambda folder: (folder / "config.json").write_text("{"), "is damaged or from another version"),
-        (lambda folder: (folder / "config.json").write_text('{"options": {}}'), "is damaged or from another version"),
-    ],
-)
-def test_a_folder_without_a_run_cannot_be_resumed(tmp_path, capsys, make, sentence):
-    make(tmp_path)
-    assert train.main(["--resume", str(tmp_path)]) == 2
-    assert_told(capsys, sentence)
-
-
-def test_a_run_without_its_model_cannot_be_resumed(finished, tmp_path, capsys):
-    for name in ("config.json", "progress.csv"):
-        (tmp_path / name).write_bytes((finished / name).read_bytes())
-    assert train.main(["--resume", str(tmp_path), "--strokes", "1024"]) == 2
-    assert "There is no trained policy at" in capsys.readouterr().err
-
-
-def test_a_run_killed_before_its_first_checkpoint_is_continued_from_its_beginning(finished, tmp_path):
-    (tmp_path / "config.json").write_bytes((finished / "config.json").read_bytes())
-    assert train.main(["--resume", str(tmp_path)]) == 0
-    first, again = (policies.load(folder / "policy.safetensors") for folder in (finished, tmp_path))
-    for name, array in first.weights.items():
-        np.testing.assert_array_equal(again.weights[name], array)
-    assert len(again.training["commands"]) == 2
-
-
-def test_an_empty_folder_is_taken(tmp_path):
+def test_a_folder_is_taken_while_it_is_empty_and_never_written_over(finished, tmp_path, capsys):
     (tmp_path / part_name("config.json")).write_text("{")
     with held(tmp_path, new=True):
         (tmp_path / "somebody's").write_text("work")
     with pytest.raises(ValueError, match="exists already"), held(tmp_path, new=True):
         pass
+    before = (finished / "model.zip").read_bytes()
+    assert train.main([*TINY, "--strokes", "128", "--out", str(finished)]) == 2
+    assert_told(capsys, "exists already")
+    assert (finished / "model.zip").read_bytes() == before
 
 
 def test_two_never_train_in_one_folder(finished, tmp_path, capsys):
@@ -321,22 +270,21 @@ RUN = ("config.json", "model.zip", "progress.csv", "efficiency.json", "policy.js
        "evaluation", "config.json.part", "scene.json")  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", ["link", "dangling", "pipe", "folder of somebody"])
-@pytest.mark.parametrize("name", RUN)
-def test_a_folder_with_links_is_not_continued(name, kind, finished, tmp_path, capsys):
-    folder, somebodys = tmp_path / "run", tmp_path / "somebody"
-    shutil.copytree(finished, folder)
-    somebodys.mkdir()
-    (somebodys / "file").write_text("work")
-    place = folder / name
-    shutil.rmtree(place) if place.is_dir() else place.unlink(missing_ok=True)
-    if kind == "pipe":
-        os.mkfifo(place)
-    else:
-        place.symlink_to(somebodys / {"link": "file", "dangling": "new", "folder of somebody": ""}[kind])
-    assert train.main(["--resume", str(folder), "--strokes", "1024"]) == 2
-    assert_told(capsys)
-    assert [file.name for file in somebodys.iterdir()] == ["file"] and (somebodys / "file").read_text() == "work"
+KINDS = ("link", "dangling", "pipe", "folder of somebody")
+
+
+def linked(name, kind):
+    """Function that puts a pipe, or a link to what is somebody's, into a folder."""
+
+    def damage(folder):
+        somebodys, place = folder.parent / "somebody", folder / name
+        shutil.rmtree(place) if place.is_dir() else place.unlink(missing_ok=True)
+        if kind == "pipe":
+            os.mkfifo(place)
+        else:
+            place.symlink_to(somebodys / {"link": "file", "dangling": "new", "folder of somebody": ""}[kind])
+
+    return damage
 
 
 def damaged_config(change):
@@ -364,21 +312,22 @@ def damaged_file(name, text):
 
 DEEP = "[" * 100_000
 DAMAGES = {
+    **{f"{name}: {kind}": linked(name, kind) for name in RUN for kind in KINDS},
+    "no run": (lambda folder: (folder / "config.json").unlink(), "There is no run to continue in"),
+    "no model": (lambda folder: (folder / "model.zip").unlink(), "There is no trained policy at"),
+    "half a config": (damaged_file("config.json", "{"), "is damaged or from another version"),
+    "an empty config": (damaged_file("config.json", '{"options": {}}'), "is damaged or from another version"),
     "no commands": damaged_config(lambda config: config.pop("commands")),
-    "commands null": damaged_config(lambda config: config.update(commands=None)),
     "commands of numbers": damaged_config(lambda config: config.update(commands=[1])),
     "options null": damaged_config(lambda config: config.update(options=None)),
     "no versions": damaged_config(lambda config: config.pop("versions")),
     "ppo a list": damaged_options(ppo=[]),
     "a huge rollout": damaged_ppo(rollout=1_000_000_000),
-    "a rollout of text": damaged_ppo(rollout="16"),
     "huge layers": damaged_ppo(hidden=[2**20, 2**20]),
     "many layers": damaged_ppo(hidden=[2**20] * 100_000),
     "hidden null": damaged_ppo(hidden=None),
     "reward null": damaged_ppo(reward=None),
     "an infinite discount": damaged_ppo(discount=math.inf),
-    "a learning rate of text": damaged_ppo(learning_rate="fast"),
-    "a negative seed": damaged_options(seed=-1),
     "a huge seed": damaged_options(seed=10**30),
     "a seed of text": damaged_options(seed="0"),
     "strokes of text": damaged_options(strokes="many"),
@@ -393,21 +342,33 @@ DAMAGES = {
     "efficiency of text": damaged_file("efficiency.json", '{"seconds": "long"}'),
     "efficiency null": damaged_file("efficiency.json", '{"strokes": null}'),
     "efficiency nan": damaged_file("efficiency.json", '{"seconds": NaN}'),
+    "other efficiency": (damaged_file("efficiency.json", '{"hours": 3}'), "efficiency.json is damaged"),
     "no zip": damaged_file("model.zip", "PK"),
     "deep scene": lambda folder: (damaged_options(scene="x.py")(folder), damaged_file("scene.json", DEEP)(folder)),
 }  # fmt: skip
+"""What happens to a run's folder, some with words of the sentence."""
 
 
-@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
-def test_a_damaged_folder_is_refused_in_a_sentence(damage, finished, tmp_path, capsys):
-    folder = tmp_path / "run"
+@pytest.mark.parametrize("name", DAMAGES)
+def test_a_damaged_folder_is_refused_in_a_sentence(name, finished, tmp_path, capsys):
+    folder, (damage, *words) = tmp_path / "run", DAMAGES[name] if isinstance(DAMAGES[name], tuple) else [DAMAGES[name]]
     shutil.copytree(finished, folder)
+    (tmp_path / "somebody").mkdir()
+    (tmp_path / "somebody" / "file").write_text("work")
     damage(folder)
     assert train.main(["--resume", str(folder), "--strokes", "1024"]) == 2
-    assert_told(capsys)
+    assert_told(capsys, *words)
+    assert [(file.name, file.read_text()) for file in (tmp_path / "somebody").iterdir()] == [("file", "work")]
 
 
-def test_a_checkpoint_that_a_kill_cut_short_is_completed(finished, tmp_path):
+def test_a_run_killed_before_its_first_checkpoint_or_in_one_is_continued_from_where_it_was(finished, tmp_path):
+    (tmp_path / "first").mkdir()
+    (tmp_path / "first" / "config.json").write_bytes((finished / "config.json").read_bytes())
+    assert train.main(["--resume", str(tmp_path / "first")]) == 0
+    first, again = (policies.load(folder / "policy.safetensors") for folder in (finished, tmp_path / "first"))
+    for name, array in first.weights.items():
+        np.testing.assert_array_equal(again.weights[name], array)
+    assert len(again.training["commands"]) == 2
     folder = tmp_path / "tiny"
     shutil.copytree(finished, folder)
     lines = (finished / "progress.csv").read_text().splitlines()
@@ -496,43 +457,25 @@ def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_pa
     assert "not recorded" not in card
 
 
-def test_a_policy_no_worse_than_that_in_the_box_needs_no_second_word(finished, box, monkeypatch):
+def test_only_a_policy_no_worse_than_a_readable_one_in_the_box_needs_no_second_word(finished, box, monkeypatch):
     monkeypatch.setattr(publishing, "HELD_OUT_PATHS", 2)
-    policies.save(policies.load(finished / "policy.safetensors"), box)
-    assert publishing.why_not(policies.load(finished / "policy.safetensors"), saved_options(finished)) is None
-
-
-def test_a_box_that_cannot_be_read_is_not_overwritten_at_once(finished, box):
-    box.write_bytes(b"")
     policy, options = policies.load(finished / "policy.safetensors"), saved_options(finished)
+    policies.save(policy, box)
+    assert publishing.why_not(policy, options) is None
+    box.write_bytes(b"")
     assert "nothing to compare with" in publishing.why_not(policy, options)
 
 
-def test_a_quick_run_is_asked_twice_before_it_begins(tmp_path, capsys):
-    assert train.main(["--quick", "--publish", "--out", str(tmp_path / "run")]) == 2
-    assert_told(capsys, "only with --publish-anyway")
-    assert train.main(["--publish-anyway", "--out", str(tmp_path / "run")]) == 2
-    assert_told(capsys, "give both")
-    assert not (tmp_path / "run").exists()
-
-
-def test_a_folder_in_use_is_not_written_over(finished, capsys):
-    before = (finished / "model.zip").read_bytes()
-    assert train.main([*TINY, "--strokes", "128", "--out", str(finished)]) == 2
-    assert "exists already" in capsys.readouterr().err
-    assert (finished / "model.zip").read_bytes() == before
-
-
-def test_quick_is_short_and_fast():
+def test_a_quick_run_is_short_and_fast_and_published_only_when_asked_twice(tmp_path, capsys):
     options = read_options(["--quick"])
-    assert options.length < Options().length / 2
-    assert options.fidelity == "fast"
-
-
-def test_a_training_in_time_is_longer_than_one_in_strokes_unless_its_length_is_told():
+    assert options.length < Options().length / 2 and options.fidelity == "fast"
     in_time = ["--decision-period", "0.5"]
     assert read_options([]).length < read_options(in_time).length
     assert read_options([*in_time, "--strokes", "7"]).length == 7
+    for asked, words in (("--quick --publish", "only with --publish-anyway"), ("--publish-anyway", "give both")):
+        assert train.main([*asked.split(), "--out", str(tmp_path / "run")]) == 2
+        assert_told(capsys, words)
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_run_says_how_long_it_took_to_round_the_pentagon_in_time(finished):
@@ -561,12 +504,6 @@ def swim_of(seconds, reached):
         "learned", np.zeros((5, 2)), np.zeros((2, 2)), np.array([0, reached]), np.array([0.0, seconds]), np.zeros(1),
         np.zeros(1), np.zeros(1), None,
     )  # fmt: skip
-
-
-def test_efficiency_that_is_damaged_is_refused(tmp_path):
-    (tmp_path / efficiency.FILE).write_text('{"hours": 3}')
-    with pytest.raises(ValueError, match=r"efficiency\.json is damaged"):
-        efficiency.read(tmp_path)
 
 
 def test_several_seeds_are_runs_of_their_own(tmp_path, capsys, short_swims):
@@ -666,7 +603,4 @@ def test_a_timed_training_is_evaluated_and_kept_in_its_own_decisions(tmp_path, m
     shipped = policies.bundled_file(0.5, tmp_path / "box" / "strokes.safetensors")
     assert policies.load(shipped).decision_period == 0.5
     assert publishing.why_not(policy, saved_options(folder)) is None
-
-
-def test_decisions_of_no_gait_are_evaluated_without_a_script():
-    assert train.script(0.3) == {} and train.script(None)["script"].decision_period is None
+    assert train.script(0.3) == {} and train.script(None)["script"].decision_period is None  # 0.3 s is of no gait

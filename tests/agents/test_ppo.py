@@ -7,7 +7,6 @@ import random
 import zipfile
 from dataclasses import replace
 
-import gymnasium as gym
 import numpy as np
 import pytest
 import safetensors.torch
@@ -98,6 +97,11 @@ def test_a_loaded_policy_acts_as_the_learner_did(hyperparameters, scene, tmp_pat
     policy = load(tmp_path / "model.zip")
     assert policy.actions == hyperparameters.actions
     assert policy.scene == (Scene(numerics=FAST) if scene is None else scene)
+    with zipfile.ZipFile(tmp_path / "model.zip") as archive:
+        facts = json.loads(archive.read(checkpoint.DESCRIPTION))
+    assert facts["observation_layout"] == 2 and facts["strokes_trained"] == learner.num_timesteps
+    told = (hyperparameters.actions, hyperparameters.symmetry, [*hyperparameters.hidden], FAST.scheme)
+    assert (facts["actions"], facts["symmetry"], facts["hidden"], facts["scene"]["numerics"]["scheme"]) == told
     observations = observations_of(learner)
     actions, state = policy.predict(observations, deterministic=True)
     assert state is None
@@ -107,35 +111,15 @@ def test_a_loaded_policy_acts_as_the_learner_did(hyperparameters, scene, tmp_pat
         np.testing.assert_array_equal(actions, learner.predict(observations, deterministic=True)[0])
 
 
-def test_a_loaded_policy_drives_the_plain_environment(file):
-    policy = load(file)
-    env = gym.make("SeastarSwim-v0", actions=policy.actions, scene=policy.scene, max_episode_steps=4)
-    observation, _ = env.reset(seed=0)
-    over = False
-    while not over:
-        action, state = policy.predict(observation, state=None, episode_start=np.ones(1, bool), deterministic=True)
-        assert env.action_space.contains(np.int64(action)) and state is None
-        observation, _, terminated, truncated, _ = env.step(action)
-        over = terminated or truncated
-
-
-def test_one_observation_gets_the_action_that_it_gets_in_a_batch(learner, file):
-    policy = load(file)
-    observations = observations_of(learner)
+def test_a_loaded_policy_is_equivariant_acts_alone_as_in_a_batch_and_explores_unless_told_not_to(learner, file):
+    policy, observations = load(file), observations_of(learner)
+    assert_equivariant(policy, observations)
     together, _ = policy.predict(observations, deterministic=True)
     alone = [policy.predict(observation, deterministic=True)[0] for observation in observations]
     np.testing.assert_array_equal(alone, together)
     assert np.shape(alone[0]) == ()
-
-
-def test_a_loaded_policy_is_equivariant(learner, file):
-    assert_equivariant(load(file), observations_of(learner))
-
-
-def test_without_deterministic_it_explores(learner, file):
-    policy, observation = load(file), observations_of(learner)[0]
-    assert len({int(policy.predict(observation)[0]) for _ in range(30)}) > 5
-    assert len({int(policy.predict(observation, deterministic=True)[0]) for _ in range(30)}) == 1
+    assert len({int(policy.predict(observations[0])[0]) for _ in range(30)}) > 5
+    assert len({int(policy.predict(observations[0], deterministic=True)[0]) for _ in range(30)}) == 1
 
 
 def test_the_learner_and_its_policy_score_the_same(learner):
@@ -149,8 +133,11 @@ def test_the_learner_and_its_policy_score_the_same(learner):
     assert scores[0] == scores[1]
 
 
-def test_loading_unpickles_nothing(file, tmp_path):
+def test_loading_unpickles_nothing_of_a_file_that_stable_baselines_reads_as_its_own(learner, file, tmp_path):
     """Stable-Baselines3's pickles are not even looked at, neither to swim nor to learn on."""
+    theirs = PPO.load(file)
+    for name, tensor in learner.policy.state_dict().items():
+        assert torch.equal(tensor, theirs.policy.state_dict()[name])
     without = tmp_path / "without.zip"
     with zipfile.ZipFile(file) as old, zipfile.ZipFile(without, "w") as new:
         for name in (checkpoint.DESCRIPTION, checkpoint.LEARNER, learner_file.FACTS):
@@ -175,12 +162,6 @@ class Bomb:
         return os.mkdir, (self.folder,)
 
 
-def test_stable_baselines_reads_the_file_as_its_own(learner, file):
-    theirs = PPO.load(file)
-    for name, tensor in learner.policy.state_dict().items():
-        assert torch.equal(tensor, theirs.policy.state_dict()[name])
-
-
 # Saving
 
 
@@ -201,31 +182,20 @@ def test_saving_replaces_the_file_in_one_go(learner, file, monkeypatch):
     assert [one.name for one in file.parent.iterdir()] == ["model.zip"]
 
 
-def test_the_description_says_what_the_policy_expects(learner, file):
-    with zipfile.ZipFile(file) as archive:
-        facts = json.loads(archive.read(checkpoint.DESCRIPTION))
-    assert facts["observation_layout"] == 2
-    assert (facts["actions"], facts["symmetry"], facts["hidden"]) == (Hyperparameters().actions, True, [16, 8])
-    assert facts["scene"]["numerics"]["scheme"] == FAST.scheme
-    assert facts["strokes_trained"] == learner.num_timesteps
-
-
 # Files that are no policy
 
+POLICY, FACTS, TENSORS = checkpoint.DESCRIPTION, learner_file.FACTS, checkpoint.LEARNER
 
-def rewritten(file, **changes):
-    """The file with other facts in its description, or without one of its entries (None)."""
+
+def rewritten(file, change):
+    """Rewrite the file after a change of its parts: the description, the learner's facts, and its tensors."""
     with zipfile.ZipFile(file) as archive:
         entries = {name: archive.read(name) for name in archive.namelist()}
-    facts = json.loads(entries[checkpoint.DESCRIPTION])
-    for name, value in changes.items():
-        entry = name.replace("__", ".")
-        if entry in entries:
-            del entries[entry]
-        else:
-            facts[name] = value
-    if checkpoint.DESCRIPTION in entries:
-        entries[checkpoint.DESCRIPTION] = json.dumps(facts).encode()
+    parts = {name: json.loads(entries.pop(name)) for name in (POLICY, FACTS)}
+    parts[TENSORS] = safetensors.torch.load(entries.pop(TENSORS))
+    change(parts)
+    for name, part in parts.items():
+        entries[name] = safetensors.torch.save(part) if name == TENSORS else json.dumps(part).encode()
     with zipfile.ZipFile(file, "w") as archive:
         for name, data in entries.items():
             archive.writestr(name, data)
@@ -236,88 +206,79 @@ def assert_one_sentence(error, file):
     assert str(file) in text and "\n" not in text and text.endswith("."), text
 
 
-def test_a_missing_file_is_said_to_be_missing(tmp_path):
+@pytest.mark.parametrize("keep", [0, 10, 0.5, 0.99, None])
+def test_a_file_that_is_missing_cut_or_changed_by_a_bit_is_said_to_be(file, tmp_path, keep):
     with pytest.raises(FileNotFoundError, match=r"There is no trained policy at .*nothing\.zip") as error:
         load(tmp_path / "nothing.zip")
     assert_one_sentence(error, tmp_path / "nothing.zip")
-
-
-@pytest.mark.parametrize("keep", [0, 10, 0.5, 0.99])
-def test_a_cut_file_is_said_to_be_damaged(file, keep):
-    data = file.read_bytes()
-    file.write_bytes(data[: keep if isinstance(keep, int) else int(keep * len(data))])
-    with pytest.raises(ValueError, match="is damaged") as error:
+    data = bytearray(file.read_bytes())
+    if keep is None:
+        with zipfile.ZipFile(file) as archive:
+            data[archive.getinfo(checkpoint.LEARNER).header_offset + 5000] ^= 1
+    else:
+        data = data[: keep if isinstance(keep, int) else int(keep * len(data))]
+    file.write_bytes(bytes(data))
+    with pytest.raises(ValueError, match="is damaged" if keep is not None else r"is damaged.*Bad CRC-32") as error:
         load(file)
     assert_one_sentence(error, file)
-
-
-def test_a_flipped_bit_is_found(file):
-    data = bytearray(file.read_bytes())
-    with zipfile.ZipFile(file) as archive:
-        data[archive.getinfo(checkpoint.LEARNER).header_offset + 5000] ^= 1
-    file.write_bytes(bytes(data))
-    with pytest.raises(ValueError, match=r"is damaged.*Bad CRC-32"):
-        load(file)
 
 
 NO_LIMBS = Scene().to_dict() | {"robot": Scene().to_dict()["robot"] | {"n_limbs": 0}}
 
 
-@pytest.mark.parametrize(
-    "change, sentence",
-    [
-        ({"policy__json": None}, "no policy saved by this project: There is no item"),
-        ({"learner__safetensors": None}, "no policy saved by this project: There is no item"),
-        ({"observation_layout": 1}, "its observation_layout is 1, this version of seastar_gym knows 2"),
-        ({"format": 99}, "its format is 99"),
-        ({"actions": "waves"}, "actions must be one of"),
-        ({"hidden": [16, 9]}, "does not fit"),
-        ({"scene": NO_LIMBS}, "n_limbs must be a whole number from 1"),
-        ({"scene": {"robot": {"n_arms": 5}}}, "does not fit"),
-    ],
-)
-def test_what_does_not_fit_is_said_in_one_sentence(file, change, sentence):
-    rewritten(file, **change)
-    with pytest.raises(ValueError, match=sentence) as error:
-        load(file)
-    assert_one_sentence(error, file)
+def resumed(file):
+    return resume(file, make_learner().get_env())
 
 
-def with_learner(file, change):
-    """The file after a change of its learner's facts and tensors, in place."""
-    with zipfile.ZipFile(file) as archive:
-        entries = {name: archive.read(name) for name in archive.namelist()}
-    facts, tensors = json.loads(entries[learner_file.FACTS]), safetensors.torch.load(entries[checkpoint.LEARNER])
-    change(facts, tensors)
-    entries |= {learner_file.FACTS: json.dumps(facts).encode(), checkpoint.LEARNER: safetensors.torch.save(tensors)}
-    with zipfile.ZipFile(file, "w") as archive:
-        for name, data in entries.items():
-            archive.writestr(name, data)
+def lacks(part):
+    return lambda parts: parts.pop(part)
+
+
+def says(**facts):
+    return lambda parts: parts[POLICY].update(facts)
+
+
+def told(**facts):
+    return lambda parts: parts[FACTS].update(facts)
+
+
+def has(**tensors):
+    return lambda parts: parts[TENSORS].update({name.replace("__", "."): values for name, values in tensors.items()})
 
 
 @pytest.mark.parametrize(
     "change, sentence",
     [
-        (lambda facts, tensors: facts.pop("seed"), "damaged.*: seed"),
-        (lambda facts, tensors: facts.update(format=2), "the learner's format is 2, this version knows 1"),
-        (lambda facts, tensors: facts.update(seed="x"), "seed must be a whole number"),
-        (lambda facts, tensors: facts.update(strokes=-1), "strokes must be a whole number"),
-        (lambda facts, tensors: facts.update(numpy=[10**6, 0, 0.0]), "position in numpy's generator must be a whole"),
-        (lambda facts, tensors: facts.update(episodes=[1]), "does not fit"),
-        (lambda facts, tensors: facts["settings"].update(rollout="many"), "does not fit"),
-        (lambda facts, tensors: facts["settings"].update(patience=3), "does not fit"),
-        (lambda facts, tensors: tensors.pop("network.value_net.bias"), "Missing key"),
-        (lambda facts, tensors: tensors.pop("generator.torch"), "damaged.*: torch"),
-        (lambda facts, tensors: tensors.update({"optimiser.0.exp_avg": torch.zeros(3)}), "its optimiser has 0.exp_avg"),
-        (lambda facts, tensors: tensors.update({"optimiser.99.exp_avg": torch.zeros(3)}), "does not fit"),
-        (lambda facts, tensors: tensors.update({"generator.numpy": torch.zeros(3)}), "does not fit"),
-        (lambda facts, tensors: tensors.update({"generator.torch": torch.zeros(3)}), "does not fit"),
+        (lacks(POLICY), "no policy saved by this project: There is no item"),
+        (lacks(TENSORS), "no policy saved by this project: There is no item"),
+        (says(observation_layout=1), "its observation_layout is 1, this version of seastar_gym knows 2"),
+        (says(format=99), "its format is 99"),
+        (says(actions="waves"), "actions must be one of"),
+        (says(hidden=[16, 9]), "does not fit"),
+        (says(scene=NO_LIMBS), "n_limbs must be a whole number from 1"),
+        (says(scene={"robot": {"n_arms": 5}}), "does not fit"),
+        (lambda parts: parts[FACTS].pop("seed"), "damaged.*: seed"),
+        (told(format=2), "the learner's format is 2, this version knows 1"),
+        (told(seed="x"), "seed must be a whole number"),
+        (told(strokes=-1), "strokes must be a whole number"),
+        (told(numpy=[10**6, 0, 0.0]), "position in numpy's generator must be a whole"),
+        (told(episodes=[1]), "does not fit"),
+        (lambda parts: parts[FACTS]["settings"].update(rollout="many"), "does not fit"),
+        (lambda parts: parts[FACTS]["settings"].update(patience=3), "does not fit"),
+        (lambda parts: parts[TENSORS].pop("network.value_net.bias"), "Missing key"),
+        (lambda parts: parts[TENSORS].pop("generator.torch"), "damaged.*: torch"),
+        (has(optimiser__0__exp_avg=torch.zeros(3)), "its optimiser has 0.exp_avg"),
+        (has(optimiser__99__exp_avg=torch.zeros(3)), "does not fit"),
+        (has(generator__numpy=torch.zeros(3)), "does not fit"),
+        (has(generator__torch=torch.zeros(3)), "does not fit"),
     ],
 )
-def test_a_learner_that_does_not_fit_is_refused_in_one_sentence(file, change, sentence):
-    with_learner(file, change)
+def test_what_does_not_fit_is_refused_in_one_sentence(file, change, sentence):
+    """By who only swims by the policy, if it is the policy that does not fit."""
+    rewritten(file, change)
+    read = load if change.__qualname__.startswith(("lacks", "says")) else resumed
     with pytest.raises(ValueError, match=sentence) as error:
-        resume(file, make_learner().get_env())
+        read(file)
     assert_one_sentence(error, file)
 
 
@@ -361,34 +322,27 @@ def test_a_resumed_learner_is_where_it_was(tmp_path):
     assert resumed.lr_schedule(1.0) == SMALL.learning_rate
 
 
-def test_learning_on_from_one_file_ends_at_the_same_numbers(file):
-    first, second = (resume(file, make_learner().get_env()).learn(64, reset_num_timesteps=False) for _ in range(2))
-    for number, same in zip(numbers_of(first), numbers_of(second), strict=True):
+def test_the_same_seed_and_the_same_file_train_the_same_policy(file):
+    pairs = [make_learner(seed=seed).learn(128) for seed in (1, 1, 2)]
+    pairs += [resume(file, make_learner().get_env()).learn(64, reset_num_timesteps=False) for _ in range(2)]
+    first, second, other, resumed, again = map(numbers_of, pairs)
+    for number, same in [*zip(first, second, strict=True), *zip(resumed, again, strict=True)]:
         np.testing.assert_array_equal(number, same)
+    assert any(not np.array_equal(*pair) for pair in zip(first, other, strict=True))
 
 
-def test_a_resumed_learner_meets_new_paths(file):
+def test_a_resumed_learner_meets_new_paths_and_another_environment_is_refused(file):
     env = make_learner(seed=0).get_env()
     env.seed(0)
     first = env.reset()
     resume(file, env)
     assert env._seeds == [192 + robot for robot in range(8)]
     assert not np.array_equal(env.reset(), first)
-
-
-def test_another_environment_is_refused(file):
-    env = make_learner(scene=Scene(numerics=Numerics.preset("chapter"))).get_env()
-    with pytest.raises(ValueError, match=r"was trained for .*Scene\(\).* not for .*Numerics\(\)"):
-        resume(file, env)
-    with pytest.raises(ValueError, match=r"was trained for .*pairs.* not for .*limbs"):
-        resume(file, make_learner(OTHER, OTHER_SCENE).get_env())
-
-
-def test_the_same_seed_trains_the_same_policy():
-    first, second, other = (make_learner(seed=seed).learn(128) for seed in (1, 1, 2))
-    for number, same in zip(numbers_of(first), numbers_of(second), strict=True):
-        np.testing.assert_array_equal(number, same)
-    assert any(not np.array_equal(*pair) for pair in zip(numbers_of(first), numbers_of(other), strict=True))
+    others = make_learner(scene=Scene(numerics=Numerics.preset("chapter"))), make_learner(OTHER, OTHER_SCENE)
+    words = r"was trained for .*Scene\(\).* not for .*Numerics\(\)", r"was trained for .*pairs.* not for .*limbs"
+    for other, sentence in zip(others, words, strict=True):
+        with pytest.raises(ValueError, match=sentence):
+            resume(file, other.get_env())
 
 
 # A student that sees little learns what a teacher that sees all would do, each in its own frame.

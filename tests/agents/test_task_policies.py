@@ -56,12 +56,6 @@ def test_a_policy_on_disk_remembers_as_its_learner_does(id, tmp_path):
         np.testing.assert_array_equal(observations, wrapped._latest)
 
 
-def test_a_memory_is_seen_beneath_other_wrappers():
-    env = make_learning_env("SeastarFailBlind-v0", LEARNERS["PPO, memory"], "fast", 1)
-    wrapped = BatchVecEnv(RecordEpisodeStatistics(env.env))
-    assert describe(wrapped, (64,)) == describe(env, (64,)) and describe(wrapped, (64,)).past == 8
-
-
 def test_one_robot_is_told_what_a_batch_is():
     _, policy = small_policy("SeastarFailBlind-v0", "PPO, memory")
     seen = np.random.default_rng(0).normal(size=(6, 1, policy.description.observation_size)).astype(np.float32)
@@ -71,6 +65,9 @@ def test_one_robot_is_told_what_a_batch_is():
         together, many = policy.predict(np.repeat(each, 3, axis=0), many, np.zeros(3, bool), deterministic=True)
         assert alone.shape == () and (together == alone).all()
     assert not np.array_equal(one[0][0, 0], one[0][0, 1])
+    env = make_learning_env("SeastarFailBlind-v0", LEARNERS["PPO, memory"], "fast", 1)
+    beneath = describe(BatchVecEnv(RecordEpisodeStatistics(env.env)), (64,))
+    assert beneath == describe(env, (64,)) and beneath.past == 8
 
 
 def test_a_policy_of_another_task_is_refused_with_observations_as_long_too():

@@ -32,12 +32,9 @@ def ours(id):
     return OURS
 
 
-def test_there_are_ids():
-    assert {"SeastarSwim-v0", "SeastarSwimTimed-v0", "SeastarPrey-v0"} <= set(IDS) <= set(gym.registry)
-
-
 @pytest.mark.parametrize("id", IDS)
 def test_the_file_has_the_project_s_hyperparameters(id):
+    assert {"SeastarSwim-v0", "SeastarSwimTimed-v0", "SeastarPrey-v0"} <= {*IDS} <= {*gym.registry}
     told, known = SETTINGS[id], ours(id)
     assert told["gamma"] == pytest.approx(known.discount_per_decision, abs=1e-12)
     for name, field in {

@@ -1,6 +1,7 @@
-"""Every registered environment keeps the same promises, alone and in a batch."""
+"""Every registered environment keeps the same promises, alone and in a batch, with every option."""
 
 import copy
+import inspect
 import json
 import pickle
 from pathlib import Path
@@ -13,96 +14,240 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 import seastar_gym
-from episodes import assert_same, assert_same_steps, both, break_robot, swim_together, swum
-from seastar_gym import DomainRandomization, HeadingTargets, LogUniform, Normal, SolverStatus, Uniform
+from episodes import SHORT, assert_same, assert_same_steps, both, break_robot, goes_on, swim_together, swum
+from refusals import assert_refused
+from seastar_gym import (
+    Body,
+    DomainRandomization,
+    FailBlind,
+    HeadingTargets,
+    Limited,
+    LogUniform,
+    Miswired,
+    Normal,
+    Numerics,
+    ObstTrap,
+    Prey,
+    Prizes,
+    RewardWeights,
+    Scene,
+    Seastar,
+    Sight,
+    SimToReal,
+    SmaPulse,
+    SmaWires,
+    SolverStatus,
+    Station,
+    SymmetryReduction,
+    ThermalSma,
+    Uniform,
+    UniformCurrent,
+    VectorSymmetryReduction,
+    Water,
+)
 from seastar_gym.accuracy.info import NAMES
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.scene.serial import to_dict
+from seastar_gym.simd.lanes import N_LANES
 
+SWIM = "SeastarSwim-v0"
 IDS = tuple(sorted(id for id in gym.registry if id.startswith("Seastar")))
 SWIMS = tuple(id for id in IDS if id not in seastar_gym.TASKS)
 DRAWN = {"path": "random", "random_heading": True}
 """What makes episodes of waypoints differ, as those of tasks do anyway."""
 
 
-def arguments(id: str) -> dict:
-    return {"fidelity": "fast", **({} if id in seastar_gym.TASKS else DRAWN)}
+def of(robot=None, **parts) -> Scene:
+    return Scene(robot or Seastar(), numerics=Numerics.preset("fast"), **parts)
 
 
-def made(id: str, **more):
-    return gym.make(id, **(arguments(id) | more))
-
-
-def batched(id: str, n: int, **more):
-    return gym.make_vec(id, n, "vector_entry_point", **(arguments(id) | more))
-
-
-def test_all_ids_are_there():
-    assert len(IDS) == 6 + len(seastar_gym.TASKS) and {*seastar_gym.TASKS, *seastar_gym.TIMED} < {*IDS}
-
-
-@pytest.mark.parametrize(
-    "id, more",
-    [
-        *((id, {}) for id in IDS),
-        *(("SeastarSwim-v0", {"actions": actions, **more}) for actions in ("joint", "pairs") for more in ({}, DRAWN)),
-        ("SeastarSwim-v0", DRAWN),
-    ],
+FOUR = of(Seastar(4, 4), actuator=SmaPulse(0.5))
+REFRACTORY = of(actuator=SmaWires(refractory=True))
+HOT = of(actuator=ThermalSma(largest_temperature=240.0 - 220.0 * np.exp(-0.05 / 0.42)))
+"""Wires reach the largest temperature after 0.05 s."""
+DISTRIBUTIONS = {
+    "limb_strengths": Uniform(0.5, 1.0), "robot.density": LogUniform(900.0, 2e3), "fluid.density": Normal(1e3, 9.0),
+}  # fmt: skip
+SIZES = DomainRandomization({"robot.limb_length": Uniform(0.08, 0.12), "actuator.peak_angle": Uniform(0.4, 0.6)})
+ALIKE = DomainRandomization({"limb_strengths": Uniform(0.2, 1.0), "fluid.density": Uniform(900.0, 1100.0)})
+LATE = DomainRandomization(
+    {"sight.delay": Uniform(0.1, 0.2), "robot.density": Uniform(990.0, 1010.0), "action_delay": Uniform(0.1, 0.3)}
 )
-def test_an_environment_passes_gymnasiums_and_stable_baselines_checkers(id, more):
-    env = gym.make(id, fidelity="fast", **more).unwrapped
-    check_env(env, skip_render_check=True)
+BAD = Sight(delay=Uniform(0.05, 0.15), jitter=0.03, dropout=0.2, noise=Uniform(0.0, 2e-3), turn_noise=0.02, sees="pose")
+MARKED = Sight(1e2 / 3, Uniform(0.1, 1 / 3), dropout=0.1, sees=np.int64(3))
+TURNS = (0.1, 1 / 3, 0.0, 1.0, 2.0)
+MODES = ("limbs", "joint", "pairs", "continuous")
+RECORDED = {
+    "pairs": {**DRAWN, "actions": "pairs", "path": "figure-eight"},
+    "joint": {**DRAWN, "actions": "joint", "path": "square"},
+    "drawn scene": {**DRAWN, "randomization": DomainRandomization(DISTRIBUTIONS), "path": "triangle"},
+    "headings along": {**DRAWN, "headings": HeadingTargets(tolerance=3.0), "path": "pentagon"},
+    "headings drawn": {**DRAWN, "headings": HeadingTargets("random", 0.5), "path": "line"},
+    "aim": {**DRAWN, "waypoint_radius": 0.03, "path": [[0.05, 0.0], [0.05, 0.02], [0.2, 0.0]]},
+}
+"""Options of `SeastarSwim-v0` of which episodes.json has the first decisions."""
+OPTIONS = RECORDED | {
+    "nothing": {},
+    "reached": {"path": SHORT, "waypoint_radius": 0.0085, "max_episode_steps": 5, "num_envs": N_LANES + 1},
+    "both ends at once": {"path": SHORT, "waypoint_radius": 0.0085, "max_episode_steps": 2},
+    "two threads": {**DRAWN, "threads": 2, "num_envs": 2 * N_LANES + 1},
+    "one thread": {"threads": 1, "num_envs": N_LANES + 1, "path": "random"},
+    "weights": {"reward": RewardWeights(100 / 3, 2, 0.2), "waypoint_radius": np.float64(0.1 / 3)},
+    "single precision": {"path": ((np.float32(0.1), 0), (1 / 3, np.float64(0.1))), "scene": FOUR},
+    "four limbs": {"scene": FOUR, "actions": "pairs", "path": "random", "random_heading": np.bool_(True)},
+    "two nodes": {"scene": of(Seastar(nodes_per_limb=2))},
+    "seven nodes": {"scene": of(Seastar(nodes_per_limb=7))},
+    "many nodes": {"scene": of(Seastar(nodes_per_limb=19))},
+    "a body in a current": {"scene": of(Seastar(4, 4, body=Body(0.02)), fluid=Water(current=UniformCurrent(1e-3)))},
+    "limited": {"scene": of(actuator=Limited(SmaPulse(), 0.5, 3.0))},
+    "drawn": {**DRAWN, "randomization": SIZES},
+    "error bars": {"scene": of(Seastar(nodes_per_limb=4)), "error_bars": True},
+    "plain code": {"device": "scalar"},
+    "blind to wires": {"decision_period": 0.2, "observe_actuators": False},
+    "continuous": {"actions": "continuous", "decision_period": np.float64(0.3)},
+    "turns": {"headings": HeadingTargets(TURNS)},
+    "one turn": {**DRAWN, "headings": HeadingTargets(0.5, 1.0), "waypoint_radius": 0.15},
+    "legs": {**DRAWN, "headings": HeadingTargets("along", 1.0), "waypoint_radius": 0.15},
+    "pose": {"decision_period": 0.5, "sight": BAD, "action_delay": Uniform(0.0, 0.7), "num_envs": 5, "path": SHORT},
+    "markers": {"decision_period": 0.5, "sight": MARKED, "action_delay": Uniform(0.0, 1 / 3)},
+    "all nodes": {"decision_period": 0.5, "sight": Sight(delay=0.1, noise=1e-3, sees="nodes")},
+    "late strokes": {"sight": Sight(), "action_delay": np.float64(1.0)},
+    "drawn sight": {"decision_period": 0.5, "sight": Sight(sees=1), "randomization": LATE},
+    "pictures": {**DRAWN, "randomization": SIZES, "render_mode": "rgb_array", "num_envs": 2},
+    "pictures of turns": {"headings": HeadingTargets("random"), "render_mode": "rgb_array", "num_envs": 2},
+    "plain": {
+        "sight": to_dict(Sight(delay=Uniform(0.1, 1 / 3))),
+        "headings": to_dict(HeadingTargets("random")),
+        "scene": FOUR.to_dict(),
+        "reward": to_dict(RewardWeights(1.0)),
+        "randomization": to_dict(DomainRandomization({"fluid.density": Uniform(900.0, 1000.0)})),
+    },
+    **{f"refractory {mode}": {"scene": REFRACTORY, "actions": mode, "decision_period": 0.2} for mode in MODES},
+    **{f"hot {mode}": {"scene": HOT, "actions": mode, "decision_period": 0.2} for mode in MODES},
+    **{f"reduced {mode}": {**DRAWN, "scene": FOUR, "actions": mode, "reduced": True} for mode in MODES},
+    "reduced wires": {"scene": REFRACTORY, "actions": "pairs", "decision_period": 0.2, "reduced": True, **DRAWN},
+    "reduced and blind to wires": {**DRAWN, "decision_period": 0.5, "observe_actuators": False, "reduced": True},
+    "reduced turns": {**DRAWN, "headings": HeadingTargets("random"), "reduced": True},
+    "reduced and drawn": {**DRAWN, "scene": FOUR, "randomization": ALIKE, "reduced": True},
+}
+"""Options of `SeastarSwim-v0`; `num_envs`, `threads` and `reduced` are those of `both`."""
+SEEN = ("SeastarFailBlind-v0", "SeastarPrizesTimed-v0", "SeastarObstTrap-v0", "SeastarMiswiredTimed-v0",
+        "SeastarPreyTimed-v0", "SeastarStation-v0", "SeastarSwimHeading-v0")  # fmt: skip
+OWN = (
+    Miswired(0.1, RewardWeights(100.0)), Prey(speed=(0.005, 1 / 180), wanted=1), Station(current=(0.0, 1e-3)),
+    FailBlind(1), ObstTrap(scattered=1, potential="geodesic"), Prizes(side=0.6, gain=0.1),
+    SimToReal(Sight(20.0, 0.2), DomainRandomization({"robot.density": Uniform(990.0, 1010.0)})),
+)  # fmt: skip
+TABLE = {
+    **{f"own {type(task).__name__}": ("SeastarStation-v0", {"task": task}) for task in OWN},
+    **{id: (id, {} if id in seastar_gym.TASKS else DRAWN) for id in IDS},
+    **{f"{id} seen": (id, {"sight": BAD, "action_delay": 1.0, "num_envs": 2}) for id in SEEN},
+    **{name: (SWIM, options) for name, options in OPTIONS.items()},
+}
+"""Ids and options of everything below."""
+
+
+def given(name: str, *batch: str) -> tuple[str, dict]:
+    """Id and arguments of a row of the table. batch: Names of those arguments of `both` that are wanted."""
+    id, options = TABLE[name]
+    options = {key: value for key, value in options.items() if key in batch or key not in OF_BOTH}
+    return id, ({} if "scene" in options else {"fidelity": "fast"}) | options
+
+
+OF_BOTH = ("num_envs", "threads", "reduced")
+ROUNDED = ("heating_time", "energy", "energy_per_metre")
+"""Sums over the pieces of a decision, which has more of them where delays of other robots end in it."""
+
+
+def made(name: str, **more):
+    id, arguments = given(name)
+    env = gym.make(id, **(arguments | more))
+    return SymmetryReduction(env) if TABLE[name][1].get("reduced") else env
+
+
+def batched(name: str, n: int, **more):
+    id, arguments = given(name)
+    return gym.make_vec(id, n, "vector_entry_point", **(arguments | more))
+
+
+def by_json(spec: EnvSpec) -> EnvSpec:
+    """The spec by way of text, whose names a library may have sorted."""
+    return EnvSpec.from_json(json.dumps(json.loads(spec.to_json()), sort_keys=True))
+
+
+def test_all_ids_and_all_arguments_are_there():
+    assert len(IDS) == 6 + len(seastar_gym.TASKS) and {*seastar_gym.TASKS, *seastar_gym.TIMED} < {*IDS}
+    told = {"fidelity", *(key for options in OPTIONS.values() for key in options)}
+    others = {"frames_per_stroke", "certificate"}  # which have tests of their own
+    assert told - {*OF_BOTH, "max_episode_steps"} | others == {*inspect.signature(SeastarSwimEnv).parameters}
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", [*IDS, "pairs", "joint", "headings drawn", "nothing", "continuous"])
+def test_an_environment_passes_gymnasiums_and_stable_baselines_checkers(name, no_display):
+    """The first makes an environment of its spec with every render mode that it names, one of them twice."""
+    env = made(name).unwrapped
+    check_env(env, skip_render_check=name != "nothing")
     pytest.importorskip("stable_baselines3.common.env_checker").check_env(env, warn=True, skip_render_check=True)
 
 
-@pytest.mark.parametrize("id", IDS)
-@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
-def test_a_batch_has_the_bits_of_single_environments(id, mode):
-    batch, singles = both(id, 3, mode, max_episode_steps=3, **arguments(id))
-    for name in ("single_observation_space", "observation_space", "single_action_space", "action_space"):
-        assert getattr(batch, name) == getattr(singles, name)
-    swim_together(batch, singles, 8)
+@pytest.mark.parametrize("mode", AutoresetMode)
+@pytest.mark.parametrize("name", TABLE)
+def test_a_batch_has_the_bits_of_single_environments(name, mode):
+    """Over ends of episodes, and where a robot cannot be solved: all results, their types, masks and pictures."""
+    id, arguments = given(name, *OF_BOTH)
+    batch, singles = both(id, mode=mode, **({"max_episode_steps": 3} | arguments))
+    for space in ("single_observation_space", "observation_space", "single_action_space", "action_space"):
+        assert getattr(batch, space) == getattr(singles, space)
+    in_a_point = mode is not AutoresetMode.NEXT_STEP and name != "error bars"  # of which a new state knows nothing
+    status = SolverStatus.NOT_CONVERGED if in_a_point else SolverStatus.NOT_FINITE
+    steps = swim_together(batch, singles, 9, status, ROUNDED if "sight" in arguments else ())
+    assert np.any([step[2] | step[3] for step in steps], axis=0).all()
+    assert name in ("reached", "both ends at once") or last_failed(steps[6])  # or it rests then
+    assert name != "reached" or np.any([step[2] for step in steps[:5]], axis=0).sum() > 2
 
 
-@pytest.mark.parametrize("id", IDS)
-def test_seeds_decide_everything_and_nothing_goes_from_one_episode_into_the_next(id):
-    env, new = made(id), made(id)
-    first = swum(env)
-    other = swum(env, seed=7)
-    assert np.abs(other[0] - first[0]).max() > 1e-3
-    assert_same(swum(env), first)
-    assert_same(swum(new), first)
+def last_failed(step: tuple) -> bool:
+    """Whether robot 1 was not solved in a step."""
+    return step[4].get("final_info", step[4])["solver_status"][1] != 0
 
 
-@pytest.mark.parametrize("id", IDS)
-def test_an_environment_comes_back_from_its_spec_a_pickle_and_a_copy(id):
-    env = made(id, **({"split": "test"} if id in seastar_gym.TASKS else {}))
-    spec = EnvSpec.from_json(json.dumps(json.loads(env.spec.to_json()), sort_keys=True))
-    expected = swum(env)
-    for other in (gym.make(spec), pickle.loads(pickle.dumps(env)), copy.deepcopy(env)):
-        assert_same(swum(other), expected)
+@pytest.mark.parametrize("name", TABLE)
+def test_an_episode_follows_from_its_seed_in_a_copy_a_pickle_and_what_is_made_of_the_spec(name):
+    """Nothing goes from one episode into the next."""
+    env = made(name, **({"split": "test"} if TABLE[name][0] in seastar_gym.TASKS else {}))
+    spec, first, other = by_json(env.spec), swum(env), swum(env, seed=7)
+    assert spec == env.spec
+    assert name not in IDS or np.abs(other[0] - first[0]).max() > 1e-3
+    for twin in (env, gym.make(spec), pickle.loads(pickle.dumps(env)), copy.deepcopy(env)):
+        assert twin.spec == env.spec and type(twin) is type(env) and twin.unwrapped.scene == env.unwrapped.scene
+        assert_same(swum(twin), first)
+    env.reset(seed=0)
+    goes_on(env, 1)
+    expected, *others = [goes_on(twin, 3) for twin in (env, pickle.loads(pickle.dumps(env)), copy.deepcopy(env))[::-1]]
+    for found in others:
+        assert_same(found, expected)
 
 
-@pytest.mark.parametrize("id", IDS)
-def test_the_middle_of_an_episode_goes_on_to_the_same_bits_in_a_pickle_and_in_a_copy(id):
-    """Over its end and the beginning of the next."""
-    env, batch = made(id, max_episode_steps=4), batched(id, 3, max_episode_steps=4)
-    env.reset(seed=0), batch.reset(seed=0)
-    env.action_space.seed(0), batch.action_space.seed(0)
-    env.step(env.action_space.sample()), batch.step(batch.action_space.sample())
-    for twins in ([one, pickle.loads(pickle.dumps(one)), copy.deepcopy(one)] for one in (env, batch)):
-        for k in range(6):
-            action = twins[0].action_space.sample()
-            if twins[0] is env and k == 3:
-                results = [[*twin.reset()] for twin in twins]
-                assert all(result[0].tobytes() == results[0][0].tobytes() for result in results)
-                continue
-            results = [twin.step(action) for twin in twins]
-            for result in results[1:]:
-                if twins[0] is batch:
-                    assert_same_steps(result, results[0])
-                else:
-                    assert_same([*result[:4], *result[4].values()], [*results[0][:4], *results[0][4].values()])
+@pytest.mark.parametrize("name", TABLE)
+def test_a_batch_goes_on_to_the_same_bits_in_a_pickle_and_a_copy_and_comes_back_from_its_spec(name):
+    """From the middle of an episode, over its end and the beginning of the next."""
+    batch = batched(name, 2, max_episode_steps=3, autoreset_mode=AutoresetMode.SAME_STEP, threads=1)
+    made_again = gym.make_vec(by_json(batch.spec))
+    assert made_again.spec == batch.spec and made_again.autoreset_mode is AutoresetMode.SAME_STEP
+    batch.action_space.seed(4)
+    assert_same_steps(batch.reset(seed=3), made_again.reset(seed=3))
+    assert_same_steps(
+        *(twin.step(actions) for actions in [batch.action_space.sample()] for twin in (batch, made_again))
+    )
+    twins = [batch, pickle.loads(pickle.dumps(batch)), copy.deepcopy(batch)]
+    for _ in range(4):
+        actions = batch.action_space.sample()
+        expected, *others = [twin.step(actions) for twin in twins]
+        for found in others:
+            assert_same_steps(found, expected)
 
 
 @pytest.mark.parametrize("id", IDS)
@@ -115,95 +260,100 @@ def test_observations_lie_in_their_space_share_no_memory_and_no_number_of_theirs
     assert not np.shares_memory(seen[-1], seen[-2])
     every = np.concatenate(seen)
     assert (np.ptp(every, axis=0) > (1e-6 if id in SWIMS else 0.0)).all() and np.isfinite(every).all()
-    assert id != "SeastarSwim-v0" or min(len(np.unique(column)) for column in every.T) > 10
+    assert id != SWIM or min(len(np.unique(column)) for column in every.T) > 10
     first, _ = env.reset(seed=0)
     kept, second = first.copy(), env.step(env.action_space.sample())[0]
     assert first in env.observation_space and second in env.observation_space and not np.shares_memory(first, second)
     np.testing.assert_array_equal(first, kept)
 
 
-@pytest.mark.parametrize("id", IDS)
-def test_the_reward_is_the_sum_of_its_terms_in_info(id):
-    env = made(id)
-    names = [name for name in env.reset(seed=0)[1] if name.startswith("reward_")]
+@pytest.mark.parametrize("name", TABLE)
+def test_rewards_are_sums_of_their_terms_and_info_has_the_same_names_types_and_shapes_always(name):
+    """On a reset, on a step, and on a failure, which ends an episode with a sentence."""
+    env = made(name)
+    infos = [env.reset(seed=0)[1]]
+    terms = [term for term in infos[0] if term.startswith("reward_")]
     env.action_space.seed(1)
-    for _ in range(3):
+    for k in range(4):
+        if k == 3:
+            break_robot(env.unwrapped, SolverStatus.NOT_FINITE)
         action = env.action_space.sample()
-        _, reward, terminated, truncated, info = env.step(action)
+        observation, reward, terminated, truncated, info = env.step(action)
+        infos.append(info)
         assert type(reward) is float and type(terminated) is type(truncated) is bool
-        assert [name for name in info if name.startswith("reward_")] == names
-        assert reward == pytest.approx(sum(info[name] for name in names), abs=1e-12)
-        table = env.unwrapped.command_table
+        assert np.isfinite(observation).all() and reward == pytest.approx(sum(info[term] for term in terms), abs=1e-12)
+        if terminated:
+            break
+    assert terminated and (k < 3) == (info["solver_message"] == "")
+    for info in [*infos, env.reset()[1]]:
+        assert list(info) == list(infos[0])
+        for entry, value in info.items():
+            assert type(value) is type(infos[0][entry]) and np.shape(value) == np.shape(infos[0][entry]), entry
+            assert type(value) in (int, float, bool, str, np.ndarray), entry
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_effort_is_the_price_of_pulses_and_the_time_limit_truncates(id):
+    assert batched(id, 1).max_episode_steps == gym.spec(id).max_episode_steps
+    env = made(id, max_episode_steps=2)
+    env.reset(seed=0)
+    env.action_space.seed(1)
+    table = env.unwrapped.command_table
+    for k in range(2):
+        action = env.action_space.sample()
+        *_, terminated, truncated, info = env.step(action)
+        assert not terminated and truncated == (k == 1)
         if table is not None:
             pulses = pulses_of(np.array([info["heating_time"]]), table[[action]])[0]
             assert info["reward_effort"] == -0.01 * pulses < 0.0
 
 
 @pytest.mark.parametrize("id", IDS)
-def test_info_has_the_same_names_types_and_shapes_on_a_reset_on_a_step_and_on_a_failure(id):
-    env = made(id)
-    infos = [env.reset(seed=0)[1], env.step(env.action_space.sample())[4]]
-    break_robot(env.unwrapped, SolverStatus.NOT_FINITE)
-    infos += [env.step(env.action_space.sample())[4], env.reset()[1]]
-    assert infos[2]["solver_message"]
-    for info in infos:
-        assert list(info) == list(infos[0])
-        for name, value in info.items():
-            assert type(value) is type(infos[0][name]) and np.shape(value) == np.shape(infos[0][name]), name
-            assert type(value) in (int, float, bool, str, np.ndarray), name
-    assert infos[1]["hub_position"].shape == (2,) and infos[1]["hub_position"].dtype == np.float64
-
-
-@pytest.mark.parametrize("id", IDS)
-def test_the_time_limit_is_the_same_alone_and_in_a_batch_and_truncates(id):
-    assert batched(id, 1).max_episode_steps == gym.spec(id).max_episode_steps
-    env = made(id, max_episode_steps=2)
-    env.reset(seed=0)
-    none = np.zeros(env.action_space.shape, env.action_space.dtype)
-    ends = [env.step(none)[2:4] for _ in range(2)]
-    assert ends == [(False, False), (False, True)]
-
-
-@pytest.mark.parametrize("id", IDS)
-def test_a_step_before_the_first_reset_is_refused(id):
-    for env in (made(id).unwrapped, batched(id, 2)):
-        with pytest.raises(gym.error.ResetNeeded, match=r"reset\(\) before step\(\)\.$"):
-            env.step(env.action_space.sample())
-
-
-@pytest.mark.parametrize("id", IDS)
-def test_pictures_are_drawn_alone_and_of_a_batch(id):
+def test_a_step_before_the_first_reset_is_refused_and_pictures_are_drawn(id):
     pytest.importorskip("pygame")
-    env, batch = made(id, render_mode="rgb_array"), batched(id, 2, render_mode="rgb_array")
-    env.reset(seed=0), batch.reset(seed=0)
+    env, batch = made(id, render_mode="rgb_array").unwrapped, batched(id, 2, render_mode="rgb_array")
+    for one in (env, batch):
+        with pytest.raises(gym.error.ResetNeeded, match=r"reset\(\) before step\(\)\.$"):
+            one.step(one.action_space.sample())
+        one.reset(seed=0)
     for picture in (env.render(), *batch.render()):
         assert picture.shape == (720, 960, 3) and picture.dtype == np.uint8 and np.ptp(picture) > 0
+
+
+def no_actions(mode: str) -> list:
+    """What is no action of a robot of four limbs."""
+    good, beyond = {
+        "limbs": (np.zeros(4, int), 3), "joint": (np.array(0), 81), "pairs": (np.array(0), 13),
+        "continuous": (np.zeros(4), 1.001),
+    }[mode]  # fmt: skip
+    wrong = [good + np.nan, good + beyond, good - beyond, np.ones(good.shape, bool), good[..., None], None, "up"]
+    of_limbs = [good[:3], *([10**400, good + 0.0] if mode == "limbs" else [good + np.inf])] if good.ndim else []
+    return [*wrong, [[0, 1], [0]], *(of_limbs or [good + 0.5, np.zeros(4, int), 10**12])]
+
+
+@pytest.mark.parametrize("kind", [SeastarSwimEnv, SeastarSwimVectorEnv])
+@pytest.mark.parametrize("reduced", [False, True])
+@pytest.mark.parametrize("mode", MODES)
+def test_what_is_no_action_is_refused_and_changes_nothing(mode, reduced, kind):
+    is_one = kind is SeastarSwimEnv
+    env = kind(**({} if is_one else {"num_envs": 2, "max_episode_steps": 2}), scene=FOUR, actions=mode)
+    if reduced:
+        env = (SymmetryReduction if is_one else VectorSymmetryReduction)(env)
+    env.reset(seed=0)
+    twin, good = copy.deepcopy(env), env.action_space.sample()
+    wrong = no_actions(mode) if is_one else [[action] * 2 for action in no_actions(mode)]
+    for _ in range(3):
+        for action in [*wrong, *([] if is_one else [good[:1], good[:, None], np.concatenate([good, good])])]:
+            with assert_refused("action"):
+                env.step(action)
+        found, expected = env.step(good), twin.step(good)
+        assert_same([*found[:4], *found[4].values()], [*expected[:4], *expected[4].values()])
 
 
 # The first decisions of every id, as they were recorded: whoever trains on a -v0 has the same task in every release.
 
 
-RECORDED = Path(__file__).parent / "episodes.json"
-DISTRIBUTIONS = {
-    "limb_strengths": Uniform(0.5, 1.0), "robot.density": LogUniform(900.0, 2e3), "fluid.density": Normal(1e3, 9.0),
-}  # fmt: skip
-OPTIONS = {
-    "": {},
-    "pairs": {"actions": "pairs", "path": "figure-eight"},
-    "joint": {"actions": "joint", "path": "square"},
-    "drawn scene": {
-        "randomization": DomainRandomization(DISTRIBUTIONS),
-        "path": "triangle",
-    },
-    "headings along": {"headings": HeadingTargets(tolerance=3.0), "path": "pentagon"},
-    "headings drawn": {"headings": HeadingTargets("random", 0.5), "path": "line"},
-    "aim": {"waypoint_radius": 0.03, "path": [[0.05, 0.0], [0.05, 0.02], [0.2, 0.0]]},
-}
-"""Options of `SeastarSwim-v0`, beside ids with their own."""
-CASES = {
-    **{id: {} if id in seastar_gym.TASKS else DRAWN for id in gym.registry if id.startswith("Seastar")},
-    **{f"SeastarSwim-v0 {name}": DRAWN | options for name, options in OPTIONS.items() if name},
-}
+EPISODES = Path(__file__).parent / "episodes.json"
 
 
 def numbers(info: dict) -> dict[str, list]:
@@ -222,7 +372,7 @@ def to_the_target(env: SeastarSwimEnv) -> None:
 
 def first_decisions(name: str) -> list[dict[str, list]]:
     """What an environment gives in four decisions; before the last but one, the robot is at its target."""
-    env = gym.make(name.partition(" ")[0], fidelity="fast", **CASES[name])
+    env = made(name)
     observation, info = env.reset(seed=11)
     env.action_space.seed(12)
     rows = [{"observation": observation, **numbers(info)}]
@@ -247,17 +397,17 @@ def changes(rows: list[dict]) -> list[dict[str, list]]:
     ]
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [*IDS, *RECORDED])
 def test_an_id_is_what_it_was(name):
-    known = json.loads(RECORDED.read_text(encoding="utf-8")) if RECORDED.exists() else {}
-    found = first_decisions(name)
-    if name not in known:
-        known[name] = changes(found)
-        lines = ",\n".join(f"{json.dumps(case)}: {json.dumps(known[case])}" for case in sorted(known))
-        RECORDED.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
+    known = json.loads(EPISODES.read_text(encoding="utf-8")) if EPISODES.exists() else {}
+    found, case = first_decisions(name), name if name in IDS else f"{SWIM} {name}"
+    if case not in known:
+        known[case] = changes(found)
+        lines = ",\n".join(f"{json.dumps(one)}: {json.dumps(known[one])}" for one in sorted(known))
+        EPISODES.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
         pytest.fail(f"{name} is recorded: look at it.")
     expected: dict[str, list] = {}
-    for row, changed in zip(found, known[name], strict=True):
+    for row, changed in zip(found, known[case], strict=True):
         expected |= changed
         for entry in row:
             np.testing.assert_allclose(row[entry], expected[entry], rtol=1e-3, atol=2e-5, err_msg=entry)

@@ -3,27 +3,22 @@
 import inspect
 import itertools
 import json
-import pickle
 import re
 
 import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
-from gymnasium.vector import AutoresetMode
 
 import seastar_gym
-from episodes import assert_same, assert_same_steps, swum
 from refusals import assert_refused
 from seastar_gym import (
     TASKS,
     Contact,
-    DomainRandomization,
     FailBlind,
     HeadingTargets,
     Limited,
     Miswired,
-    Normal,
     Numerics,
     ObstTrap,
     Prey,
@@ -31,24 +26,21 @@ from seastar_gym import (
     RewardWeights,
     Scene,
     Seastar,
-    Sight,
     SimToReal,
     SmaPulse,
     SmaWires,
     Station,
-    SymmetryReduction,
     ThermalSma,
-    Uniform,
 )
 from seastar_gym.accuracy.chapter import STROKES
 from seastar_gym.accuracy.info import NAMES
 from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
-from seastar_gym.envs.options import SwimOptions, scene_at, with_options
+from seastar_gym.envs.options import scene_at
 from seastar_gym.envs.paths import PATHS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv
+from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv, name_of
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.serial import from_dict, to_dict
+from seastar_gym.scene.serial import from_dict
 
 TYPES = {"float": float, "int": int, "bool": bool, "str": str}
 CHALLENGED = (Miswired, Prey, Station, FailBlind, ObstTrap, Prizes, SimToReal)
@@ -102,26 +94,20 @@ def test_the_observation_is_that_of_the_table():
     space = SeastarSwimEnv().observation_space
     assert f"`{space}`" in section("Observation") and space.shape == (documented[-1].stop,)
     assert {row["range"] for row in rows} == {f"({space.low.min()}, {space.high.max()})"}
-
-
-@pytest.mark.parametrize("actuator, n", [(SmaWires(), 2), (ThermalSma(), 4), (Limited(SmaPulse(), 0.3), 1)])
-def test_the_memory_of_actuators_is_that_of_the_table(actuator, n):
-    (row,) = [line for line in section("Observation").splitlines() if f"`{type(actuator).__name__}`" in line]
-    assert ("+, -" in row) == (n > 1)
-    at = Layout.of(Scene(actuator=actuator))
-    assert at.actuators == slice(182, 182 + 5 * n) and (n != 2 or f"has {at.size} numbers" in section("Observation"))
+    for actuator, n in ((SmaWires(), 2), (ThermalSma(), 4), (Limited(SmaPulse(), 0.3), 1)):
+        (row,) = [line for line in section("Observation").splitlines() if f"`{type(actuator).__name__}`" in line]
+        at = Layout.of(Scene(actuator=actuator))
+        assert ("+, -" in row) == (n > 1) and at.actuators == slice(182, 182 + 5 * n)
+        assert n != 2 or f"has {at.size} numbers" in section("Observation")
     assert f"{Layout.of(Scene(actuator=SmaWires()), entries=HEADINGS).size} with headings" in section("Observation")
 
 
-def test_the_reward_has_the_terms_and_weights_of_the_table():
+def test_the_reward_and_info_are_those_of_the_tables():
     weights = RewardWeights()
     documented = {row["term"]: float(row["default weight"].split()[0]) for row in table("Reward")}
     expected = {name: getattr(weights, name) for name in ("progress", "waypoint", "effort", "heading")}
     assert documented == {f"reward_{name}": weight for name, weight in expected.items()}
     assert f"within {weights.aim} of its radius" in section("Reward")
-
-
-def test_info_has_the_names_and_types_of_the_table():
     numerics = Numerics("implicit-midpoint", 5e-3, 1e-5)
     env = SeastarSwimEnv(scene=Scene(numerics=numerics, contact=Contact()), error_bars=True, headings=HeadingTargets())
     for info in (env.reset(seed=0)[1], env.step([0, 1, 0, 0, 2])[4]):
@@ -139,10 +125,7 @@ def test_the_arguments_are_those_of_the_constructors(one, batch):
     assert arguments(one) == list(inspect.signature(one).parameters)
     missing = {"frames_per_stroke"}  # a batch draws the ends of strokes
     assert {*arguments(one), *arguments(batch)} - missing == set(inspect.signature(batch).parameters)
-
-
-def test_every_named_path_is_documented():
-    assert all(f'"{name}"' in section("Arguments") for name in PATHS)
+    assert one is SeastarTaskEnv or all(f'"{name}"' in section("Arguments") for name in PATHS)
 
 
 OF_WAYPOINTS = "SeastarSwim-v0", "SeastarSwimContinuous-v0", "SeastarSwimHeading-v0", *seastar_gym.TIMED
@@ -160,11 +143,6 @@ def test_ids_are_those_of_the_table(id):
     assert env.step(env.action_space.sample())[4]["time"] == float(period)
 
 
-def test_the_timed_environments_decide_as_often_as_they_say():
-    timed = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
-    assert timed == seastar_gym.TIMED
-
-
 # Tasks
 
 
@@ -173,6 +151,7 @@ def test_a_task_has_the_numbers_of_the_table(id):
     task, period, actions, limit, threshold = row_of(id, SeastarTaskEnv)
     env = gym.make(id, fidelity="fast")
     inner = env.unwrapped
+    assert name_of(None) is name_of(Prey(wanted=9)) is None and name_of(inner.challenge) == task.strip('"')
     assert CHALLENGES[task.strip('"')] == inner.challenge and f'"{inner.actions}"' == actions
     assert inner.decision_period == float(period) and env.spec.reward_threshold == float(threshold)
     assert env.spec.max_episode_steps == round(float(limit) / float(period))
@@ -205,7 +184,8 @@ def test_info_of_a_task_is_that_of_the_docstrings(id):
 
 
 @pytest.mark.parametrize("kind", CHALLENGED)
-def test_rewards_of_a_task_are_those_of_the_table(kind):
+def test_arguments_and_rewards_of_a_challenge_are_those_of_the_docstring(kind):
+    assert arguments(kind) == list(inspect.signature(kind).parameters)
     env = SeastarTaskEnv(task=kind(), fidelity="fast")
     named = {row["term"] for row in table("Reward", kind) if row["term"]}
     assert named == {name for name in env.reset(seed=0)[1] if name.startswith("reward_")}
@@ -240,11 +220,6 @@ def test_what_a_camera_sees_of_a_task_is_that_of_the_table():
     assert env.observation_space.shape == (at.size,)
 
 
-@pytest.mark.parametrize("kind", CHALLENGED)
-def test_arguments_of_a_challenge_are_those_of_the_docstring(kind):
-    assert arguments(kind) == list(inspect.signature(kind).parameters)
-
-
 def test_ids_are_declared_as_recorded():
     limits = {id: spec.max_episode_steps for id, spec in gym.registry.items() if id.startswith("SeastarSwim")}
     assert limits == {
@@ -252,6 +227,8 @@ def test_ids_are_declared_as_recorded():
         "SeastarSwimTimedModerate-v0": 1000, "SeastarSwimTimedHard-v0": 2000, "SeastarSwimHeading-v0": 600,
         "SeastarSwimSimToReal-v0": 1500,
     }  # fmt: skip
+    timed = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
+    assert timed == seastar_gym.TIMED
     assert gym.spec("SeastarSwimContinuous-v0").kwargs == {"actions": "continuous"}
     heading = gym.spec("SeastarSwimHeading-v0").kwargs
     assert heading["decision_period"] == 0.5 and heading["actions"] == "pairs"
@@ -260,19 +237,6 @@ def test_ids_are_declared_as_recorded():
         spec = gym.spec(id)
         assert spec.max_episode_steps == round(limit / period) and spec.reward_threshold == threshold
         assert spec.kwargs == {"task": task, "actions": actions, "decision_period": period}
-
-
-def test_a_signature_names_the_shared_options_after_those_before_them():
-    class Made:
-        @with_options
-        def __init__(self, first, *given, last=3, **options):
-            pass
-
-    names = list(inspect.signature(SwimOptions).parameters)
-    found = inspect.signature(Made).parameters
-    assert list(found) == ["first", *names, "last"]
-    assert found["last"].kind is inspect.Parameter.KEYWORD_ONLY and found["path"].default == "pentagon"
-    assert found["first"].kind is inspect.Parameter.POSITIONAL_OR_KEYWORD
 
 
 def test_a_scene_of_a_file_has_its_own_numerics_or_those_of_the_fidelity(tmp_path):
@@ -289,88 +253,20 @@ def test_a_scene_of_a_file_has_its_own_numerics_or_those_of_the_fidelity(tmp_pat
 
 ID = "SeastarSwim-v0"
 SCENE = Scene(Seastar(nodes_per_limb=4), actuator=SmaPulse(0.5), numerics=Numerics.preset("fast"))
-ARGUMENTS = {
-    "nothing": {"fidelity": "fast"},
-    "scene": {"scene": SCENE},
-    "stateful scene": {"scene": Scene(actuator=Limited(SmaPulse(), 0.5, 3.0)), "fidelity": "fast"},
-    "waypoints": {"path": np.array([[0.01, 0.1 / 3], [0.1, 0.0]]), "scene": SCENE},
-    "waypoints in single precision": {"path": ((np.float32(0.1), 0), (1 / 3, np.float64(0.1))), "scene": SCENE},
-    "actions": {"actions": "pairs", "path": "random", "random_heading": np.bool_(True), "scene": SCENE},
-    "reward": {"reward": RewardWeights(100 / 3, 2, 0.0), "waypoint_radius": np.float64(0.1 / 3), "scene": SCENE},
-    "randomization": {
-        "randomization": DomainRandomization({"robot.density": Normal(1e3, 10 / 3), "fluid.density": Uniform(9, 99)}),
-        "scene": SCENE,
-    },
-    "error_bars": {"error_bars": True, "scene": SCENE},
-    "device": {"device": "scalar", "fidelity": "fast"},
-    "decisions": {"decision_period": 0.2, "observe_actuators": False, "fidelity": "fast"},
-    "continuous": {"actions": "continuous", "decision_period": np.float64(0.3), "fidelity": "fast"},
-    "headings": {"headings": HeadingTargets((0.1, 1 / 3, 0.0, 1.0, 2.0)), "fidelity": "fast"},
-    "one heading": {"headings": HeadingTargets(0.1, 1 / 3), "fidelity": "fast"},
-    "sight": {
-        "sight": Sight(1e2 / 3, Uniform(0.1, 1 / 3), dropout=0.1, sees=np.int64(3)),
-        "decision_period": 0.5,
-        "fidelity": "fast",
-        "action_delay": Uniform(0.0, 1 / 3),
-    },
-    "a delay": {"sight": Sight(), "action_delay": np.float64(1.0), "fidelity": "fast"},
-    "plain": {
-        "sight": to_dict(Sight(delay=Uniform(0.1, 1 / 3))),
-        "headings": to_dict(HeadingTargets("random")),
-        "scene": SCENE.to_dict(),
-        "reward": to_dict(RewardWeights(1.0)),
-        "randomization": to_dict(DomainRandomization({"fluid.density": Uniform(900.0, 1000.0)})),
-    },
-}
 
 
-def by_json(spec: EnvSpec) -> EnvSpec:
-    """The spec by way of text, whose names a library may have sorted."""
-    return EnvSpec.from_json(json.dumps(json.loads(spec.to_json()), sort_keys=True))
-
-
-@pytest.mark.parametrize("arguments", ARGUMENTS)
-def test_an_environment_comes_back_from_its_spec(arguments):
-    env = gym.make(ID, **ARGUMENTS[arguments])
-    spec = by_json(env.spec)
-    assert spec == env.spec
-    other = gym.make(spec)
-    assert other.spec == env.spec and other.unwrapped.scene == env.unwrapped.scene
-    assert_same(swum(env, 3), swum(other, 3))
-
-
-@pytest.mark.parametrize("arguments", ["scene", "waypoints", "reward", "randomization", "sight", "plain"])
-def test_a_native_batch_comes_back_from_its_spec(arguments):
-    more = {"num_envs": 3, "autoreset_mode": AutoresetMode.SAME_STEP, "threads": 1, "max_episode_steps": 2}
-    batch = gym.make_vec(ID, **more, **ARGUMENTS[arguments])
-    other = gym.make_vec(by_json(batch.spec))
-    assert other.num_envs == 3 and other.autoreset_mode is AutoresetMode.SAME_STEP
-    assert other.spec == batch.spec
-    np.testing.assert_array_equal(batch.reset(seed=3)[0], other.reset(seed=3)[0])
-    batch.action_space.seed(4)
-    for _ in range(3):
-        actions = batch.action_space.sample()
-        assert_same_steps(batch.step(actions), other.step(actions))
-
-
-def test_a_batch_of_gymnasiums_own_comes_back_where_it_was_told_in_plain_form():
-    batch = gym.make_vec(ID, 2, vectorization_mode="sync", scene=SCENE.to_dict())
-    other = gym.make_vec(by_json(batch.spec))
-    np.testing.assert_array_equal(batch.reset(seed=3)[0], other.reset(seed=3)[0])
-
-
-def test_wrappers_come_back_too():
-    env = SymmetryReduction(gym.make(ID, scene=SCENE, actions="pairs"))
-    for other in (gym.make(by_json(env.spec)), pickle.loads(pickle.dumps(env))):
-        assert isinstance(other, SymmetryReduction)
-        assert_same(swum(env, 3), swum(other, 3))
-
-
-def test_a_spec_can_be_copied_changed_and_made_again():
+def test_specs_can_be_changed_hold_files_by_name_and_that_of_gymnasiums_own_batch_is_read_where_it_is_plain(tmp_path):
     env = gym.make(ID, scene=SCENE)
     other = gym.make(env.spec, actions="pairs")
     assert other.unwrapped.actions == "pairs" and other.unwrapped.scene == SCENE
     assert SeastarSwimEnv().spec is None
+    file = tmp_path / "strokes.json"
+    file.write_bytes(STROKES.read_bytes())
+    env = gym.make(ID, fidelity="fast", certificate=file)
+    assert json.loads(env.spec.to_json())["kwargs"]["certificate"] == str(file)
+    batch = gym.make_vec(ID, 2, vectorization_mode="sync", scene=SCENE.to_dict())
+    again = gym.make_vec(EnvSpec.from_json(batch.spec.to_json()))
+    np.testing.assert_array_equal(batch.reset(seed=3)[0], again.reset(seed=3)[0])
 
 
 class Own(SmaPulse):
@@ -382,34 +278,3 @@ def test_a_spec_that_could_not_be_read_back_refuses_to_be_written_and_still_make
     with assert_refused("Scene.actuator is a Own", "seastar_gym.register_part"):
         env.spec.to_json()
     assert gym.make(env.spec).unwrapped.scene == env.unwrapped.scene
-
-
-@pytest.mark.parametrize(
-    "arguments, words",
-    [
-        ({"scene": {}}, "plain Scene is a dict with a version"),
-        ({"scene": to_dict(RewardWeights())}, "plain RewardWeights, not a Scene"),
-        ({"scene": {**SCENE.to_dict(), "version": 2}}, "version 2"),
-        ({"scene": 3}, "scene must be a Scene"),
-        ({"reward": {"progress": 1.0}}, "plain RewardWeights is a dict with a version"),
-        ({"randomization": {"robot.density": [900, 1000]}}, "plain DomainRandomization is a dict with a version"),
-    ],
-)
-@pytest.mark.parametrize("make", [gym.make, gym.make_vec])
-def test_plain_arguments_that_are_none_are_refused(make, arguments, words):
-    with assert_refused(words):
-        make(ID, **arguments)
-
-
-def test_the_arguments_of_the_tables_are_those_of_the_environment():
-    """A new argument is not forgotten."""
-    told = {name for arguments in ARGUMENTS.values() for name in arguments}
-    drawing = {"render_mode", "frames_per_stroke", "certificate"}  # a certificate has tests of its own
-    assert told | drawing == set(inspect.signature(SeastarSwimEnv).parameters)
-
-
-def test_a_certificate_by_its_path_is_a_text_in_the_spec(tmp_path):
-    file = tmp_path / "strokes.json"
-    file.write_bytes(STROKES.read_bytes())
-    env = gym.make(ID, fidelity="fast", certificate=file)
-    assert json.loads(env.spec.to_json())["kwargs"]["certificate"] == str(file)

@@ -1,18 +1,35 @@
 """Helpers of environments refuse in a sentence what they could not use, and take what is just allowed."""
 
+import copy
+
 import gymnasium as gym
 import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import DomainRandomization, Scene, Seastar, Sight, SmaPulse, SmaWires, SymmetryReduction, Uniform
+from seastar_gym import (
+    Body,
+    DomainRandomization,
+    Limited,
+    MeasuredCurve,
+    Numerics,
+    Scene,
+    Seastar,
+    Sight,
+    SmaPulse,
+    SmaWires,
+    SymmetryReduction,
+    Uniform,
+)
 from seastar_gym.envs.commands import action_space, choices, command_table, to_commands
+from seastar_gym.envs.frame import Frame
 from seastar_gym.envs.goal import GoalForm
 from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.paths import FARTHEST, make_path, register_path
 from seastar_gym.envs.randomization import LogUniform, Normal
+from seastar_gym.envs.rendering import Renderer
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import (
@@ -24,14 +41,19 @@ from seastar_gym.envs.symmetry import (
 )
 from seastar_gym.envs.task_env import checked_options
 from seastar_gym.envs.tasks.course import Pursuit, draw_course
+from seastar_gym.envs.tasks.envs import SeastarTaskEnv, SeastarTaskVectorEnv
 from seastar_gym.envs.tasks.obst_trap import ObstTrap, draw_discs
 from seastar_gym.envs.vector import SeastarSwimVectorEnv, checked_seeds
+from seastar_gym.scene.numerics import MAX_STEPS, SHORTEST
+from seastar_gym.scene.serial import to_dict
 from symmetries import symmetry_for
 
 LIMBS, SHARES, JOINT = (Symmetry(5, (), Layout(5), mode) for mode in ("limbs", "continuous", "joint"))
 ONE = np.zeros(1, int)
 WIRES = memory_mirror(SmaWires())
 NINE = Scene(Seastar(9), actuator=SmaPulse(0.1))
+LEG, WIRED = np.array([[0.1, 0.0]]), Scene(actuator=SmaWires())
+SHORTEST_DECISION, LONGEST_DECISION = SHORTEST * WIRED.numerics.step, MAX_STEPS * WIRED.numerics.step
 RNG, SLOW = np.random.default_rng(0), Pursuit(1e-3, 1e-3)
 
 
@@ -39,6 +61,24 @@ def goals(achieved, desired):
     """Rewards of goals."""
     env = GoalForm(gym.make("SeastarSwim-v0", fidelity="fast"))
     return env.compute_reward(achieved, desired, {})
+
+
+def path(given):
+    return make_path(given, RNG)
+
+
+def drawn_of(name):
+    """Values of a number of a robot with a body."""
+    scene = Scene(Seastar(body=Body(radius=0.02, drag_coefficient=1.0)))
+    return DomainRandomization({name: Uniform(0.1, 0.2)}).first_values(scene, 2)
+
+
+def drawn_by(size=(480, 360), **changed):
+    """Picture of a robot that rests."""
+    pytest.importorskip("pygame")
+    robot = Seastar(nodes_per_limb=10)
+    shown = {"positions": robot.nodes(), "command": np.zeros(5), "trail": np.zeros((1, 2))} | changed
+    return Renderer(robot, LEG, 0.01, size).draw(Frame(**shown, waypoint_index=0, time=0.0))
 
 
 def swimmers(**options):
@@ -57,26 +97,20 @@ REFUSED = {
     "goals of a cart": (lambda: GoalForm(gym.make("CartPole-v1")), "GoalForm needs an environment of waypoints"),
     "goals seen by a camera": (lambda: GoalForm(gym.make("SeastarSwim-v0", sight=Sight())), "which no camera knows"),
     "entries in a list": (lambda: Layout(entries=["scalar"]), "entries must be a tuple of scalar"),
-    "an entry of no text": (lambda: Layout(entries=(3,)), "entries must be a tuple of scalar"),
     "an unknown entry": (lambda: Layout(entries=("tensor",)), "entries must be a tuple of scalar"),
     "limbs without number": (lambda: Layout(0), "n_limbs"),
     "a path without name": (lambda: register_path(""), "The name of a path must be a text"),
-    "a path named 3": (lambda: register_path(3), "The name of a path must be a text"),
     "a path that is none": (lambda: register_path("mine")(3), "A path"),
     "a path without rng": (lambda: make_path("line", 3), "rng"),
     "a range downwards": (lambda: Uniform(2.0, 1.0), "low must not exceed high"),
     "a range beyond floats": (lambda: Uniform(-1e308, 1e308), "high - low must be finite"),
     "a range to infinity": (lambda: Uniform(0.0, np.inf), "high must be a finite number"),
-    "a range of texts": (lambda: Uniform("0", 1.0), "low must be a finite number"),
-    "a range of ranges": (lambda: Uniform(np.array([0.0, 1.0]), 1.0), "low must be a finite number"),
     "logarithms of zero": (lambda: LogUniform(0.0, 1.0), "low must be a positive"),
     "a mean that is none": (lambda: Normal(np.nan, 1.0), "mean must be a finite number"),
     "a negative deviation": (lambda: Normal(0.0, -1.0), "deviation"),
-    "a deviation of truth": (lambda: Normal(1.0, True), "deviation"),
     "no distributions": (lambda: DomainRandomization({}), "needs distributions by name"),
     "a number as a draw": (lambda: DomainRandomization({"fluid.density": 3.0}), "fluid.density", "needs a Uniform"),
     "a misspelt draw": (lambda: drawing("limb_strength", 0.5, 1.0), "'limb_strength'", "limb_strengths"),
-    "a draw without name": (lambda: drawing(3, 0.5, 1.0), "3", "limb_strengths"),
     "a draw of everything": (lambda: SeastarSwimEnv(randomization="all"), "DomainRandomization", "'all'"),
     "a draw of limbs": (lambda: drawing("robot.n_limbs", 3, 5), "robot.n_limbs", "same for all robots of a batch"),
     "a draw of lengths below zero": (lambda: drawing("robot.limb_length", -0.1, 0.2), "limb_length", "positive"),
@@ -85,7 +119,6 @@ REFUSED = {
     "a draw of no current": (lambda: drawing("fluid.current.u_x", 0.1, 0.2), "fluid.current.u_x"),
     "strong limbs": (lambda: DomainRandomization({"limb_strengths": Uniform(0.5, 1.1)}), "drawn from 0 to 1"),
     "limbs that push back": (lambda: DomainRandomization({"limb_strengths": Uniform(-0.1, 1.0)}), "drawn from 0 to 1"),
-    "a mirror of lists": (lambda: Symmetry(5, [(0, 1)], Layout(5, 1)), "mirror must be a tuple of pairs"),
     "a mirror of triples": (lambda: Symmetry(5, ((0, 1, 1),), Layout(5, 1)), "mirror must be a tuple of pairs"),
     "a mirror beyond": (lambda: Symmetry(5, ((1, 1),), Layout(5, 1)), "mirror must be a tuple of pairs"),
     "a mirror before": (lambda: Symmetry(5, ((-1, 1),), Layout(5, 1)), "mirror must be a tuple of pairs"),
@@ -131,13 +164,61 @@ REFUSED = {
     "an action of shares": (lambda: to_commands("pairs", 5, [1.0], 1), "are whole numbers of shape (1,)"),
     "a heading beyond": (lambda: HeadingTargets(1.1e6), "HeadingTargets.target must be"),
     "half a turn and more": (lambda: HeadingTargets(tolerance=3.2), "HeadingTargets.tolerance must be at most pi"),
-    "an aim beyond": (lambda: RewardWeights(aim=1.01), "RewardWeights.aim must be from 0 to 1"),
     "a goal too far": (lambda: ObstTrap(distance=(0.45, 0.61)), "ObstTrap.distance must lie from 0.45 to 0.6"),
     "a goal too near": (lambda: ObstTrap(distance=(0.1, 0.5)), "ObstTrap.distance must lie from 0.45 to 0.6 m"),
     "no potential": (lambda: ObstTrap(potential="by air"), "ObstTrap.potential must be one of 'straight', 'geodesic'"),
     "prey too fast": (lambda: draw_course(RNG, (9.0, 10.0), (0.5, 1.0), 0.1, SLOW), "a robot could meet none"),
     "discs without end": (lambda: draw_discs(RNG, np.array([0.5, 0.0]), 3, 0.4), "none can be passed"),
-    "frames without end": (lambda: SeastarSwimEnv(frames_per_stroke=1_000_001), "frames_per_stroke"),
+    "a camera of 2 kHz": (lambda: Sight(2e3), "at most 1000 Hz"),
+    "a camera that foresees": (lambda: Sight(delay=-0.1), "Sight.delay"),
+    "a camera that may foresee": (lambda: Sight(delay=Uniform(-0.1, 0.1)), "Sight.delay"),
+    "a camera too late": (lambda: Sight(delay=6.0), "at most 5 s"),
+    "more losses than pictures": (lambda: Sight(dropout=1.1), "at most 1 1"),
+    "two markers": (lambda: Sight(sees=2), "1, 3 or 9 markers"),
+    "a camera of hubs": (lambda: Sight(sees="hub"), "Sight.sees"),
+    "a heading that is none": (lambda: HeadingTargets("across"), "HeadingTargets.target", "along"),
+    "no headings": (lambda: HeadingTargets(()), "HeadingTargets.target", "along"),
+    "a heading among others": (lambda: HeadingTargets((0.1, np.nan)), "HeadingTargets.target", "along"),
+    "headings in a list": (lambda: HeadingTargets([0.1]), "HeadingTargets.target", "along"),
+    "no tolerance": (lambda: HeadingTargets(0.0, 0.0), "HeadingTargets.tolerance"),
+    "an unknown path": (lambda: path("hexagon"), "'hexagon': choose one of pentagon, square, triangle, line, figure"),
+    "a path beside numbers": (lambda: path([[0.1, np.nan]]), "must be finite"),
+    "a path of one axis": (lambda: path([0.1, 0.2]), "must have shape (n, 2)", "not (2,)"),
+    "a path in space": (lambda: path([[0.1, 0.2, 0.3]]), "must have shape (n, 2)", "not (1, 3)"),
+    "ragged waypoints": (lambda: path([[0.1, 0.2], [0.3]]), "must have shape (n, 2)"),
+    "no waypoints": (lambda: path(np.zeros((0, 2))), "at least one waypoint"),
+    "waypoints of texts": (lambda: path([["a", "b"]]), "array of numbers"),
+    "one place twice": (lambda: path([[0.1, 0.0], [0.1, 0.0]]), "are the same point"),
+    "a path that stays": (lambda: path([[0.0, 0.0]]), "must lead away from the origin"),
+    "a path beyond": (lambda: path([[1.1e6, 0.0]]), "within"),
+    "one name for two paths": (lambda: register_path("line")(lambda rng: LEG), "a path of the name 'line' already"),
+    "a body's drag that is not": (lambda: drawn_of("robot.body.drag_along"), "number 'robot.body.drag_along' to draw",
+                                  ", since it leaves that out (None): give it a value there."),
+    "a body's radius": (lambda: drawn_of("robot.body.radius"), "'robot.body.radius'", "same for all robots of a"),
+    "a colour": (lambda: drawn_of("robot.colour"), "has no number 'robot.colour' to draw: it has ", "fluid.density"),
+    "a step that is too short": (lambda: SeastarSwimEnv(scene=WIRED, decision_period=0.99 * SHORTEST_DECISION),
+                                 "decision_period must be from"),
+    "a step that is too long": (lambda: SeastarSwimEnv(scene=WIRED, decision_period=1.01 * LONGEST_DECISION),
+                                "decision_period must be from"),
+    "no batch": (lambda: SeastarSwimVectorEnv(0), "num_envs must be a whole number"),
+    "batches without end": (lambda: SeastarSwimVectorEnv(2, 0), "max_episode_steps"),
+    "no threads": (lambda: SeastarSwimVectorEnv(2, threads=0), "threads"),
+    "a window of a batch": (lambda: SeastarSwimVectorEnv(2, render_mode="human"), 'draws with render_mode="rgb_array"'),
+    "no mode of a batch": (lambda: SeastarSwimVectorEnv(2, autoreset_mode="sometimes"), "autoreset_mode must be one"),
+    "no mode of pictures": (lambda: SeastarSwimEnv(render_mode="ansi"), "render_mode"),
+    "no pictures": (lambda: SeastarSwimEnv(frames_per_stroke=0), "frames_per_stroke must be a whole number"),
+    "no mode of a task": (lambda: SeastarTaskEnv(render_mode="film"), "render_mode"),
+    "films of tasks": (lambda: gym.make_vec("SeastarPrey-v0", render_mode="film"), "The batch draws"),
+    "no task": (lambda: SeastarTaskEnv(task="swim"), "one of 'miswired', 'prey', 'fast-prey', 'station'"),
+    "a task of 3": (lambda: SeastarTaskVectorEnv(task=3), "task must be a challenge"),
+    "a task in plain": (lambda: SeastarTaskEnv(task={"kind": "Prey"}), "a dict with a version"),
+    "no split": (lambda: SeastarTaskVectorEnv(split="validation"), "split must be one of 'train', 'test'"),
+    "pictures too small": (lambda: drawn_by(size=(100, 100)), "at least 320 x 240 pixels, not 100 x 100"),
+    "a robot beside numbers": (lambda: drawn_by(positions=np.full((46, 2), np.nan)), "of shape (46, 2)"),
+    "a node that is missing": (lambda: drawn_by(positions=np.zeros((45, 2))), "must be finite and of shape (46, 2)"),
+    "a command of four": (lambda: drawn_by(command=np.zeros(4)), "must have shape (5,), not (4,)"),
+    "an endless trail": (lambda: drawn_by(trail=np.full((3, 2), np.inf)), "must be finite and of shape (k, 2)"),
+    "a flat trail": (lambda: drawn_by(trail=np.zeros(2)), "must be finite and of shape (k, 2)"),
 }  # fmt: skip
 """What is refused, and words of the sentence."""
 
@@ -150,6 +231,7 @@ def test_what_nobody_could_use_is_refused_in_a_sentence(case):
 
 
 def test_what_is_just_allowed_is_taken():
+    assert SeastarSwimEnv(scene=WIRED, decision_period=1.01 * SHORTEST_DECISION).decision_period < 0.01
     assert goals(np.zeros((3, 2)), np.zeros((3, 2))).tolist() == [0.0] * 3
     near = [[0.1 - 1e-9, 0.0], [0.1 + 1e-9, 0.0]]  # the radius of waypoints in limb lengths
     assert goals(near, np.zeros((2, 2))).tolist() == [0.0, -1.0]
@@ -166,8 +248,85 @@ def test_what_is_just_allowed_is_taken():
     assert checked_seeds([1, None], 2) == [1, None] and checked_seeds(3, 2) == [3, 4]
     assert checked_seeds(None, 2) == [None, None]
     assert checked_options(None, {"path"}) == {}
-    one = SeastarSwimVectorEnv(1, 1, fidelity="fast")
-    one.reset(seed=0)
-    assert one.step(np.zeros((1, 5), int))[3].tolist() == [True]
     assert HeadingTargets((0.1, 0.2)).of_path(np.ones((2, 2)), np.random.default_rng(0)).tolist() == [0.1, 0.2]
     assert DomainRandomization({"limb_strengths": Uniform(0.0, 1.0)}).distributions
+
+
+SCENE = Scene(Seastar(nodes_per_limb=4), actuator=SmaPulse(0.5), numerics=Numerics.preset("fast"))
+CURVE = MeasuredCurve((0.0, 0.5, 1.0), (0.0, 0.3, 0.0))
+CORNERS = [[0.05, 0.0], [0.05, 0.05], [0.0, 0.0]]
+SEEN = {"decision_period": 0.5, "sight": Sight()}
+
+
+def draws(name, low=0.0, high=1.0):
+    return {"randomization": DomainRandomization({name: Uniform(low, high)})}
+
+
+ARGUMENTS = [
+    ({"path": "hexagon"}, "hexagon"), ({"path": None}, "path"), ({"actions": "binary"}, "actions"),
+    ({"fidelity": "exact"}, "fidelity"), ({"scene": "chapter"}, "Scene"), ({"scene": Seastar()}, "Scene"),
+    ({"reward": 1.0}, "RewardWeights"), ({"waypoint_radius": 0.0}, "waypoint_radius"),
+    ({"waypoint_radius": 1e300}, "waypoint_radius"), ({"random_heading": "False"}, "random_heading"),
+    ({"observe_actuators": 1}, "observe_actuators"), ({"randomization": {}}, "DomainRandomization"),
+    ({"scene": Scene(Seastar(hub_hinge="turning", discretisation="chapter"))}, "turning"),
+    ({"scene": Scene(Seastar(hub_hinge="turning", discretisation="chapter"), actuator=SmaPulse(0.3)),
+      **draws("actuator.peak_angle", 0.3, np.pi / 5.0)}, "close a hub hinge"),
+    ({"scene": Scene(numerics=Numerics()), "fidelity": "fast"}, "Numerics()", "give one of them"),
+    ({"scene": {}}, "plain Scene is a dict with a version"),
+    ({"scene": to_dict(RewardWeights())}, "plain RewardWeights, not a Scene"),
+    ({"scene": {**SCENE.to_dict(), "version": 2}}, "version 2"),
+    ({"reward": {"progress": 1.0}}, "plain RewardWeights is a dict with a version"),
+    ({"randomization": {"robot.density": [900, 1000]}}, "plain DomainRandomization is a dict with a version"),
+    ({"headings": "along"}, "eading"), ({"headings": {"kind": "HeadingTargets"}}, "eading"),
+    ({"headings": HeadingTargets((0.1, 0.2))}, "2 angles", "5 waypoint"),
+    ({"path": [[0.1, 0.0], [0.1, 0.0], [0.2, 0.0]], "headings": HeadingTargets()}, "leg to waypoint 2"),
+    ({"sight": 30.0}, "a Sight or None"), ({"action_delay": -1.0}, "action_delay"),
+    ({"action_delay": Sight()}, "action_delay"), ({**draws("sight.delay"), "decision_period": 0.5}, "sight.delay"),
+    ({**draws("sight.rate"), **SEEN}, "sight.rate"), ({**draws("sight.delay", 0.0, 9.0), **SEEN}, "at most 5 s"),
+    ({**draws("action_delay", -1.0), **SEEN}, "action_delay"), ({"decision_period": 0.0}, "decision_period"),
+    ({"decision_period": np.nan}, "decision_period"), ({"decision_period": 1e30}, "decision_period"),
+    *(({"action_delay": 0.1, "scene": scene}, "action_delay", "whole decisions of 1 s", "SmaWires")
+      for scene in (None, Scene(actuator=SmaPulse()))),
+    *(({"decision_period": 0.5, "scene": Scene(actuator=each)}, "decision_period", type(each).__name__, "SmaWires")
+      for each in (SmaPulse(), CURVE, Limited(SmaPulse(), 0.3))),
+]  # fmt: skip
+"""Arguments of an environment, and words of the sentence that refuses them."""
+
+
+@pytest.mark.parametrize("make", [SeastarSwimEnv, SeastarSwimVectorEnv])
+@pytest.mark.parametrize("arguments, words", [(arguments, words) for arguments, *words in ARGUMENTS], ids=str)
+def test_arguments_that_mean_nothing_are_refused(make, arguments, words):
+    with assert_refused(*words):
+        make(**arguments)
+
+
+def resets():
+    """Environments, options of a reset, and words of the sentence that refuses them."""
+    one, batch = SeastarSwimEnv(fidelity="fast"), SeastarSwimVectorEnv(3, fidelity="fast")
+    asked = {"path": CORNERS, "headings": HeadingTargets((0.1, 0.2, 0.3)), "fidelity": "fast"}
+    for env in (one, batch):
+        yield env, {"heading": 1.0}, "Unknown reset option(s)"
+        yield env, {"path": "hexagon"}, "hexagon"
+        yield env, {"path": [[np.nan, 0]]}, "finite"
+    for wrong in ([1, 0, 0], [[True], [True, False]], "True", np.array([True]), np.zeros(3, bool)):
+        yield batch, {"reset_mask": wrong}, "reset_mask"
+    for env in (SeastarSwimEnv(**asked), SeastarSwimVectorEnv(**asked)):
+        yield env, {"path": "pentagon"}, "3 angles", "5 waypoint"
+    task = SeastarTaskEnv(task="prey", fidelity="fast", split="test")
+    for number in (-1, 1000, 1.0, True, [1, 2, 3], "one"):
+        yield task, {"instance": number}, "instance must be a whole number from 0 to 999"
+    yield task, {"path": "line"}, "Unknown reset option"
+
+
+def test_resets_that_mean_nothing_are_refused_and_the_episode_goes_on():
+    for env, options, *words in resets():
+        env.reset(seed=0)
+        good = env.action_space.sample()
+        env.step(good)
+        twin = copy.deepcopy(env)
+        with assert_refused(*words):
+            env.reset(options=options)
+        for one, other in zip(env.step(good)[:4], twin.step(good)[:4], strict=True):
+            np.testing.assert_array_equal(one, other)
+    with pytest.raises(gym.error.ResetNeeded, match="first reset"):
+        SeastarSwimVectorEnv(3, fidelity="fast").reset(options={"reset_mask": np.array([True, False, True])})
