@@ -152,6 +152,8 @@ def test_a_report_is_as_kept(kept, monkeypatch, tmp_path):
         *_, swum = text.splitlines()
         assert MARKUP not in text and "<" not in swum and json.loads(swum)["swims"][1]["agent"] == MARKUP
         kept(f"report_{name}.txt", text.replace(',"', ',\n"'))
+    titles = (re.sub(r"^(mean|largest) | \[.*", "", " ".join(title.split())) for title in COLUMNS.values())
+    assert [title for title in titles if title not in f"{page._terms()} agent waypoints reached"] == []
 
 
 READ = {
@@ -185,12 +187,6 @@ def test_damaged_files_of_a_report_are_refused(name, text, words, tmp_path):
     (tmp_path / name).write_text(text)
     with assert_refused(words):
         READ[name](tmp_path / name)
-
-
-def test_every_column_is_explained():
-    terms = page._terms()
-    titles = (re.sub(r"^(mean|largest) | \[.*", "", " ".join(title.split())) for title in COLUMNS.values())
-    assert [title for title in titles if title not in f"{terms} agent waypoints reached"] == []
 
 
 # Recording, and the page in a browser
@@ -279,8 +275,8 @@ def opened(open_offline, evaluated):
     watched.page.context.close()
 
 
-def test_the_slider_moves_the_robot_whose_actuated_limbs_are_blue(opened, evaluated):
-    folder, (straight, _) = evaluated
+def test_the_robot_moves_as_slider_strokes_and_play_say_and_its_actuated_limbs_are_blue(opened, evaluated):
+    folder, (straight, stray) = evaluated
     opened.choose("straight")
     opened.page.wait_for_selector("#curves .main-svg")
     assert [url for url in opened.requests if not url.startswith("data:")] == [(folder / "report.html").as_uri()]
@@ -295,12 +291,6 @@ def test_the_slider_moves_the_robot_whose_actuated_limbs_are_blue(opened, evalua
         assert f"stroke {stroke} of {straight.strokes}" in opened.page.inner_text("#readout")
     _, _, *colours, _, _ = opened.colours()
     assert [blue > 1.4 * max(red, green) for red, green, blue in colours] == [False, True, True]
-    assert opened.complaints == []
-
-
-def test_strokes_are_listed_lead_there_and_play_to_the_end(opened, evaluated):
-    _, (straight, stray) = evaluated
-    opened.choose("straight")
     items, play, time = (opened.page.locator(name) for name in ("#strokes li", "#play", "#time"))
     assert items.count() == straight.strokes
     opened.choose(MARKUP)

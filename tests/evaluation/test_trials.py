@@ -159,7 +159,7 @@ def test_the_command_line_writes_a_row_for_every_set_agent_and_fidelity(options,
 # Means over seeds and tasks, their intervals, and performance profiles.
 
 
-def test_means_intervals_and_profiles_are_as_kept(golden):
+def test_means_intervals_and_profiles_are_as_kept_and_wide_where_seeds_or_episodes_differ(golden):
     """Of seeds that differ on the same paths, of crossed seeds and episodes, of one seed, of constants, of nothing."""
     rng = np.random.default_rng(0)
     paths, scores = np.linspace(150.0, 200.0, 16), np.array([[0.2, 0.9], [0.4, 0.9], [0.6, 0.9], [0.8, 0.9]])
@@ -176,10 +176,6 @@ def test_means_intervals_and_profiles_are_as_kept(golden):
         "profile": np.transpose(statistics.profile(scores, [0.0, 0.5, 0.85, 1.0])),
     }  # fmt: skip
     golden("statistics.txt", "\n".join(f"{name}: {np.round(value, 4).tolist()}" for name, value in found.items()))
-
-
-def test_an_interval_is_wide_where_seeds_or_episodes_differ():
-    rng = np.random.default_rng(0)
     of_seeds, of_episodes = rng.normal(size=(10, 1)), rng.normal(size=(1, 40))
     for drawn in (of_seeds, of_episodes):
         low, high = statistics.crossed_interval(list(drawn + np.zeros((10, 40))))
