@@ -128,20 +128,22 @@ def scenes_of_pages(tmp_path, monkeypatch):
     Path("fitted.json").write_text(json.dumps(fitted), encoding="utf-8")
 
 
-@pytest.mark.slow
+IN_SHORT = "--error 0.01"
+"""The robot of the guide has a setting below one per cent; one that is tried alone tells."""
+
+
 @pytest.mark.usefixtures("scenes_of_pages")
-@pytest.mark.parametrize("line", CERTIFYING)
-def test_lines_that_certify_find_a_setting_as_pages_say(line):
+@pytest.mark.parametrize(
+    "line, in_short",
+    [*((line, True) for line in CERTIFYING if IN_SHORT in line),
+     *(pytest.param(line, False, marks=pytest.mark.slow) for line in CERTIFYING)],
+)  # fmt: skip
+def test_lines_that_certify_find_a_setting_as_pages_say(line, in_short, monkeypatch):
     """Of two sequences per class."""
+    if in_short:
+        one_setting(monkeypatch, 19, 5e-4, Numerics("implicit-midpoint", 1e-3, 1e-7))
     assert command.main([*shlex.split(line), "--samples", "2"]) == 0
-    assert any(each.is_energy_stable for each in Certificate.load("certificate.json").settings)
-
-
-@pytest.mark.usefixtures("scenes_of_pages")
-def test_the_robot_of_the_guide_has_a_setting_below_one_per_cent(monkeypatch):
-    one_setting(monkeypatch, 19, 5e-4, Numerics("implicit-midpoint", 1e-3, 1e-7))
-    (line,) = [line for line in CERTIFYING if "--error 0.01" in line]
-    assert command.main([*shlex.split(line), "--samples", "2"]) == 0
+    assert in_short or any(each.is_energy_stable for each in Certificate.load("certificate.json").settings)
 
 
 PUBLIC_ELSEWHERE = (
