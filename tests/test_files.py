@@ -60,20 +60,11 @@ def test_a_link_is_replaced_and_what_it_points_to_stays(tmp_path, somebodys):
 @pytest.mark.parametrize("make", [os.mkfifo, os.mkdir], ids=["pipe", "folder"])
 def test_what_is_no_file_is_not_written_over(make, tmp_path):
     make(tmp_path / "results.json")
-    for link in (False, True):
-        target = tmp_path / "link.json" if link else tmp_path / "results.json"
-        if link:
-            target.symlink_to(tmp_path / "results.json")
+    (tmp_path / "link.json").symlink_to(tmp_path / "results.json")
+    for name in ("results.json", "link.json"):
         with pytest.raises(OSError, match=r"is no file that can be written over\.$"):
-            write_atomically(target, "mine")
+            write_atomically(tmp_path / name, "mine")
     assert names(tmp_path) == {"results.json", "link.json"}
-
-
-def test_a_file_is_as_readable_as_any_other(tmp_path):
-    write_atomically(tmp_path / "new" / "ours", "text")
-    (tmp_path / "theirs").write_text("text")
-    ours, theirs = (stat.S_IMODE(file.stat().st_mode) for file in (tmp_path / "new" / "ours", tmp_path / "theirs"))
-    assert ours == theirs
 
 
 def test_only_what_an_ended_process_was_writing_is_left_behind(tmp_path):
@@ -89,31 +80,35 @@ def test_only_what_an_ended_process_was_writing_is_left_behind(tmp_path):
     assert not is_left_behind(tmp_path / names[0])
 
 
-def test_two_at_once_do_not_meet(tmp_path):
+def test_two_at_once_do_not_meet_and_files_are_as_readable_as_any_other(tmp_path):
     """Not even two threads of one process; the later of them counts."""
-    with beside(tmp_path / "file") as first:
-        with beside(tmp_path / "file") as second:
+    file = tmp_path / "new" / "file"
+    with beside(file) as first:
+        with beside(file) as second:
             assert first != second
             second.write_text("second")
         first.write_text("first")
-    assert (tmp_path / "file").read_text() == "first" and names(tmp_path) == {"file"}
+    assert file.read_text() == "first" and names(file.parent) == {"file"}
+    (tmp_path / "theirs").write_text("text")
+    ours, theirs = (stat.S_IMODE(each.stat().st_mode) for each in (file, tmp_path / "theirs"))
+    assert ours == theirs
 
 
-@pytest.mark.parametrize("failure", [OSError(28, "No space left on device"), KeyboardInterrupt()], ids=repr)
-def test_whatever_goes_wrong_leaves_the_file_as_it_was(failure, tmp_path):
+FULL = OSError(28, "No space left on device")
+
+
+@pytest.mark.parametrize("failure", [FULL, KeyboardInterrupt()], ids=repr)
+def test_whatever_goes_wrong_leaves_the_file_as_it_was(failure, tmp_path, monkeypatch):
+    """While it is written, or when a full disk does not take what was."""
+
+    def full(descriptor):
+        raise FULL
+
     (tmp_path / "file").write_text("before")
     writing = beside(tmp_path / "file")
     writing.__enter__().write_text("half")
     with pytest.raises(type(failure)):
         writing.gen.throw(failure)
-    assert (tmp_path / "file").read_text() == "before" and names(tmp_path) == {"file"}
-
-
-def test_a_file_that_a_full_disk_does_not_take_is_as_it_was(tmp_path, monkeypatch):
-    def full(descriptor):
-        raise OSError(28, "No space left on device")
-
-    (tmp_path / "file").write_text("before")
     monkeypatch.setattr("os.fsync", full)
     for name in ("file", "new"):
         with pytest.raises(OSError, match="No space left"):
@@ -189,14 +184,11 @@ DAMAGED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("text", DAMAGED.values(), ids=DAMAGED)
-def test_damaged_json_is_refused_by_its_name(text, tmp_path):
-    (tmp_path / "data.json").write_bytes(text if isinstance(text, bytes) else text.encode())
-    with assert_refused("data.json is no JSON that can be read"):
-        read_json(tmp_path / "data.json")
-
-
-def test_json_that_is_no_file_is_missing(tmp_path):
+def test_json_is_read_or_refused_by_its_name(tmp_path):
+    for text in DAMAGED.values():
+        (tmp_path / "data.json").write_bytes(text if isinstance(text, bytes) else text.encode())
+        with assert_refused("data.json is no JSON that can be read"):
+            read_json(tmp_path / "data.json")
     os.mkfifo(tmp_path / "pipe")
     for name in ("pipe", "", "none"):
         with pytest.raises(FileNotFoundError, match="There is no file"):

@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 FENCED = re.compile(r"^```(\S*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\]\((?!\w+:)([^)#\s]*)(#[^)\s]+)?\)")
-CERTIFY = re.compile(r"seastar certify((?: [\w./-]+)+)")
+CERTIFY = re.compile(r"(?:-m seastar_gym\.certify|seastar certify)((?: [\w./-]+)+)")
 LONGEST = 3  # steps of an episode
 
 
@@ -38,6 +38,14 @@ def blocks(page: Path) -> list[str]:
 
 RUN = [page for page in PAGES if blocks(page)]
 NOTEBOOK = ROOT / "examples" / "first_hour.ipynb"
+
+
+def one_setting(monkeypatch, nodes, short, numerics):
+    """Let certificates be of one setting, against a short step [s], with swims of 40 strokes: seconds."""
+    monkeypatch.setattr(measure, "NODES", (nodes,))
+    monkeypatch.setattr(measure, "SHORT", Numerics("implicit-midpoint", short, 1e-8))
+    monkeypatch.setattr(measure, "NUMERICS", (numerics,))
+    monkeypatch.setattr(endurance, "LONG", 40)
 
 
 @pytest.fixture
@@ -57,11 +65,8 @@ def short_form(monkeypatch, tmp_path):
     monkeypatch.setattr(gym, "make", make_short)
     monkeypatch.setattr(PPO, "learn", learn_shortly)
     monkeypatch.setitem(many.swim_many.__kwdefaults__, "max_strokes", LONGEST)
-    monkeypatch.setattr(measure, "NODES", (12,))
+    one_setting(monkeypatch, 12, 1e-3, Numerics("implicit-midpoint", 5e-3, 1e-6))
     monkeypatch.setattr(measure, "MANY_NODES", 17)
-    monkeypatch.setattr(measure, "SHORT", Numerics("implicit-midpoint", 1e-3, 1e-8))
-    monkeypatch.setattr(measure, "NUMERICS", (Numerics("implicit-midpoint", 5e-3, 1e-6),))
-    monkeypatch.setattr(endurance, "LONG", 40)
     monkeypatch.setattr(paths, "PATHS", dict(paths.PATHS))
     monkeypatch.chdir(tmp_path)
 
@@ -101,11 +106,6 @@ def test_the_notebook_of_the_first_hour_runs():
     assert 8 <= len(cells) < 24
 
 
-def test_the_links_of_the_notebook_lead_to_files():
-    links = LINK.findall("".join("".join(cell["source"]) for cell in json.loads(NOTEBOOK.read_text("utf-8"))["cells"]))
-    assert len(links) > 4 and all((NOTEBOOK.parent / target).is_file() for target, _ in links)
-
-
 EXAMPLES = [file for file in sorted((ROOT / "seastar_gym").rglob("*.py")) if ">>> " in file.read_text("utf-8")]
 
 
@@ -116,20 +116,7 @@ def test_examples_in_docstrings_give_what_they_say(file):
     assert tried and not failed
 
 
-def test_scenes_paths_and_statistics_have_examples():
-    assert {"scene", "paths", "statistics"} <= {file.stem for file in EXAMPLES}
-
-
 CERTIFYING = sorted({match[1] for page in PAGES for match in CERTIFY.finditer(page.read_text(encoding="utf-8"))})
-
-
-@pytest.fixture
-def one_setting(monkeypatch):
-    """Certificates of 19 nodes and 1 ms alone, against steps of 0.5 ms, with swims of 40 strokes: seconds."""
-    monkeypatch.setattr(measure, "NODES", (19,))
-    monkeypatch.setattr(measure, "SHORT", Numerics("implicit-midpoint", 5e-4, 1e-8))
-    monkeypatch.setattr(measure, "NUMERICS", (Numerics("implicit-midpoint", 1e-3, 1e-7),))
-    monkeypatch.setattr(endurance, "LONG", 40)
 
 
 @pytest.fixture
@@ -141,23 +128,22 @@ def scenes_of_pages(tmp_path, monkeypatch):
     Path("fitted.json").write_text(json.dumps(fitted), encoding="utf-8")
 
 
-@pytest.mark.slow
+IN_SHORT = "--error 0.01"
+"""The robot of the guide has a setting below one per cent; one that is tried alone tells."""
+
+
 @pytest.mark.usefixtures("scenes_of_pages")
-@pytest.mark.parametrize("line", CERTIFYING)
-def test_lines_that_certify_find_a_setting_as_pages_say(line):
+@pytest.mark.parametrize(
+    "line, in_short",
+    [*((line, True) for line in CERTIFYING if IN_SHORT in line),
+     *(pytest.param(line, False, marks=pytest.mark.slow) for line in CERTIFYING)],
+)  # fmt: skip
+def test_lines_that_certify_find_a_setting_as_pages_say(line, in_short, monkeypatch):
     """Of two sequences per class."""
+    if in_short:
+        one_setting(monkeypatch, 19, 5e-4, Numerics("implicit-midpoint", 1e-3, 1e-7))
     assert command.main([*shlex.split(line), "--samples", "2"]) == 0
-    assert any(each.is_energy_stable for each in Certificate.load("certificate.json").settings)
-
-
-@pytest.mark.usefixtures("scenes_of_pages", "one_setting")
-def test_the_robot_of_the_guide_has_a_setting_below_one_per_cent():
-    (line,) = [line for line in CERTIFYING if "--error 0.01" in line]
-    assert command.main([*shlex.split(line), "--samples", "2"]) == 0
-
-
-def test_pages_have_lines_that_certify():
-    assert len(CERTIFYING) > 2 and any("--chosen" in line for line in CERTIFYING)
+    assert in_short or any(each.is_energy_stable for each in Certificate.load("certificate.json").settings)
 
 
 PUBLIC_ELSEWHERE = (
@@ -199,44 +185,34 @@ def test_no_block_hides_from_the_tests():
     assert sum(len(blocks(page)) for page in RUN) == kinds.count("python") > 20
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_links_lead_to_files(page):
-    text = FENCED.sub("", page.read_text(encoding="utf-8"))
-    missing = [target for target, _ in LINK.findall(text) if target and not (page.parent / target).exists()]
-    assert not missing
-
-
 def anchors(page: Path) -> set[str]:
     """Anchors of a page's headings, as GitHub and the site name them."""
     titles = re.findall(r"^#+ (.+)$", FENCED.sub("", page.read_text(encoding="utf-8")), re.MULTILINE)
     return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_links_lead_to_headings(page):
+@pytest.mark.parametrize("page", [*PAGES, NOTEBOOK], ids=lambda page: page.stem)
+def test_links_lead_to_files_and_their_headings(page):
     text = FENCED.sub("", page.read_text(encoding="utf-8"))
-    named = [(page.parent / target if target else page, anchor[1:]) for target, anchor in LINK.findall(text) if anchor]
-    assert [(target.name, anchor) for target, anchor in named if anchor not in anchors(target)] == []
+    links = [(page.parent / target if target else page, anchor[1:]) for target, anchor in LINK.findall(text)]
+    assert [target for target, _ in links if not target.exists()] == []
+    assert [(target.name, anchor) for target, anchor in links if anchor and anchor not in anchors(target)] == []
 
 
 SAID = re.compile(r"docs/(\w+\.md)")
 
 
-def test_pages_that_the_code_names_are_there():
-    """In docstrings, model cards and sentences of the programs."""
+def test_pages_and_files_that_code_and_pages_name_are_there():
+    """In docstrings, model cards, sentences of the programs, and on the page on extending."""
     files = [file for room in ("seastar_gym", "agents", "studies", ".ci") for file in (ROOT / room).rglob("*.*")]
     texts = {file: file.read_text("utf-8") for file in files if file.suffix in {".py", ".md", ".yml", ".html"}}
     named = {(file.name, page) for file, text in texts.items() for page in SAID.findall(text)}
     assert len(named) > 10
     assert [(file, page) for file, page in named if not (ROOT / "docs" / page).is_file()] == []
-
-
-def test_the_files_that_the_page_on_extending_names_are_there():
-    page = ROOT / "docs" / "extending.md"
-    named = re.findall(r"`((?:seastar_gym|tests|der|model)/[\w/]+\.py)`", page.read_text(encoding="utf-8"))
-    assert len(named) > 8
-    missing = [name for name in named if not any((base / name).is_file() for base in (ROOT, ROOT / "seastar_gym"))]
-    assert not missing
+    extending = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+    code = re.findall(r"`((?:seastar_gym|tests|der|model)/[\w/]+\.py)`", extending)
+    assert len(code) > 8
+    assert [name for name in code if not any((base / name).is_file() for base in (ROOT, ROOT / "seastar_gym"))] == []
 
 
 def test_every_page_is_named_once_in_the_contents():

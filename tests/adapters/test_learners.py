@@ -33,17 +33,18 @@ LEARNERS = {
 ARGUMENTS = {"fidelity": "fast", "max_episode_steps": 5}
 
 
-def batch(actions):
-    return BatchVecEnv(
-        gym.make_vec(
-            "SeastarSwim-v0", 4, vectorization_mode="vector_entry_point", actions=actions, autoreset_mode="SameStep",
-            **ARGUMENTS,
-        )
-    )  # fmt: skip
+def batch(actions, **arguments):
+    same_step = {"actions": actions, "autoreset_mode": "SameStep", **arguments}
+    return BatchVecEnv(gym.make_vec("SeastarSwim-v0", 4, vectorization_mode="vector_entry_point", **same_step))
 
 
-def single(actions):
-    return gym.make("SeastarSwim-v0", actions=actions, **ARGUMENTS)
+def single(actions, **arguments):
+    return gym.make("SeastarSwim-v0", actions=actions, **arguments)
+
+
+def learner_of(kind, env, policy="MlpPolicy", **arguments):
+    """A small learner of this kind."""
+    return kind(policy, env, policy_kwargs={"net_arch": [8]}, seed=0, device="cpu", **arguments)
 
 
 @pytest.mark.parametrize("make", [batch, single])
@@ -51,7 +52,7 @@ def single(actions):
 def test_a_learner_learns_for_an_iteration(name, make):
     kind, actions, arguments = LEARNERS[name]
     policy = "MlpLstmPolicy" if kind is RecurrentPPO else "MlpPolicy"
-    learner = kind(policy, make(actions), policy_kwargs={"net_arch": [8]}, seed=0, device="cpu", **arguments)
+    learner = learner_of(kind, make(actions, **ARGUMENTS), policy, **arguments)
     before = [weight.detach().clone() for weight in learner.policy.parameters()]
     learner.learn(16)
     assert learner.num_timesteps >= 16
@@ -61,12 +62,8 @@ def test_a_learner_learns_for_an_iteration(name, make):
 
 
 def test_hindsight_changes_goals_and_learns():
-    env = GoalForm(single("continuous"))
-    learner = SAC(
-        "MultiInputPolicy", env, replay_buffer_class=HerReplayBuffer, policy_kwargs={"net_arch": [8]}, seed=0,
-        device="cpu", learning_starts=8, buffer_size=100, batch_size=4,
-    )  # fmt: skip
-    learner.learn(16)
+    env, replay = GoalForm(single("continuous", **ARGUMENTS)), REPLAY | {"learning_starts": 8}
+    learner = learner_of(SAC, env, "MultiInputPolicy", replay_buffer_class=HerReplayBuffer, **replay).learn(16)
     drawn = learner.replay_buffer.sample(64)
     episode_goals = learner.replay_buffer.observations["desired_goal"][:16, 0]
     goals = drawn.observations["desired_goal"].numpy()
@@ -79,16 +76,8 @@ def test_hindsight_changes_goals_and_learns():
 def test_a_masked_learner_never_asks_for_what_wires_cannot_follow():
     """Refractory wires that are warm: a command to them would be refused, and counts in info."""
     scene = replace(Scene.preset("fast"), actuator=SmaWires(refractory=True))
-    env = BatchVecEnv(
-        gym.make_vec(
-            "SeastarSwim-v0", 4, vectorization_mode="vector_entry_point", actions="joint", autoreset_mode="SameStep",
-            scene=scene, decision_period=0.2, max_episode_steps=10,
-        )
-    )  # fmt: skip
-    learner = MaskablePPO(
-        "MlpPolicy", env, n_steps=8, batch_size=8, n_epochs=1, policy_kwargs={"net_arch": [8]}, seed=0, device="cpu"
-    )
-    learner.learn(32)
+    env = batch("joint", scene=scene, decision_period=0.2, max_episode_steps=10)
+    learner = learner_of(MaskablePPO, env, n_steps=8, batch_size=8, n_epochs=1).learn(32)
     seen, refused, closed = env.reset(), 0, 0
     for _ in range(8):
         masks = get_action_masks(env)
@@ -120,16 +109,13 @@ def single_file():
     return train
 
 
-def test_the_loop_in_one_file_learns_for_an_iteration(single_file):
+def test_the_loop_in_one_file_learns_for_an_iteration_a_policy_of_the_project(single_file, tmp_path):
     one, again, hardly = single_file(), single_file(), single_file(learning_rate=1e-12)
     assert all(np.array_equal(one.weights[name], again.weights[name]) for name in one.weights)
     assert max(np.abs(one.weights[name] - hardly.weights[name]).max() for name in one.weights) > 1e-4
-
-
-def test_its_policy_is_one_of_the_project(single_file, tmp_path):
-    save(single_file(), tmp_path / "policy.safetensors", strokes=64)
+    save(one, tmp_path / "policy.safetensors", strokes=64)
     policy = load(tmp_path / "policy.safetensors")
-    env = gym.make("SeastarSwim-v0", actions=policy.actions, scene=policy.scene).unwrapped
+    env = single(policy.actions, scene=policy.scene).unwrapped
     assert swim("learned", policy, env, max_strokes=2, seed=0).strokes == 2
 
 
@@ -160,8 +146,6 @@ def test_torchrl_learns_for_an_iteration():
 @pytest.mark.filterwarnings("ignore")
 def test_skrl_learns_for_an_iteration():
     pytest.importorskip("skrl")
-    import torch
-
     loop = example("skrl_ppo")
     shape = {"num_envs": 8, "rollout": 8, "mini_batches": 2, "epochs": 1, "max_episode_steps": 5}
     agents = [loop["train"](loop["Options"](strokes=strokes, **shape)) for strokes in (64, 128)]

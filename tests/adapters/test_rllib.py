@@ -20,6 +20,8 @@ def test_a_runner_s_batch_is_reduced_if_that_is_asked_for():
     reduced.action_space.seed(0)
     *results, info = reduced.step(reduced.action_space.sample())
     assert info == {} and all(len(result) == 4 for result in results)
+    with pytest.raises(ValueError, match="colour"):
+        native_batch({**CONTEXT, "colour": "red"})
 
 
 def test_runners_with_neighbouring_seeds_have_no_robot_in_common():
@@ -29,8 +31,3 @@ def test_runners_with_neighbouring_seeds_have_no_robot_in_common():
     assert len(np.unique(np.concatenate(observations), axis=0)) == 12
     again, _ = batches[0].reset(seed=8)
     np.testing.assert_array_equal(again, observations[0])
-
-
-def test_the_context_has_arguments_of_the_batch():
-    with pytest.raises(ValueError, match="colour"):
-        native_batch({**CONTEXT, "colour": "red"})

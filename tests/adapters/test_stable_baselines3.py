@@ -95,7 +95,7 @@ def test_arrays_are_fresh_every_step():
         assert not any(np.shares_memory(array, other) for other in seen[:number])
 
 
-def test_a_seed_counts_once_and_without_one_episodes_differ():
+def test_seeds_and_options_of_the_next_reset_count_once():
     batch = make_batch(path="random")
     batch.seed(5)
     first = batch.reset()
@@ -103,39 +103,35 @@ def test_a_seed_counts_once_and_without_one_episodes_differ():
     assert not np.array_equal(batch.reset(), first)
     batch.seed(5)
     np.testing.assert_array_equal(batch.reset(), first)
-
-
-def test_options_of_the_next_reset_reach_the_batch_once():
     batch = make_batch()
     batch.set_options({"path": "square"})
-    batch.reset()
-    np.testing.assert_allclose([info["distance"] for info in batch.reset_infos], 0.2, rtol=1e-12)
-    batch.reset()
-    np.testing.assert_allclose([info["distance"] for info in batch.reset_infos], 0.006, rtol=1e-12)
-
-
-def test_options_that_differ_between_robots_are_refused():
-    batch = make_batch()
+    for distance in (0.2, 0.006):
+        batch.reset()
+        np.testing.assert_allclose([info["distance"] for info in batch.reset_infos], distance, rtol=1e-12)
     batch.set_options([{}, *[{"path": "square"}] * (N - 1)])
-    with pytest.raises(ValueError, match="one dictionary for all"):
+    with assert_refused("one dictionary for all"):
         batch.reset()
 
 
-@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED])
-def test_another_autoreset_mode_is_refused(mode):
-    with pytest.raises(ValueError, match=r"needs autoreset_mode=AutoresetMode\.SAME_STEP"):
-        make_batch(autoreset_mode=mode)
-
-
-def test_observations_on_a_device_are_refused():
-    with pytest.raises(ValueError, match="needs observations on the processor: make the batch without on_device"):
-        make_batch(on_device=True)
+@pytest.mark.parametrize(
+    "call, words",
+    [
+        (lambda: make_batch(autoreset_mode=AutoresetMode.NEXT_STEP), "needs autoreset_mode=AutoresetMode.SAME_STEP"),
+        (lambda: make_batch(autoreset_mode=AutoresetMode.DISABLED), "needs autoreset_mode=AutoresetMode.SAME_STEP"),
+        (lambda: make_batch(on_device=True), "needs observations on the processor: make the batch without on_device"),
+        (lambda: make_vec_env("SeastarSwim-v0", 2, vec_env_cls=BatchVecEnv), "gym.make_vec"),
+        (lambda: make_batch().set_attr("max_episode_steps", 5, indices=0), "for all of them"),
+    ],
+)
+def test_what_is_no_batch_of_the_adapter_is_refused(call, words):
+    with assert_refused(words):
+        call()
 
 
 @pytest.mark.parametrize("symmetry", [False, True])
 def test_attributes_and_methods_are_those_of_the_batch(symmetry):
-    batch = make_batch(symmetry)
-    assert batch.render_mode is None
+    batch = make_batch(symmetry, path="random")
+    assert batch.render_mode is None and batch.get_images() == [None] * N
     assert batch.get_attr("actions") == ["pairs"] * N
     assert batch.get_attr("actions", indices=[0, 2]) == ["pairs"] * 2
     assert batch.has_attr("simulator") and not batch.has_attr("no_such_thing")
@@ -143,28 +139,27 @@ def test_attributes_and_methods_are_those_of_the_batch(symmetry):
         batch.get_attr("no_such_thing")
     batch.set_attr("max_episode_steps", 3)
     assert batch.env.unwrapped.max_episode_steps == 3
-    with pytest.raises(ValueError, match="for all of them"):
-        batch.set_attr("max_episode_steps", 5, indices=0)
     batch.reset()
+    own = batch.env.unwrapped.waypoints
+    for found, expected in zip(batch.get_attr("waypoints", indices=[2, 0]), (own[2], own[0]), strict=True):
+        np.testing.assert_array_equal(found, expected)
     assert len(batch.env_method("reset", seed=1)) == N
     facts = batch.env_method("reset", seed=1, indices=[1])
     assert len(facts) == 1 and facts[0][0].shape == (N, 186)
     assert batch.env_is_wrapped(VectorSymmetryReduction) == [symmetry] * N
     assert batch.env_is_wrapped(gym.vector.VectorObservationWrapper) == [False] * N
+    batch.close()
+    assert batch.env.unwrapped.closed
 
 
-def test_it_counts_as_monitored_so_that_evaluation_takes_its_statistics():
+def test_normalisation_goes_on_top_and_evaluation_takes_its_statistics():
     batch = make_batch(path="pentagon", waypoint_radius=0.01, actions="limbs")
     assert batch.env_is_wrapped(Monitor, indices=0) == [True]
     returns, lengths = evaluate_policy(scripted("straight"), batch, n_eval_episodes=N, return_episode_rewards=True)
     assert lengths == [LIMIT] * N
     assert np.ptp(returns) > 0.0  # random headings
-
-
-def test_normalisation_goes_on_top():
-    normalised = VecNormalize(make_batch(), training=False)
+    normalised, plain = VecNormalize(make_batch(), training=False), make_batch()
     normalised.obs_rms.mean[:] = 1.0
-    plain = make_batch()
     for env in (normalised, plain):
         env.seed(0)
         env.reset()
@@ -172,18 +167,10 @@ def test_normalisation_goes_on_top():
         observations, _, dones, infos = normalised.step(np.zeros(N, int))
         raw_observations, _, _, raw_infos = plain.step(np.zeros(N, int))
     assert dones.all()
-    np.testing.assert_allclose(observations, raw_observations - 1.0, rtol=1e-5, atol=1e-6)
-    for info, raw_info in zip(infos, raw_infos, strict=True):
-        last, raw_last = info["terminal_observation"], raw_info["terminal_observation"]
-        np.testing.assert_allclose(last, raw_last - 1.0, rtol=1e-5, atol=1e-6)
-
-
-def test_a_robots_own_attributes_are_its_own():
-    batch = make_batch(path="random")
-    batch.reset()
-    own = batch.env.unwrapped.waypoints
-    for found, expected in zip(batch.get_attr("waypoints", indices=[2, 0]), (own[2], own[0]), strict=True):
-        np.testing.assert_array_equal(found, expected)
+    ends = zip(infos, raw_infos, strict=True)
+    pairs = [(info["terminal_observation"], raw["terminal_observation"]) for info, raw in ends]
+    for found, raw in [(observations, raw_observations), *pairs]:
+        np.testing.assert_allclose(found, raw - 1.0, rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.parametrize("symmetry", [False, True])
@@ -198,31 +185,14 @@ def test_a_picture_of_the_batch_has_its_first_robots_side_by_side(symmetry):
     np.testing.assert_array_equal(picture[:288, :384], tiles[0])
 
 
-def test_a_batch_that_draws_nothing_has_no_pictures():
-    assert make_batch().get_images() == [None] * N
-
-
 def test_stable_baselines_records_a_video(tmp_path):
     pytest.importorskip("pygame")
     pytest.importorskip("moviepy")
-    recorder = VecVideoRecorder(
-        make_batch(render_mode="rgb_array", num_envs=2), str(tmp_path), lambda step: step == 0, video_length=3
-    )
+    batch = make_batch(render_mode="rgb_array", num_envs=2)
+    recorder = VecVideoRecorder(batch, str(tmp_path), lambda step: step == 0, video_length=3)
     recorder.reset()
     for _ in range(4):
         recorder.step(np.ones(2, int))
     recorder.close()
     (video,) = tmp_path.glob("*.mp4")
     assert video.stat().st_size > 1000 and recorder.frames_per_sec == 10
-
-
-def test_make_vec_env_is_told_what_to_do_instead():
-    with assert_refused("BatchVecEnv wraps one batch", "gym.make_vec"):
-        make_vec_env("SeastarSwim-v0", 2, vec_env_cls=BatchVecEnv)
-
-
-def test_closing_closes_the_batch():
-    batch = make_batch()
-    batch.reset()
-    batch.close()
-    assert batch.env.closed

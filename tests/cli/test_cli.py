@@ -10,25 +10,39 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from refusals import assert_refused
 from seastar_gym import Scene, Seastar, Sight
 from seastar_gym.cli import compile, played, screen
 from seastar_gym.cli.keys import Steering, known_keys, typed
 from seastar_gym.cli.main import COMMANDS, main
 from seastar_gym.controllers import learned
+from seastar_gym.controllers.description import Description
+from seastar_gym.controllers.registry import AGENTS
+from seastar_gym.controllers.scripted import GAITS
+from seastar_gym.envs.paths import PATHS
 from seastar_gym.gaits import lagged_gait
 from seastar_gym.scene.serial import to_dict
 
 ROOT = Path(__file__).resolve().parents[2]
-PREY = learned.of_task("prey", None)
-SHORT = "0.03, 0.0\n"
+FAST = ["--path", "path.csv", "--fidelity", "fast"]
+WEAK = "from seastar_gym import Scene\nscene = Scene(limb_strengths=(0.5, 0.5, 0.5, 0.5, 0.5))\n"
+THREE_LIMBS = "from seastar_gym import Scene, Seastar\nscene = Scene(robot=Seastar(n_limbs=3))\n"
 
 
-@pytest.fixture
-def path(tmp_path):
-    file = tmp_path / "path.csv"
-    file.write_text(SHORT)
-    return str(file)
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Where commands run: a path, scenes, and files that are no good."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "controllers")
+    for name, content in {
+        "path.csv": "0.03, 0.0\n", "ragged.csv": "0.1, 0.0\n0.2\n", "three.py": THREE_LIMBS, "bound.json": "{}",
+        "three.json": json.dumps(Scene(robot=Seastar(n_limbs=3)).to_dict()), "damaged.zip": "PK\x03\x04 and nothing",
+        "wrong.py": "import math\nscene = nothing\n", "damaged.safetensors": "nothing", "damaged.json": "{}",
+    }.items():  # fmt: skip
+        Path(name).write_text(content)
+    about = Description("pairs", True, Scene(robot=Seastar(n_limbs=4)), (2,))
+    weights = {name: np.zeros(shape, np.float32) for name, shape in about.shapes().items()}
+    learned.save(learned.LearnedPolicy(about, weights), "four.safetensors")
+    return tmp_path
 
 
 def frames(file):
@@ -41,11 +55,17 @@ def frames(file):
         return np.stack(found)
 
 
-def test_help_tells_every_command_and_loads_none(capsys):
+@pytest.mark.parametrize("command", ["", *sorted(set(COMMANDS) - {"train"})])
+def test_every_command_has_help_that_tells_what_there_is(command, capsys):
     with pytest.raises(SystemExit) as ended:
-        main(["--help"])
-    text = capsys.readouterr().out
-    assert ended.value.code == 0 and all(name in text for name in COMMANDS)
+        main([*command.split(), "--help"])
+    text = " ".join(capsys.readouterr().out.replace("│", " ").split()).replace("- ", "-")  # names are parted at hyphens
+    assert ended.value.code == 0 and text.startswith(f"usage: seastar {command or '[-h]'} ")
+    names = {"": COMMANDS, "evaluate": (*AGENTS, *GAITS, *PATHS, "module:function", "load only files that you trust")}
+    assert [name for name in names.get(command, ()) if name not in text] == []
+
+
+def test_help_loads_no_command():
     code = (
         "import sys; from seastar_gym.cli.main import main\n"
         "try: main(['--help'])\n"
@@ -53,14 +73,6 @@ def test_help_tells_every_command_and_loads_none(capsys):
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert set(done.stderr.split()).isdisjoint({"torch", "pygame", "imageio", "matplotlib", "safetensors", "rich"})
-
-
-@pytest.mark.parametrize("command", sorted(set(COMMANDS) - {"train"}))
-def test_every_command_has_help_under_its_name(command, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main([command, "--help"])
-    assert ended.value.code == 0
-    assert capsys.readouterr().out.startswith(f"usage: seastar {command} ")
 
 
 def test_what_is_compiled_before_is_found_by_another_process(tmp_path, monkeypatch):
@@ -88,48 +100,44 @@ def test_code_that_cannot_be_kept_is_not_said_to_be(monkeypatch, capsys):
     assert "set NUMBA_CACHE_DIR" in capsys.readouterr().err
 
 
-def test_a_swim_is_filmed_without_a_display(path, tmp_path, no_display, capsys):
-    film = tmp_path / "films" / "swim.gif"
-    assert main(["swim", "--agent", "straight", "--path", path, "--fidelity", "fast", "--film", str(film)]) == 0
+def test_a_swim_is_filmed_without_a_display(no_display, capsys):
+    assert main(["swim", "--agent", "straight", *FAST, "--film", "films/swim.gif"]) == 0
     said = capsys.readouterr().out
-    assert "straight: 1 of 1 waypoints in" in said and str(film) in said
-    pictures = frames(film)
+    assert "straight: 1 of 1 waypoints in" in said and "films/swim.gif" in said
+    pictures = frames("films/swim.gif")
     seconds = float(said.split(" in ")[1].split(" s")[0])
     assert len(pictures) == 1 + seconds * screen.GIF_FPS / 4  # four times as fast; equal ones become one, longer
     assert np.abs(pictures[-1] - pictures[0]).max() > 100
 
 
-def test_the_learned_policy_swims_in_a_registered_task(tmp_path, capsys):
-    film = tmp_path / "swim.mp4"
-    task = ["--task", "SeastarSwimTimedModerate-v0", "--fidelity", "fast", "--seconds", "1", "--speed", "8"]
-    assert main(["swim", *task, "--film", str(film)]) == 0
-    assert "0 of 5 waypoints in 1.0 s" in capsys.readouterr().out
-    assert film.stat().st_size > 1000
+TIMED = "SeastarSwimTimedModerate-v0"
+CAMERA = ["--sight", "sight.json", "--action-delay", "1"]
 
 
 @pytest.mark.parametrize(
-    "more, seconds",
-    [([], "0.4 s"), (["--agent", "straight"], "1.0 s"), (["--decision-period", "1"], "1.0 s"),
-     (["--task", "SeastarSwim-v0"], "1.0 s")],
-)  # fmt: skip
-def test_without_options_the_policy_of_the_picture_on_top_swims(more, seconds, tmp_path, capsys):
-    """It decides every 0.2 s; whoever asks for an agent, a task or a time between decisions gets that."""
-    film = tmp_path / "swim.gif"
-    arguments = ["--fidelity", "fast", "--speed", "8", "--seconds", "0.4", "--film", str(film)]
-    assert main(["swim", *arguments, *more]) == 0
-    assert f"0 of 5 waypoints in {seconds}." in capsys.readouterr().out
+    "options, said",
+    [
+        ([], "learned: 0 of 5 waypoints in 0.4 s."),
+        (["--agent", "straight"], "straight: 0 of 5 waypoints in 1.0 s."),
+        (["--decision-period", "1"], "learned: 0 of 5 waypoints in 1.0 s."),
+        (["--task", "SeastarSwim-v0"], "learned: 0 of 5 waypoints in 1.0 s."),
+        (["--task", TIMED, "--seconds", "1", "--film", "swim.mp4"], "0 of 5 waypoints in 1.0 s"),
+        (["--agent", "straight", *FAST, "--seconds", "99", *CAMERA], "straight: 1 of 1 waypoints in"),
+        (["--agent", "straight", *FAST, "--seconds", "2", "--scene", "weak.py"], "0 of 1 waypoints in 2.0 s"),
+    ],
+)
+def test_a_swim_is_what_options_ask_for(options, said, folder, no_display, capsys):
+    """Without any, the policy of the picture on top swims, which decides every 0.2 s; cameras and robots are files."""
+    Path("sight.json").write_text(json.dumps(to_dict(Sight(delay=0.1, sees=1))))
+    Path("weak.py").write_text(WEAK)
+    plain = ["--fidelity", "fast", "--speed", "8", "--seconds", "0.4", "--film", "swim.gif"]
+    assert main(["swim", *plain, *options]) == 0
+    assert said in capsys.readouterr().out
+    assert [file.stat().st_size > 1000 for file in folder.glob("swim.*")] == [True]
 
 
-def test_a_swim_is_seen_through_a_camera_in_a_file(path, tmp_path, no_display, capsys):
-    sight = tmp_path / "sight.json"
-    sight.write_text(json.dumps(to_dict(Sight(delay=0.1, sees=1))))
-    arguments = ["--agent", "straight", "--path", path, "--fidelity", "fast", "--film", str(tmp_path / "swim.gif")]
-    assert main(["swim", *arguments, "--sight", str(sight), "--action-delay", "1"]) == 0
-    assert "straight: 1 of 1 waypoints in" in capsys.readouterr().out
-
-
-def test_a_window_shows_a_swim_until_it_is_closed(path, dummy_window, monkeypatch, capsys):
-    arguments = ["swim", "--agent", "straight", "--path", path, "--fidelity", "fast", "--speed", "100"]
+def test_a_window_shows_a_swim_until_it_is_closed(dummy_window, monkeypatch, capsys):
+    arguments = ["swim", "--agent", "straight", *FAST, "--speed", "100"]
     assert main(arguments) == 0
     assert "1 of 1" in capsys.readouterr().out
     monkeypatch.setattr(screen.Window, "show", lambda self, *arguments: self.close())
@@ -139,52 +147,95 @@ def test_a_window_shows_a_swim_until_it_is_closed(path, dummy_window, monkeypatc
     assert "0 of 1 waypoints in 2.0 s" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    "arguments, words",
-    [
-        (["swim"], "No window can be opened here: write a film, --film swim.mp4 or swim.gif."),
-        (["play"], "No window can be opened here"),
-        (["play", "--film", "x.gif"], "A film needs the keys"),
-        (["play", "--keys", "9"], "There is no key '9'"),
-        (["play", "--speed", "0"], "--speed must be"),
-        (["swim", "--film", "swim.avi"], "A film is an .mp4 or a .gif, not swim.avi."),
-        (["swim", "--agent", "nobody"], "Unknown scripted agent 'nobody'"),
-        (["swim", "--task", "Nothing-v0"], "There is no task 'Nothing-v0': choose of SeastarSwim-v0, "),
-        (["swim", "--path", "nowhere"], "Unknown path 'nowhere'"),
-        (["swim", "--agent", str(PREY), "--film", "x.gif"], "was trained for the task prey, the environment's is"),
-        (["swim", "--speed", "-1"], "--speed must be"),
-        (["swim", "--scene", "none.json"], "none.json is no file."),
-        (["swim", "--sight", "7"], "Sight.sees must be"),
-        (["swim", "--sight", "none.json"], "There is no file none.json."),
-        (["swim", "--sight", "pose", "--film", "x.gif"], "196"),
-        (["evaluate", "--scene", "none.py"], "none.py is no file."),
-        (["evaluate", "--seconds", "0"], "--seconds must be"),
-    ],
-)
-def test_what_cannot_be_done_is_said_in_a_sentence(arguments, words, no_display, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main(arguments) == 2
+NAMES = "planner, gait-planner, files of policies, and module:function"
+REFUSED = [
+    ("swim", "No window can be opened here: write a film, --film swim.mp4 or swim.gif."),
+    ("swim --film swim.avi", "A film is an .mp4 or a .gif, not swim.avi."),
+    ("swim --agent nobody", "Unknown scripted agent 'nobody'"),
+    ("swim --task Nothing-v0", "There is no task 'Nothing-v0': choose of SeastarSwim-v0, "),
+    ("swim --path nowhere", "Unknown path 'nowhere'"),
+    ("swim --agent prey --film x.gif", "was trained for the task prey, the environment's is"),
+    ("swim --speed -1", "--speed must be"),
+    ("swim --scene none.json", "none.json is no file."),
+    ("swim --sight 7", "Sight.sees must be"),
+    ("swim --sight none.json", "There is no file none.json."),
+    ("swim --sight pose --film x.gif", "196"),
+    ("play", "No window can be opened here"),
+    ("play --film x.gif", "A film needs the keys"),
+    ("play --keys 9", "There is no key '9'"),
+    ("play --keys 6", "There is no key '6'"),
+    ("play --keys a*b", "how often, 'a*b'"),
+    ("play --speed 0", "--speed must be"),
+    ("evaluate --scene none.py", "none.py is no file."),
+    ("evaluate --seconds 0", "--seconds must be"),
+    ("evaluate --agents none.zip", "There is no trained policy at"),
+    ("evaluate --agents none.safetensors", "There is no trained policy at"),
+    ("evaluate --agents damaged.safetensors", "is damaged"),
+    ("evaluate --agents four.safetensors", "trained on a robot of 4 limbs, "),
+    ("evaluate --agents damaged.zip", "damaged"),
+    ("evaluate --agents pentagram", f"Unknown scripted agent 'pentagram'|{NAMES}"),
+    ("evaluate --agents rest rest", "'rest' is named twice"),
+    ("evaluate --agents no_such_module:make", "No module named 'no_such_module'"),
+    ("evaluate --agents own_agents:missing", "the module own_agents has no function missing"),
+    ("evaluate --agents own_agents:number", "the module own_agents has no function number"),
+    ("evaluate --agents own_agents:nothing", "is a int, which has no predict"),
+    ("evaluate --path hexagon", "Unknown path 'hexagon'"),
+    ("evaluate --path ragged.csv", "ragged.csv, line 2: every line must have x and y"),
+    ("evaluate --max-strokes 0", "--max-strokes must be a whole number from 1"),
+    ("evaluate --waypoint-radius -1", "--waypoint-radius must be"),
+    ("evaluate --decision-period 0", "--decision-period"),
+    ("evaluate --fidelity fast balanced", "Several fidelities are for --sets"),
+    ("evaluate --sets nominal --video --out out", "needs a folder, --out, and a path, no --sets"),
+    ("evaluate --trajectory", "needs a folder, --out, and a path, no --sets"),
+    ("evaluate --sets nominal --swims 0", "--swims must be"),
+    ("evaluate --report --out out --bound bound.json", "bound.json is no result of studies.learning.bound"),
+    ("evaluate --report --out out --runs .", "progress.csv"),
+    ("evaluate --fidelity none", "usage: seastar evaluate"),
+    ("evaluate --sets", "usage: seastar evaluate"),
+    ("evaluate --max-strokes 2 --seconds 3", "usage: seastar evaluate"),
+    ("fly", "usage: seastar"),
+    ("export greedy --to c", "greedy is no learned policy: name a file, .safetensors or the model.zip"),
+    ("export none.safetensors --to c", "There is no trained policy at none.safetensors"),
+    ("export none.zip --to c", "There is no trained policy at none.zip"),
+    ("export learned --to onnx --points 3", "--points is for c"),
+    ("drive straight --plant usb", "A plant is sim, or serial:/dev/"),
+    ("drive straight --plant serial:", "A plant is sim, or serial:/dev/"),
+    ("drive learned --dry", "policy sees 196"),
+    ("drive straight --sight nodes", "A tracker sees no nodes"),
+    ("drive straight --seconds 0", "--seconds must"),
+    ("drive nobody", "Unknown scripted agent"),
+    ("drive straight --scene none.py", "none.py is no file."),
+    *((f"{command} wrong.py", "wrong.py, line 2: NameError: name 'nothing' is not defined.") for command in (
+        "swim --scene", "evaluate --scene", "certify", "sweep --scene", "identify --synthetic --scene",
+    )),
+]  # fmt: skip
+"""Commands, and words of what is said."""
+
+
+@pytest.mark.parametrize("command, words", REFUSED, ids=[command for command, _ in REFUSED])
+def test_what_cannot_be_done_is_said_in_a_sentence_and_nothing_is_written(command, words, no_display, folder, capsys):
+    before = set(folder.iterdir())
+    try:
+        code = main(command.split())
+    except SystemExit as ended:
+        code = ended.code
     printed = capsys.readouterr()
-    assert words in printed.err and printed.err.count("\n") == 1 and not printed.out
-    assert not list(tmp_path.iterdir())
-
-
-def test_an_unknown_command_is_refused(capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(["fly"])
-    assert ended.value.code == 2 and "invalid choice: 'fly'" in capsys.readouterr().err
+    assert code == 2 and not printed.out and set(folder.iterdir()) == before
+    if words.startswith("usage"):
+        assert printed.err.startswith(words) and "error: " in printed.err
+        return
+    assert printed.err.count("\n") == 1 and printed.err.endswith(".\n"), printed.err
+    assert all(word in printed.err for word in words.split("|")), printed.err
 
 
 # Playing
 
 
-def test_keys_swim_into_a_film(path, tmp_path, no_display, capsys):
+def test_keys_swim_into_a_film(no_display, capsys):
     """Straight on for four seconds: the robot arrives, and the film goes on to show it."""
-    film = tmp_path / "play.gif"
-    arguments = ["--path", path, "--keys", "a*20 .", "--film", str(film), "--speed", "2"]
-    assert main(["play", *arguments]) == 0
+    assert main(["play", "--path", "path.csv", "--keys", "a*20 .", "--film", "play.gif", "--speed", "2"]) == 0
     assert "1 of 1 waypoints in" in capsys.readouterr().out
-    pictures = frames(film)
+    pictures = frames("play.gif")
     assert np.abs(pictures[10] - pictures[0]).max() > 100
     help_text = pictures[:, 22:76, 8:200]  # the keys are told all the time
     assert np.ptp(help_text[0]) > 100 and np.abs(help_text[-1] - help_text[0]).max() < 60
@@ -221,7 +272,7 @@ def test_something_shows_before_the_simulator_is_loaded():
     assert result.stdout.split() == ["False", "True"], result.stderr
 
 
-def test_the_keyboard_plays_in_a_window(path, dummy_window, monkeypatch, capsys):
+def test_the_keyboard_plays_in_a_window(dummy_window, monkeypatch, capsys):
     import pygame
 
     keys = Pressed("a", "", "", "f1", "z", "escape")
@@ -230,7 +281,7 @@ def test_the_keyboard_plays_in_a_window(path, dummy_window, monkeypatch, capsys)
     seen = []
     step = played.PlayedEnv.step
     monkeypatch.setattr(played.PlayedEnv, "step", lambda env, action: seen.append(action.tolist()) or step(env, action))
-    assert main(["play", "--path", path, "--speed", "100", "--decision-period", "0.2"]) == 0
+    assert main(["play", "--path", "path.csv", "--speed", "100", "--decision-period", "0.2"]) == 0
     assert seen[0] == [0, 1, 0, 0, 2] and not keys.held
     assert "You reached 0 of 1 waypoints" in capsys.readouterr().out
 
@@ -238,84 +289,65 @@ def test_the_keyboard_plays_in_a_window(path, dummy_window, monkeypatch, capsys)
 # Evaluation and training
 
 
-def test_agents_are_compared_without_rich(path, tmp_path, capsys):
-    out = tmp_path / "out"
-    arguments = ["--agents", "straight", "2-,5+", "--path", path, "--fidelity", "fast", "--seconds", "5"]
-    assert main(["evaluate", *arguments, "--out", str(out)]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert max(map(len, lines[:-1])) <= 80 and "of 1" in lines[3]
-    assert [line.split()[0] for line in lines[3:5]] == ["straight", "2-,5+"]
-    assert {file.name for file in out.iterdir()} == {"evaluation.csv", "traces.png"}
-
-
-def test_a_robot_of_a_file_swims(path, tmp_path, capsys):
-    """Half as strong as the chapter's, so it is slower; agents that plan know it."""
-    scene = tmp_path / "weak.py"
-    scene.write_text("from seastar_gym import Scene\nscene = Scene(limb_strengths=(0.5, 0.5, 0.5, 0.5, 0.5))\n")
-    arguments = ["--agents", "straight", "greedy", "--path", path, "--fidelity", "fast"]
-    seconds = []
-    for own in ([], ["--scene", str(scene)]):
-        assert main(["evaluate", *arguments, *own]) == 0
-        rows = [line.split() for line in capsys.readouterr().out.splitlines()[3:5]]
-        assert [row[0] for row in rows] == ["straight", "greedy"]
-        seconds.append([float(row[2]) for row in rows])
-    assert (np.array(seconds[0]) < seconds[1]).all()
-    film = ["swim", "--agent", "straight", "--path", path, "--fidelity", "fast", "--speed", "8", "--seconds", "2"]
-    assert main([*film, "--scene", str(scene), "--film", str(tmp_path / "x.gif")]) == 0
-    assert "0 of 1 waypoints in 2.0 s" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("command", ["swim", "evaluate", "certify", "sweep", "identify"])
-def test_what_goes_wrong_in_a_scene_file_is_said_with_its_line(command, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    Path("wrong.py").write_text("import math\nscene = nothing\n")
-    scene = ["wrong.py"] if command == "certify" else ["--scene", "wrong.py"]
-    assert main([command, *scene, *(["--synthetic"] if command == "identify" else [])]) == 2
-    last = capsys.readouterr().err.splitlines()[-1]
-    assert last == "wrong.py, line 2: NameError: name 'nothing' is not defined."
-
-
-THREE_LIMBS = "from seastar_gym import Scene, Seastar\nscene = Scene(robot=Seastar(n_limbs=3))\n"
-
-
-@pytest.mark.parametrize("ending", [".py", ".json"])
-def test_a_robot_of_three_limbs_is_compared_by_agents_that_it_can_have(ending, path, tmp_path, capsys):
-    scene = tmp_path / f"three{ending}"
-    as_json = json.dumps(Scene(robot=Seastar(n_limbs=3)).to_dict())
-    scene.write_text(THREE_LIMBS if ending == ".py" else as_json)
-    arguments = ["--scene", str(scene), "--path", path, "--fidelity", "fast", "--seconds", "2"]
-    assert main(["evaluate", *arguments]) == 0
-    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()[3:]] == ["greedy", "straight"]
-
-
-def test_agents_that_do_not_fit_are_left_out_with_a_sentence_each(path, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    Path("three.py").write_text(THREE_LIMBS)
-    arguments = ["--path", path, "--fidelity", "fast", "--scene", "three.py", "--seconds", "2"]
-    assert main(["evaluate", "--agents", "learned", "straight", "pentagon", "nobody", "none.zip", *arguments]) == 0
+def compared(capsys, *options):
+    """Table of agents without its titles, as words, and what is said of those that are left out."""
+    assert main(["evaluate", *FAST, *options]) == 0
     said = capsys.readouterr()
-    assert "straight" in said.out and "learned" not in said.out
-    sentences = said.err.splitlines()
-    left_out = [sentence.partition(" is left out: ")[0] for sentence in sentences]
-    assert left_out == ["learned", "pentagon", "nobody", "none"]
-    assert all(sentence.endswith(".") for sentence in sentences)
-    assert main(["evaluate", "--agents", "learned", *arguments]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
+    lines = said.out.splitlines()
+    assert max(map(len, lines[:-1])) <= 80 and "of 1" in lines[3]
+    return [line.split() for line in lines[3:] if not line.startswith("Written")], said.err.splitlines()
 
 
-def test_training_without_the_repository_says_what_it_needs(tmp_path, monkeypatch, capsys):
+def test_agents_are_compared_in_a_table_and_files(folder, capsys):
+    """Those that fit: the others are left out with a sentence each. One of robots half as strong is slower."""
+    rows, _ = compared(capsys, "--agents", "straight", "2-,5+", "--seconds", "5", "--out", "out")
+    assert [row[0] for row in rows] == ["straight", "2-,5+"]
+    assert {file.name for file in (folder / "out").iterdir()} == {"evaluation.csv", "traces.png"}
+    for ending in (".py", ".json"):
+        rows, _ = compared(capsys, "--scene", f"three{ending}", "--seconds", "2")
+        assert [row[0] for row in rows] == ["greedy", "straight"]
+    names = ["learned", "straight", "pentagon", "nobody", "none.zip"]
+    rows, left_out = compared(capsys, "--agents", *names, "--scene", "three.py", "--seconds", "2")
+    assert [row[0] for row in rows] == ["straight"] and all(sentence.endswith(".") for sentence in left_out)
+    out = [sentence.partition(" is left out: ")[0] for sentence in left_out]
+    assert out == ["learned", "pentagon", "nobody", "none"]
+    Path("weak.py").write_text(WEAK)
+    whole, weak = (compared(capsys, "--agents", "straight", "greedy", *own)[0] for own in ([], ["--scene", "weak.py"]))
+    assert all(float(one[2]) < float(other[2]) for one, other in zip(whole, weak, strict=True))
+
+
+def test_a_report_has_the_curves_of_runs_and_how_it_was_made(folder, capsys):
+    (folder / "run").mkdir()
+    Path("run", "progress.csv").write_text("1000,200,5\n2000,190,5\n")
+    arguments = ["--agents", "learned", "straight", "--waypoint-radius", "0.5", "--report", "--runs", "run"]
+    arguments += ["--bound", "none.json"]  # the learned policy's speeds stand there too
+    assert main(["evaluate", *arguments, "--fidelity", "fast", "--out", "out"]) == 0
+    assert "report.html" in capsys.readouterr().out
+    page = (folder / "out" / "report.html").read_text(encoding="utf-8")
+    assert '"name":"run"' in page and '"name":"learned"' not in page and "agent straight: 1" in page
+    assert "python train.py" in page and "seastar evaluate --agents learned straight" in page
+
+
+def test_policies_are_exported(folder, monkeypatch, capsys):
+    assert main(["export", "learned", "--to", "c", "--points", "3"]) == 0
+    assert capsys.readouterr().out.startswith("learned.c: ")
+    assert "#define SEASTAR_POINTS 11\n" in Path("learned.c").read_text()
+    assert main(["export", "timed-0.2s", "--to", "c"]) == 0
+    assert "Policy timed-0.2s" in Path("timed-0.2s.c").read_text(encoding="utf-8")
+    capsys.readouterr()
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    assert main(["export", "learned", "--to", "onnx", "--out", "mine.onnx"]) == 2
+    assert capsys.readouterr().err == 'ONNX files need onnx: pip install "seastar-gym[export]".\n'
+
+
+def test_training_runs_the_checkout_s_own_script_and_says_where_there_is_none(folder, monkeypatch, capsys):
     from seastar_gym.cli import train
 
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(train, "__file__", str(tmp_path / "lib" / "seastar_gym" / "cli" / "train.py"))
+    monkeypatch.setattr(train, "__file__", str(folder / "lib" / "seastar_gym" / "cli" / "train.py"))
     assert main(["train"]) == 2
     assert "Training needs a checkout" in capsys.readouterr().err
-
-
-def test_training_runs_the_checkout_s_own_script(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "agents").mkdir()
-    (tmp_path / "train.py").write_text("import sys\nprint(sys.argv[1:])\nsys.exit(3)\n")
+    (folder / "agents").mkdir()
+    Path("train.py").write_text("import sys\nprint(sys.argv[1:])\nsys.exit(3)\n")
     monkeypatch.setattr(sys, "path", list(sys.path))
     monkeypatch.setattr(sys, "argv", list(sys.argv))
     assert main(["train", "--quick"]) == 3
@@ -336,53 +368,35 @@ STAR = 2.0 * np.pi / 5 * np.arange(5)
 """Headings of the limbs at rest [rad]."""
 
 
-def command(keys, period=1.0, headings=STAR):
-    return Steering(period, 5).command(keys, headings).tolist()
-
-
 @pytest.mark.parametrize(
-    "keys, expected",
+    "keys, expected, limbs_on",
     [
-        ("", [0, 0, 0, 0, 0]),
-        ("1", [1, 0, 0, 0, 0]),
-        ("r", [0, 0, 0, -1, 0]),
-        ("1r", [1, 0, 0, -1, 0]),
-        ("1q", [0, 0, 0, 0, 0]),  # both wires of a limb cancel
-        ("a", [0, 1, 0, 0, -1]),  # the straight gait along limb 1
-        ("d", [0, -1, 0, 1, 0]),
-        ("ad", [0, 0, 0, 1, -1]),
-        ("6", [0, 0, 0, 0, 0]),  # no such limb
+        ("", [0, 0, 0, 0, 0], 0),
+        ("1", [1, 0, 0, 0, 0], 0),
+        ("r", [0, 0, 0, -1, 0], 0),
+        ("1 r", [1, 0, 0, -1, 0], 0),
+        ("1 q", [0, 0, 0, 0, 0], 0),  # both wires of a limb cancel
+        ("a", [0, 1, 0, 0, -1], 0),  # the straight gait along limb 1
+        ("d", [0, -1, 0, 1, 0], 0),
+        ("a d", [0, 0, 0, 1, -1], 0),
+        ("6", [0, 0, 0, 0, 0], 0),  # no such limb
+        ("right", [0, 1, 0, 0, -1], 0),  # as "a"
+        ("up", [-1, 0, 1, 0, 0], 0),  # as "s"
+        ("down", [1, 0, 0, -1, 0], 0),  # as "g"
+        ("right", [1, 0, 0, -1, 0], 1),  # the limb before it is there now
     ],
 )
-def test_a_key_means_a_command(keys, expected):
-    assert command(set(keys)) == expected
+def test_a_key_means_a_command(keys, expected, limbs_on):
+    command = Steering(1.0, 5).command(set(keys.split()), STAR + limbs_on * 2.0 * np.pi / 5)
+    assert command.tolist() == expected
 
 
-@pytest.mark.parametrize("arrow, key", [("right", "a"), ("up", "s"), ("down", "g")])
-def test_an_arrow_takes_the_limb_that_points_its_way(arrow, key):
-    assert command({arrow}) == command({key})
-    turned = command({arrow}, headings=STAR + 2.0 * np.pi / 5)  # the limb before it is there now
-    assert turned == np.roll(command({arrow}), -1).tolist()
-
-
-def test_a_key_that_is_held_swims_the_lagged_gait_from_its_beginning():
+def test_a_key_that_is_held_swims_the_lagged_gait_from_its_beginning_and_words_are_keys():
     steering, gait = Steering(0.2, 5), lagged_gait(0.2)
     held = [steering.command({"s"}, STAR).tolist() for _ in range(7)]
     assert held == [np.roll(gait[k % 5], 1).tolist() for k in range(7)]
     assert steering.command(set(), STAR).tolist() == [0] * 5
     assert steering.command({"s"}, STAR).tolist() == held[0]
-
-
-def test_words_are_the_keys_of_decisions():
     assert list(typed("a*2 1w . up", 5)) == [{"a"}, {"a"}, {"1", "w"}, set(), {"up"}]
-
-
-@pytest.mark.parametrize("text, words", [("a 9", "There is no key '9'"), ("6", "'6'"), ("a*b", "how often, 'a*b'")])
-def test_words_that_mean_nothing_are_refused(text, words):
-    with assert_refused(words):
-        list(typed(text, 5))
-
-
-def test_every_limb_of_eight_has_keys_and_no_key_two_meanings():
     assert len(known_keys(8)) == 3 * 8 + 4
     assert {"z", "f1", "escape"}.isdisjoint(known_keys(8))

@@ -4,7 +4,6 @@ import ctypes
 import re
 import shutil
 import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,13 +11,11 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from refusals import assert_refused, assert_told
+from refusals import assert_refused
 from seastar_gym import Body, Limb, Numerics, Scene, Seastar, Simulator, SmaWires
 from seastar_gym.cli.export import load_policy
-from seastar_gym.cli.main import main
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.export import tables
 from seastar_gym.controllers.export.c_code import CODE, to_c
 from seastar_gym.controllers.export.onnx_graph import to_onnx
 from seastar_gym.controllers.learned import LearnedPolicy
@@ -39,6 +36,8 @@ TASKS = {"learned": "SeastarSwim-v0", "timed-0.2s": "SeastarSwim-v0", "fail-blin
 QUICK = ("learned", "miswired-0.5s")
 SWUM = [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in TASKS]
 """Policies that swim, those that are not quick with --slow only."""
+
+ON_A_BODY = Description("pairs", True, Scene(Seastar(nodes_per_limb=4, body=Body.rectangle(0.03, 0.03))), (4,))
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler cc")
 
@@ -173,6 +172,15 @@ def random_observations(policy: LearnedPolicy, n: int, seed: int = 0) -> np.ndar
     return observations
 
 
+def random_past(policy: LearnedPolicy, observations: np.ndarray, seed: int = 1):
+    """What robots may remember, shape (n, past, size), and the state that holds it; None without memory."""
+    if policy.frame_stack is None:
+        return None, None
+    shape = len(observations), policy.description.past, observations.shape[1]
+    past = np.random.default_rng(seed).normal(size=shape).astype(np.float32)
+    return past, (past,)
+
+
 def check(compiled: Compiled, robots: list, observations: np.ndarray, past, chosen: np.ndarray) -> int:
     """Assert that C sees and does what Python does, one after the other.
 
@@ -207,23 +215,19 @@ def test_c_decides_as_numpy_does_in_swims(name, tmp_path):
     """The policy swims, and C sees, remembers and decides the same, over 5,000 observations."""
     policy = policy_of(name)
     compiled, env = Compiled(policy, tmp_path), environment(name, policy)
-    begun, ended, state, swum = np.ones(ROBOTS, bool), np.zeros(ROBOTS, bool), None, []
-    observations, _ = env.reset(seed=0)
+    begun, ended, state, close = np.ones(ROBOTS, bool), np.zeros(ROBOTS, bool), None, 0
+    robots, (observations, _) = compiled.robots(ROBOTS), env.reset(seed=0)
     for _ in range(N_SWUM // ROBOTS):
         past = None
         if policy.frame_stack is not None:
             at_first = np.repeat(observations[:, None], policy.description.past, axis=1)
             past = at_first if state is None else np.where(begun[:, None, None], at_first, state[0])
+        for robot in np.flatnonzero(begun):
+            compiled.begin(robots[robot])
         chosen, state = policy.predict(observations, state, begun, deterministic=True)
-        swum.append((observations.copy(), past, chosen, begun))
+        close += check(compiled, robots, observations, past, chosen)
         observations, _, terminated, truncated, _ = env.step(chosen)
         begun, ended = ended, terminated | truncated  # the next episode begins a step after the end of the last
-    columns = zip(*swum, strict=True)
-    observations, past, chosen, begun = (None if of[0] is None else np.concatenate(of) for of in columns)
-    robots, places = compiled.robots(ROBOTS + N_SWUM), np.tile(np.arange(ROBOTS), N_SWUM // ROBOTS)
-    for decision in np.flatnonzero(begun):  # every episode has a robot of its own
-        places[decision::ROBOTS] = ROBOTS + decision
-    close = check(compiled, [robots[place] for place in places], observations, past, chosen)
     assert close < 0.002 * N_SWUM
 
 
@@ -232,18 +236,14 @@ def test_c_decides_as_numpy_does_in_swims(name, tmp_path):
 def test_c_decides_as_numpy_does_for_random_observations(name, tmp_path):
     """Over 5,000, whatever robots remember, and with waypoints on the boundaries of sectors."""
     policy = policy_of(name)
-    compiled, past, state = Compiled(policy, tmp_path), None, None
-    observations, robots = random_observations(policy, N_DRAWN), compiled.robots(N_DRAWN)
-    if policy.frame_stack is not None:
-        shape = N_DRAWN, policy.description.past, observations.shape[1]
-        past = np.random.default_rng(1).normal(size=shape).astype(np.float32)
-        state = (past,)
-        for robot, before in zip(robots, past, strict=True):
-            compiled.remember(robot, before)
+    compiled, observations = Compiled(policy, tmp_path), random_observations(policy, N_DRAWN)
+    robots, (past, state) = compiled.robots(N_DRAWN), random_past(policy, observations)
+    for robot, before in zip(robots, () if past is None else past, strict=past is not None):
+        compiled.remember(robot, before)
     chosen, later = policy.predict(observations, state, deterministic=True)
     assert check(compiled, robots, observations, past, chosen) < 0.002 * N_DRAWN
     if past is not None:
-        np.testing.assert_array_equal(np.array(robots[7].past).reshape(shape[1:]), later[0][7])
+        np.testing.assert_array_equal(np.array(robots[7].past).reshape(past.shape[1:]), later[0][7])
 
 
 @needs_compiler
@@ -290,18 +290,6 @@ def test_a_policy_that_does_not_see_its_limbs_needs_a_pose_alone(tmp_path):
 
 
 @needs_compiler
-def test_velocities_of_three_pictures_are_of_second_order(tmp_path):
-    """Of a robot that speeds up as t^2, they are exact."""
-    compiled, nodes = Compiled(policy_of("learned"), tmp_path), policy_of("learned").scene.robot.nodes()
-    history = np.stack([nodes + [0.01 * (1.0 - 0.1 * k) ** 2, 0.0] for k in range(3)])
-    targets = np.zeros((2, 2))
-    velocity = Layout().hub_velocity
-    three, two = (compiled.observe(history, n, 0.1, None, None, targets)[velocity] for n in (3, 2))
-    np.testing.assert_allclose(VELOCITY_SCALE * three, [0.02, 0.0], atol=1e-8)
-    np.testing.assert_allclose(VELOCITY_SCALE * two, [0.019, 0.0], atol=1e-8)
-
-
-@needs_compiler
 def test_a_robot_swims_by_c_from_what_a_camera_sees(tmp_path):
     """By pictures at 30 Hz and differences it reaches two waypoints as fast as Python does by states."""
     policy = policy_of("learned")
@@ -328,18 +316,21 @@ def test_a_robot_swims_by_c_from_what_a_camera_sees(tmp_path):
 
 
 @needs_compiler
-def test_fewer_points_may_be_tracked(tmp_path):
+def test_fewer_points_may_be_tracked_and_velocities_of_three_pictures_are_of_second_order(tmp_path):
     """With the hub and two points of every limb, a straight robot is seen as with all nodes."""
     policy = policy_of("learned")
     full = Compiled(policy, tmp_path)
     (tmp_path / "few").mkdir()
     few = Compiled(policy, tmp_path / "few", points=3)
     robot, targets = policy.scene.robot, np.array([[0.1, 0.2], [0.3, 0.1]])
-    all_of_it, some = (replace(robot, nodes_per_limb=n).nodes() for n in (robot.nodes_per_limb, 3))
-    still = [shape.copy() * 0.0 for shape in (all_of_it, some)]
-    expected = full.observe(all_of_it, still[0], None, None, targets)
-    np.testing.assert_allclose(few.observe(some, still[1], None, None, targets), expected, atol=1e-6)
+    nodes, some = (replace(robot, nodes_per_limb=n).nodes() for n in (robot.nodes_per_limb, 3))
+    expected, found = (each.observe(at, 0.0 * at, None, None, targets) for each, at in ((full, nodes), (few, some)))
+    np.testing.assert_allclose(found, expected, atol=1e-6)
     assert few.defined["POINTS"] == 11
+    history = np.stack([nodes + [0.01 * (1.0 - 0.1 * k) ** 2, 0.0] for k in range(3)])  # which speeds up as t^2
+    for n, speed in ((3, 0.02), (2, 0.019)):
+        velocity = full.observe(history, n, 0.1, None, None, targets)[Layout().hub_velocity]
+        np.testing.assert_allclose(VELOCITY_SCALE * velocity, [speed, 0.0], atol=1e-8)
 
 
 @needs_compiler
@@ -354,35 +345,19 @@ def test_the_program_of_the_page_runs(tmp_path):
     assert len(commands) == 5 and set(commands) <= {-1.0, 0.0, 1.0}
 
 
-def test_the_code_allocates_nothing_and_keeps_nothing():
+def test_every_policy_in_the_box_is_exported_to_c_that_allocates_and_keeps_nothing():
+    for name in learned.by_name():
+        assert "seastar_act" in to_c(load_policy(name), name)
     text = to_c(policy_of("timed-0.2s"), "*/ int x; /*\nname")
     assert "alloc(" not in text and "*/ int x" not in text
     kept = [line for line in text.splitlines() if line.startswith("static") and "(" not in line]
     assert kept and all(line.startswith("static const") for line in kept)
     assert all("(" in line for line in CODE.read_text(encoding="utf-8").splitlines() if "static" in line)
-
-
-def test_every_policy_in_the_box_can_be_exported():
-    for name in learned.by_name():
-        assert "seastar_act" in to_c(load_policy(name), name)
-
-
-def test_matrices_of_elements_have_two_numbers_in_a_column_at_most():
-    for name in [*TASKS, *OWN]:
-        matrices = tables.carried(policy_of(name).description)
-        assert ((matrices != 0.0).sum(axis=1) <= 2).all()
-
-
-def test_a_robot_with_limbs_on_a_body_is_refused_by_c():
-    scene = Scene(Seastar(nodes_per_limb=4, body=Body.rectangle(0.03, 0.03)))
     with assert_refused("cannot be exported to C, only to ONNX"):
-        to_c(drawn(Description("pairs", True, scene, (4,))), "body")
-
-
-@pytest.mark.parametrize("points", [1, 1001, 2.5])
-def test_what_is_no_number_of_points_is_refused(points):
-    with assert_refused("points per limb must be a whole number from 2 to 1000"):
-        to_c(policy_of("learned"), "learned", points)
+        to_c(drawn(ON_A_BODY), "body")
+    for points in (1, 1001, 2.5):
+        with assert_refused("points per limb must be a whole number from 2 to 1000"):
+            to_c(policy_of("learned"), "learned", points)
 
 
 @pytest.mark.parametrize("name", [*TASKS, *OWN])
@@ -394,12 +369,9 @@ def test_onnx_decides_as_numpy_does(name):
     session = runtime.InferenceSession(to_onnx(policy, name), providers=["CPUExecutionProvider"])
     names, close = [output.name for output in session.get_outputs()], 0
     for seed in range(10):
-        observations, past, state = random_observations(policy, 1000, seed), None, None
-        given = {"observation": observations}
-        if policy.frame_stack is not None:
-            shape = len(observations), policy.description.past, observations.shape[1]
-            past = np.random.default_rng(seed).normal(size=shape).astype(np.float32)
-            given["past"], state = past, (past,)
+        observations = random_observations(policy, 1000, seed)
+        past, state = random_past(policy, observations, seed)
+        given = {"observation": observations} | ({} if past is None else {"past": past})
         found = dict(zip(names, session.run(None, given), strict=True))
         chosen, later = policy.predict(observations, state, deterministic=True)
         near = require_rounding(policy, input_of(policy, observations, past), found["logits"])
@@ -409,41 +381,4 @@ def test_onnx_decides_as_numpy_does(name):
         np.testing.assert_array_equal(found["commands"], to_commands(policy.actions, n_limbs, found["action"], 1000))
         if past is not None:
             np.testing.assert_array_equal(found["later"], later[0])
-    assert close < 20
-
-
-def test_onnx_of_a_robot_with_limbs_on_a_body_is_written(tmp_path):
-    pytest.importorskip("onnx", reason="onnx is not installed (extra export)")
-    scene = Scene(Seastar(nodes_per_limb=4, body=Body.rectangle(0.03, 0.03)))
-    learned.save(drawn(Description("pairs", True, scene, (4,))), tmp_path / "mine.safetensors")
-    assert main(["export", str(tmp_path / "mine.safetensors"), "--to", "onnx", "--out", str(tmp_path / "m.onnx")]) == 0
-    assert (tmp_path / "m.onnx").stat().st_size > 1000
-
-
-def test_the_command_writes_a_file(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["export", "learned", "--to", "c", "--points", "3"]) == 0
-    assert capsys.readouterr().out.startswith("learned.c: ")
-    assert "#define SEASTAR_POINTS 11\n" in (tmp_path / "learned.c").read_text()
-    assert main(["export", "timed-0.2s", "--to", "c"]) == 0
-    assert "Policy timed-0.2s" in Path("timed-0.2s.c").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(
-    "given, words",
-    [
-        (["greedy", "--to", "c"], "greedy is no learned policy: name a file, .safetensors or the model.zip"),
-        (["none.safetensors", "--to", "c"], "There is no trained policy at none.safetensors"),
-        (["none.zip", "--to", "c"], "There is no trained policy at none.zip"),
-        (["learned", "--to", "onnx", "--points", "3"], "--points is for c"),
-    ],
-)
-def test_the_command_says_what_is_wrong_in_a_sentence(given, words, capsys):
-    assert main(["export", *given]) == 2
-    assert_told(capsys, words)
-
-
-def test_onnx_without_its_package_says_what_to_install(monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "onnx", None)
-    assert main(["export", "learned", "--to", "onnx"]) == 2
-    assert capsys.readouterr().err == 'ONNX files need onnx: pip install "seastar-gym[export]".\n'
+    assert close < 20 and len(to_onnx(drawn(ON_A_BODY), "body")) > 1000

@@ -5,7 +5,7 @@ import pytest
 
 from seastar_gym import Body, HeadingTargets, Numerics, RewardWeights, Scene, Seastar, Simulator, ThermalSma
 from seastar_gym.controllers.greedy import waypoints_of
-from seastar_gym.controllers.planner import Budget, Planner, Targets, gait_planner, state_of
+from seastar_gym.controllers.planner import TIMED_BUDGETS, Budget, Planner, Targets, gait_planner, state_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import transform_commands
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -25,54 +25,78 @@ def swum(n_robots=3, strokes=4, scene=FAST):
     return env, observations
 
 
-@pytest.mark.parametrize("robot", [Seastar(), Seastar(4, 5), Seastar(nodes_per_limb=7), Seastar(nodes_per_limb=19)])
-def test_an_observation_is_the_whole_state(robot):
+STATES = {
+    "chapter": (FAST, 1e-2), "four limbs": (Scene(Seastar(4, 5), numerics=FAST.numerics), 1e-4),
+    "few nodes": (Scene(Seastar(nodes_per_limb=7), numerics=FAST.numerics), 1e-4),
+    "more nodes than stations": (Scene(Seastar(nodes_per_limb=19), numerics=FAST.numerics), 1e-2),
+    "a body": (Scene(Seastar(4, 5, body=Body.rectangle(0.06, 0.02)), numerics=FAST.numerics), None),
+    "thermal": (Scene(Seastar(nodes_per_limb=10), actuator=ThermalSma(), numerics=FAST.numerics), None),
+}  # fmt: skip
+"""Scenes, and by how much the way of the next stroke may differ from that of a state that was observed.
+
+More nodes than stations are interpolated, so undamped limbs ring otherwise: by some per mille of a stroke.
+"""
+
+
+@pytest.mark.parametrize("scene, allowed", STATES.values(), ids=STATES)
+def test_an_observation_is_the_whole_state(scene, allowed):
     """From the state read off the observations, the same commands go the same way, as seen in the body frame.
 
-    More nodes than stations are interpolated, so undamped limbs ring otherwise: by some per mille of a stroke.
+    The roots of limbs on a body are part of it; so are robots whose actuators remember.
     """
-    scene = Scene(robot, numerics=FAST.numerics)
-    env, observations = swum(scene=scene)
-    state = state_of(observations, scene)
+    env, observations = swum(1 if scene.robot.has_body else 3, 1 if scene.robot.has_body else 4, scene)
+    state, hub = state_of(observations, scene), env.simulator.hub_position()
+    if scene.robot.has_body:
+        shapes = (np.linalg.norm(each, axis=-1) for each in (state.positions, env.simulator.positions - hub[:, None]))
+        np.testing.assert_allclose(*shapes, atol=1e-4)
+        return
     twin = Simulator(scene, 3, threads=1)
     twin.set_state(state)
-    np.testing.assert_allclose(
-        np.linalg.norm(twin.hub_velocity(), axis=1), np.linalg.norm(env.simulator.hub_velocity(), axis=1), rtol=1e-5
-    )
-    before = env.simulator.hub_position()
+    speeds = (np.linalg.norm(simulator.hub_velocity(), axis=1) for simulator in (twin, env.simulator))
+    np.testing.assert_allclose(*speeds, rtol=1e-5)
+    for found, waypoints, place in zip(waypoints_of(observations, scene)[0], env.waypoints, hub, strict=True):
+        assert np.hypot(*found) == pytest.approx(np.hypot(*(waypoints[0] - place)), rel=1e-5)
+    if allowed is None:
+        np.testing.assert_allclose(twin.kinetic_energy(), env.simulator.kinetic_energy(), rtol=1e-4)
+        return
     commands = np.zeros((3, scene.robot.n_limbs))
     commands[:, :2] = 1.0, -1.0
     twin.stroke(commands)
     env.simulator.stroke(commands)
-    moved = np.linalg.norm(env.simulator.hub_position() - before, axis=1)
-    allowed = 1e-4 if robot.nodes_per_limb <= 10 else 1e-2
+    moved = np.linalg.norm(env.simulator.hub_position() - hub, axis=1)
     np.testing.assert_allclose(np.linalg.norm(twin.hub_position(), axis=1), moved, rtol=allowed)
 
 
-def test_the_state_of_the_rods_is_seen_beside_what_actuators_remember():
-    scene = Scene(Seastar(nodes_per_limb=10), actuator=ThermalSma(), numerics=FAST.numerics)
-    env, observations = swum(scene=scene)
-    twin = Simulator(scene, 3, threads=1)
-    twin.set_state(state_of(observations, scene))
-    np.testing.assert_allclose(twin.kinetic_energy(), env.simulator.kinetic_energy(), rtol=1e-4)
-    for found, waypoints, hub in zip(
-        waypoints_of(observations, scene)[0], env.waypoints, env.simulator.hub_position(), strict=True
-    ):
-        assert np.hypot(*found) == pytest.approx(np.hypot(*(waypoints[0] - hub)), rel=1e-5)
+@pytest.mark.parametrize("headings", [None, HeadingTargets(tolerance=0.2)])
+def test_a_planner_of_strokes_and_one_in_time_know_their_scene_reward_and_targets(headings):
+    strokes, timed = Planner(headings=headings), Planner(decision_period=0.5, headings=headings)
+    own = RewardWeights(progress=1.0)
+    assert Planner(FAST, reward=own).reward is own and strokes.reward == RewardWeights()
+    assert strokes.scene == Scene.preset("fast") and timed.scene.actuator.has_memory
+    assert (strokes.budget, timed.budget) == (Budget(), TIMED_BUDGETS[0.5])
+    seen = np.random.default_rng(0).normal(size=(2, timed._layout.size)).astype(np.float32)
+    targets, at = timed._targets(seen), timed._layout
+    np.testing.assert_allclose(targets.current, 0.1 * seen[:, at.current_waypoint])
+    np.testing.assert_allclose(targets.after, 0.1 * seen[:, at.next_waypoint])
+    if headings is None:
+        assert targets.turn is targets.turn_after is None
+        return
+    for turn, (c, s) in zip((targets.turn, targets.turn_after), ((0, 1), (2, 3)), strict=True):
+        c, s = seen[:, at.headings][:, [c, s]].T.astype(float)
+        np.testing.assert_allclose(turn, np.arctan2(s, c))
 
 
-def test_the_roots_of_limbs_on_a_body_are_part_of_the_state():
-    scene = Scene(Seastar(4, 5, body=Body.rectangle(0.06, 0.02)), numerics=FAST.numerics)
-    env, observations = swum(1, 1, scene)
-    found, there = state_of(observations, scene), env.simulator.positions - env.simulator.hub_position()[:, None]
-    np.testing.assert_allclose(np.linalg.norm(found.positions, axis=-1), np.linalg.norm(there, axis=-1), atol=1e-4)
-
-
-def test_a_batch_gets_the_actions_of_single_robots():
-    _, observations = swum()
-    planner = Planner(FAST, budget=Budget(2, 4), threads=1)
-    together = planner.predict(observations)[0]
-    np.testing.assert_array_equal(together, [planner.predict(one)[0] for one in observations])
+def test_a_search_in_time_compares_robots_that_have_coasted():
+    """Without commands they swim on; the one that ends nearest counts, not the one that is nearest now."""
+    planner = Planner(decision_period=0.5, budget=Budget(1, 1, 0.5), threads=1)
+    start = planner._swim_all._simulator(1).get_state()
+    later = planner._swim_all(start)
+    coasted = planner._swim_all.coasted(later, 0.5)
+    assert coasted.shape == (21, planner.scene.robot.n_nodes, 2)
+    goal = np.array([[0.3, 0.1]])
+    (chosen,) = planner._search(start, Targets(goal, goal))
+    ways = np.hypot(*(coasted[:, 0] - goal).T)
+    assert ways[chosen] == ways.min() and np.argmin(np.hypot(*(later.positions[:, 0] - goal).T)) != chosen
 
 
 def test_two_strokes_ahead_it_finds_what_an_exhaustive_search_finds():
@@ -186,18 +210,3 @@ def test_of_moves_that_arrive_the_planner_takes_the_one_that_arrives_first():
     assert actions.shape == (3, 5) and (state[1] == 3).all()
     _, state = planner.predict(observation, state, episode_start=np.array([False, True, False]))
     assert state[1].tolist() == [4, 1, 4]
-
-
-@pytest.mark.parametrize(
-    ("moves", "sentence"),
-    [
-        (np.zeros((1, 20, 4)), "moves must be numbers of shape"),
-        (np.zeros((1, 1, 20, 5)), "moves must have shape"),
-        (np.zeros((0, 20, 5)), "moves must have shape"),
-        (np.full((1, 20, 5), 1.5), "moves must be shares of a pulse from -1 to 1"),
-        (np.full((1, 20, 5), np.nan), "moves must be finite numbers"),
-    ],
-)
-def test_what_is_no_move_is_refused(moves, sentence):
-    with pytest.raises(ValueError, match=sentence):
-        Planner(decision_period=0.05, moves=moves)

@@ -1,15 +1,13 @@
 """The scripted gaits do what the chapter says, in every action mode, alone and in batches."""
 
+import hashlib
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pytest
-from stable_baselines3.common.evaluation import evaluate_policy
-from stable_baselines3.common.monitor import Monitor
 
 from seastar_gym import HeadingTargets, Numerics, Scene, Simulator
-from seastar_gym.controllers.scripted import GAITS, OpenLoopPolicy, RandomPolicy, scripted, to_actions
+from seastar_gym.controllers.scripted import GAITS, RandomPolicy, scripted, to_actions
 from seastar_gym.controllers.turning import TurnThenSwim
 from seastar_gym.envs.commands import action_space, command_table, to_commands
 from seastar_gym.envs.layout import HEADINGS, Layout
@@ -17,9 +15,8 @@ from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import transform_commands
 from seastar_gym.evaluation.swim import swim
-from seastar_gym.gaits import pentagon_gait, straight_gait, timed, turning_wave
+from seastar_gym.gaits import pentagon_gait, straight_gait, turning_wave
 
-MODES = ["limbs", "joint", "pairs"]
 OBSERVATION = np.zeros(186, np.float32)
 SECOND_ORDER = Scene(numerics=Numerics(scheme="sdirk2", step=10e-3))
 
@@ -47,18 +44,10 @@ def strokes_of(policy, n_strokes, observation=OBSERVATION):
 # The chapter's swims
 
 
-def test_pentagon_gait_is_the_sequence_of_13_15():
-    gait = pentagon_gait()
-    assert gait.shape == (250, 5)
-    assert np.all(gait.sum(axis=1) == 0.0)
-    sides = gait.reshape(5, 50, 5)
+def test_the_chapter_s_gaits_trace_a_regular_pentagon_that_closes_and_a_straight_line():
+    sides = pentagon_gait().reshape(5, 50, 5)
     heated = [set((1 + np.flatnonzero(side[0])).tolist()) for side in sides]
-    assert heated == [{2, 5}, {1, 3}, {2, 4}, {3, 5}, {1, 4}]
-    assert np.all(sides[:, :45] == sides[:, :1])
-    assert np.all(sides[:, 45:] == 0.0)
-
-
-def test_pentagon_gait_traces_a_regular_pentagon_that_closes():
+    assert heated == [{2, 5}, {1, 3}, {2, 4}, {3, 5}, {1, 4}]  # (13.15)
     corners = steps_of(pentagon_gait())[::50]
     sides = np.diff(corners, axis=0)
     lengths = np.hypot(*sides.T)
@@ -67,9 +56,6 @@ def test_pentagon_gait_traces_a_regular_pentagon_that_closes():
     np.testing.assert_allclose(lengths, lengths.mean(), rtol=5e-4)
     np.testing.assert_allclose(turns, 72.0, atol=0.05)
     assert np.hypot(*corners[-1]) < 0.2e-3
-
-
-def test_straight_gait_moves_along_x_and_not_sideways():
     hub = steps_of(np.repeat(straight_gait(), 3, axis=0))
     assert np.all(np.diff(hub[:, 0]) > 3e-3)
     assert np.all(np.abs(hub[:, 1]) < 1e-10)
@@ -78,24 +64,33 @@ def test_straight_gait_moves_along_x_and_not_sideways():
 # Policies
 
 
-@pytest.mark.parametrize("actions", MODES)
-def test_every_action_mode_means_the_same_commands(actions):
-    chosen = strokes_of(scripted("pentagon", actions), 251)
-    space = action_space(actions, 5)
-    assert all(action in space for action in chosen)
-    np.testing.assert_array_equal(
-        to_commands(actions, 5, chosen, 251), np.concatenate([pentagon_gait(), straight_gait()])
-    )
+SECONDS = (0.1, 0.2)
+PAIRS = ("pentagon", "straight", "rest", "4+,1-", "1-,4+", "{1-, 4+}")
+NAMES = {
+    **{f"{name}, every {s} s": {"name": name, "decision_period": s} for name in GAITS for s in SECONDS},
+    **{f"{name} in strokes": {"name": name} for name in PAIRS},
+    **{f"{name} of {n} limbs": {"name": name, "n_limbs": n} for name, n in (("rest", 3), ("straight", 6))},
+}
+"""Arguments of gaits."""
 
 
-@pytest.mark.parametrize("actions", MODES)
-def test_one_robot_and_a_batch_get_the_same_actions(actions):
-    gait = scripted("pentagon", actions)
-    alone = strokes_of(gait, 60)
-    batch = strokes_of(gait, 60, np.zeros((3, 186), np.float32))
-    assert batch.shape == (60, 3, *action_space(actions, 5).shape)
-    for robot in range(3):
-        np.testing.assert_array_equal(batch[:, robot], alone)
+def test_gaits_are_as_kept(golden):
+    """First commands, a digest of all, and action modes; every other mode that has them means the same commands."""
+    lines = []
+    for title, given in NAMES.items():
+        policy, n_limbs = scripted(**given), given.get("n_limbs", 5)
+        n = len(policy._gait)
+        commands = to_commands(policy.actions, n_limbs, strokes_of(policy, n + 3), n + 3)
+        np.testing.assert_array_equal(commands[n:], commands[:n][np.arange(3) % n])  # it begins anew
+        for mode in ("limbs", "joint", "pairs") if given["name"] in PAIRS else ():
+            chosen = strokes_of(scripted(**given, actions=mode), n)
+            assert all(action in action_space(mode, n_limbs) for action in chosen)
+            np.testing.assert_array_equal(to_commands(mode, n_limbs, chosen, n), commands[:n])
+        digest = hashlib.sha256((np.round(commands, 6) + 0.0).tobytes()).hexdigest()[:16]
+        lines.append(f"{title}, {policy.actions}, {n} decisions, {digest}:")
+        starts = [0, *(1 + np.flatnonzero((commands[1:n] != commands[: n - 1]).any(axis=1)))]
+        lines += [f"  from {k}: {' '.join(f'{share:+.4g}' for share in commands[k])}" for k in starts[:10]]
+    golden("gaits.txt", "\n".join(lines))
 
 
 def test_episode_start_begins_the_gait_anew_for_that_robot_alone():
@@ -107,99 +102,17 @@ def test_episode_start_begins_the_gait_anew_for_that_robot_alone():
     np.testing.assert_array_equal(state[0], [50, 1])
 
 
-NO_STATES = (
-    *((made,) for made in (np.zeros(2), [0, 0], np.zeros(3, int), np.zeros(1, int), np.zeros((2, 1), int))),
-    np.zeros(2, int), (np.zeros(2, int),) * 2,
-)  # fmt: skip
-
-
-@pytest.mark.parametrize("state", NO_STATES, ids=str)
-def test_a_state_that_no_call_gave_is_refused(state):
-    with pytest.raises(ValueError, match=r"decisions made of shape \(2,\)\.$"):
-        scripted("pentagon").predict(np.zeros((2, 186), np.float32), state)
-
-
-@pytest.mark.parametrize("commands", [np.zeros(5), np.zeros((0, 5)), np.zeros((1, 1, 5))], ids=np.shape)
-def test_what_are_no_commands_is_refused(commands):
-    with pytest.raises(ValueError, match="commands"):
-        OpenLoopPolicy(commands)
-
-
-def test_two_episodes_can_share_one_gait():
-    gait = scripted("pentagon")
-    first, second = strokes_of(gait, 60), strokes_of(gait, 60)
-    np.testing.assert_array_equal(first, second)
-
-
-def test_stable_baselines3_can_evaluate_a_gait():
-    env = Monitor(gym.make("SeastarSwim-v0", path=[[0.02, 0.0]], waypoint_radius=2e-3, fidelity="fast"))
-    rewards, lengths = evaluate_policy(scripted("straight"), env, n_eval_episodes=2, return_episode_rewards=True)
-    assert lengths[0] == lengths[1] < 10
-    assert rewards[0] == rewards[1] > 0.0
-
-
-@pytest.mark.parametrize("actions", MODES)
-def test_random_actions_follow_their_generator_and_reach_every_choice(actions):
-    batch = np.zeros((1000, 186), np.float32)
-    first, second = (scripted("random", actions, rng=np.random.default_rng(3)).predict(batch)[0] for _ in range(2))
-    np.testing.assert_array_equal(first, second)
-    n_choices = {"limbs": 3, "joint": 243, "pairs": 21}[actions]
-    assert first.shape == (1000, *action_space(actions, 5).shape)
-    assert len(np.unique(first)) > 0.95 * n_choices
-    alone, state = scripted("random", actions).predict(OBSERVATION)
-    assert alone in action_space(actions, 5)
-    assert state is None
-
-
-def test_resting_heats_no_limb():
-    np.testing.assert_array_equal(strokes_of(scripted("rest"), 2), np.zeros((2, 5)))
-
-
-@pytest.mark.parametrize("name", ["4+,1-", "1-,4+", "{1-, 4+}"])
-def test_a_pair_may_be_written_as_in_the_chapter(name):
-    np.testing.assert_array_equal(strokes_of(scripted(name), 1), [[2, 0, 0, 1, 0]])
-
-
-def test_gaits_fit_robots_of_other_limbs():
-    action, _ = scripted("straight", n_limbs=6).predict(OBSERVATION)
-    np.testing.assert_array_equal(action, [0, 1, 0, 0, 0, 2])
-
-
-# Refusals
-
-
-@pytest.mark.parametrize("name", ["pentagram", "", "2+", "2+,5+", "2-,5-", "a+,b-", "1+,2-,3+"])
-def test_an_unknown_name_is_answered_with_the_known_ones(name):
-    with pytest.raises(ValueError, match="Unknown scripted agent") as refusal:
-        scripted(name)
-    assert all(known in str(refusal.value) for known in GAITS)
-
-
-@pytest.mark.parametrize("name", ["1+,1-", "1+,6-", "0+,1-"])
-def test_a_pair_needs_two_limbs_of_the_robot(name):
-    with pytest.raises(ValueError, match="two different limbs from 1 to 5"):
-        scripted(name)
-
-
-def test_continuous_actions_are_shares_for_one_robot_or_many():
+def test_random_actions_reach_every_choice_and_are_shares_in_continuous():
+    for actions, n_choices in (("limbs", 3), ("joint", 243), ("pairs", 21)):
+        found, state = scripted("random", actions).predict(np.zeros((1000, 186), np.float32))
+        assert len(np.unique(found)) > 0.95 * n_choices and state is None
     rng, policy = np.random.default_rng(3), RandomPolicy(np.random.default_rng(3), "continuous", 4)
     for shape in ((3, 4), (4,)):
-        action, state = policy.predict(np.zeros((*shape[:-1], 7), np.float32))
+        action, _ = policy.predict(np.zeros((*shape[:-1], 7), np.float32))
         np.testing.assert_array_equal(action, rng.uniform(-1.0, 1.0, shape).astype(np.float32))
-        assert action.dtype == np.float32 and state is None
+        assert action.dtype == np.float32
     shares = to_actions([[0.5, -0.25]], "continuous", 2)
     assert shares.dtype == np.float32 and shares.tolist() == [[0.5, -0.25]]
-
-
-def test_gaits_that_turn_are_for_five_limbs_and_decide_as_often_as_asked():
-    np.testing.assert_array_equal(GAITS["wave"](5, 0.2), turning_wave(0.2))
-    np.testing.assert_array_equal(GAITS["pentagon"](5, 0.5), timed(pentagon_gait(), 0.5))
-    for name in ("pentagon", "wave", "lagged-pentagon"):
-        with pytest.raises(ValueError, match=r"are for five limbs, not 4\.$"):
-            GAITS[name](4, 0.5)
-    assert scripted("rest", n_limbs=3).predict(OBSERVATION)[0].tolist() == [0, 0, 0]
-    modes = [scripted(name, decision_period=0.1).actions for name in ("thrifty", "lagged")]
-    assert modes == ["continuous", "limbs"]
 
 
 # An agent that turns to the asked heading by a gait, and swims once it has it.
@@ -242,26 +155,20 @@ def commands_of(policy: TurnThenSwim, lefts: list[float]) -> list[list[float]]:
     return found
 
 
-def test_it_turns_by_the_gait_to_the_side_where_the_heading_lies():
+def test_it_turns_by_the_gait_to_the_side_of_the_heading_and_then_swims():
+    """Turning begins above nine tenths of the tolerance and ends below four; the swimmer sees nothing of headings."""
     assert commands_of(agent(), [-1.0] * 4) == [*CLOCKWISE.tolist(), CLOCKWISE[0].tolist()]
     mirrored = transform_commands(CLOCKWISE, 9)
     assert commands_of(agent(), [1.0] * 4) == [*mirrored.tolist(), mirrored[0].tolist()]
     assert mirrored[0].tolist() == [-1, 0, 0, 0, 1]  # limb 1 stays, and 2 becomes 5
-
-
-@pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_turning_begins_above_nine_tenths_of_the_tolerance_and_ends_below_four_tenths(side):
-    lefts = [0.179, 0.181, 0.1, 0.081, 0.079, 0.1, 0.179, 0.2]
-    found = commands_of(agent(), [side * left for left in lefts])
-    assert [command != SWIMS.tolist() for command in found] == [False, True, True, True, False, False, False, True]
-    assert found[1] == found[7]  # the gait begins anew
-
-
-def test_the_swimmer_sees_nothing_of_headings():
-    swimmer = Swimmer()
-    commands_of(agent(swimmer), [0.1, 1.0])
-    (shown,) = swimmer.shown
-    np.testing.assert_array_equal(shown, np.delete(seen(0.1), AT.headings))
+    for side in (-1.0, 1.0):
+        swimmer, lefts = Swimmer(), [0.179, 0.181, 0.1, 0.081, 0.079, 0.1, 0.179, 0.2]
+        found = commands_of(agent(swimmer), [side * left for left in lefts])
+        turns = [command != SWIMS.tolist() for command in found]
+        assert turns == [False, True, True, True, False, False, False, True]
+        assert found[1] == found[7]  # the gait begins anew
+        np.testing.assert_array_equal(swimmer.shown[0], np.delete(seen(side * 0.179), AT.headings))
+        assert len(swimmer.shown) == 4
 
 
 class Resting:

@@ -1,14 +1,12 @@
 """Disturbances are what they say, and many swims are measured as one is."""
 
-import csv
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import trim_mean
 
 from seastar_gym import Scene, ThermalSma
-from seastar_gym.cli.evaluate import main
+from seastar_gym.cli.main import main
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.layout import Layout
@@ -19,7 +17,7 @@ from seastar_gym.evaluation import results, statistics
 from seastar_gym.evaluation.disturbances import DISTURBANCES, Disturbance, DisturbedTask
 from seastar_gym.evaluation.many import swim_many
 from seastar_gym.evaluation.swim import swim
-from seastar_gym.evaluation.trials import SETS
+from seastar_gym.evaluation.trials import SETS, read_trials
 
 FAST = Scene.preset("fast")
 N = 16
@@ -51,6 +49,14 @@ def test_nothing_disturbed_is_the_task_itself():
     np.testing.assert_array_equal(hubs_of(task), plain.simulator.hub_position())
 
 
+def test_nothing_but_waypoints_is_seen_at_rest_in_the_world_beside_cold_wires():
+    scene = replace(FAST, actuator=ThermalSma())
+    seen, at = disturbed(scene=scene, current=1e-3).observe(), Layout.of(scene)
+    np.testing.assert_allclose(seen[:, at.hub_velocity], 0.0, atol=1e-6)
+    np.testing.assert_array_equal(seen[:, at.actuators], 0.0)
+    np.testing.assert_array_equal(seen[:, at.waypoints], disturbed().observe()[:, Layout.of(FAST).waypoints])
+
+
 @pytest.mark.parametrize("mm_per_s", [0.5, 1.5])
 def test_a_current_carries_the_robots_its_own_way_and_the_waypoints_stay(mm_per_s):
     task, speed = disturbed(**vars(DISTURBANCES[f"current of {mm_per_s} mm/s"])), 1e-3 * mm_per_s
@@ -71,15 +77,6 @@ def test_a_current_carries_the_robots_its_own_way_and_the_waypoints_stay(mm_per_
     to_waypoint = np.linalg.norm([0.1437, 0.0] - hubs[-1], axis=1)
     np.testing.assert_allclose(np.linalg.norm(seen[:, at.current_waypoint], axis=1), to_waypoint / 0.1, rtol=1e-5)
     assert waypoint == pytest.approx(1.437)
-
-
-def test_a_current_is_seen_in_the_hubs_velocity_whatever_actuators_remember():
-    """At rest in the world, beside wires that are cold: nothing but the waypoints is seen."""
-    scene = replace(FAST, actuator=ThermalSma())
-    seen, at = disturbed(scene=scene, current=1e-3).observe(), Layout.of(scene)
-    np.testing.assert_allclose(seen[:, at.hub_velocity], 0.0, atol=1e-6)
-    np.testing.assert_array_equal(seen[:, at.actuators], 0.0)
-    np.testing.assert_array_equal(seen[:, at.waypoints], disturbed().observe()[:, Layout.of(FAST).waypoints])
 
 
 def test_every_limb_is_the_weak_one_of_some_robot():
@@ -113,12 +110,6 @@ def test_lost_strokes_are_lost_whole_and_as_often_as_said():
     np.testing.assert_array_equal(carried_out[~lost], np.broadcast_to(commands, carried_out.shape)[~lost])
 
 
-@pytest.mark.parametrize("arguments", [{"lost": 1.5}, {"weakness": 2.0}, {"noise": -1.0}, {"current": np.nan}])
-def test_impossible_disturbances_are_refused(arguments):
-    with pytest.raises(ValueError, match=next(iter(arguments))):
-        Disturbance(**arguments)
-
-
 @pytest.mark.parametrize(
     "agent, path, period, strokes",
     [(GreedyPolicy(FAST), "square", None, 30), (scripted("lagged", decision_period=0.5), "line", 0.5, 20)],
@@ -143,61 +134,53 @@ def test_a_swim_ends_at_its_last_waypoint():
     assert numbers["mean_cross_track_error_mm"][0] == pytest.approx(np.mean(errors))
 
 
-@pytest.mark.slow
-def test_the_command_line_writes_a_row_for_every_set_and_agent(tmp_path, capsys):
-    file = tmp_path / "trials.csv"
-    command = ["--agents", "greedy", "pentagon", "--sets", *SETS, "--swims", "4", "--fidelity", "fast"]
-    assert main([*command, "--out", str(file)]) == 0
-    with file.open(newline="", encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
-    assert len(rows) == 2 * (4 + 6 + 5)
-    assert "success" in capsys.readouterr().out
+# On the command line; more of it in cli/test_cli.py.
 
 
-def test_named_paths_on_two_fidelities(tmp_path, capsys):
+@pytest.mark.parametrize(
+    "options, sets, words",
+    [
+        (["--agents", "rest", "--sets", "nominal", "--fidelity", "fast", "balanced", "--seconds", "20"], 2 * 4,
+         ("path", "fidelity", "success", "0.0 [0.0, 0.0]")),
+        pytest.param(["--agents", "greedy", "pentagon", "--sets", *SETS, "--swims", "4", "--fidelity", "fast"],
+                     2 * (4 + 6 + 5), ("success",), marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_the_command_line_writes_a_row_for_every_set_agent_and_fidelity(options, sets, words, tmp_path, capsys):
     file = tmp_path / "trials.csv"
-    command = ["--agents", "rest", "--sets", "nominal", "--fidelity", "fast", "balanced", "--out", str(file)]
-    assert main([*command, "--seconds", "20", "--num-threads", "1"]) == 0
-    with file.open(newline="", encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
-    assert [row["fidelity"] for row in rows] == ["fast"] * 4 + ["balanced"] * 4
-    assert {float(row["success_rate"]) for row in rows} == {0.0}
-    printed = capsys.readouterr().out
-    words = ("path", "fidelity", "success", "strokes", "time [s]", "cross-track", "error [mm]", "[J/m]")
-    assert all(word in printed for word in (*words, "0.0 [0.0, 0.0]")) and "decisions" not in printed
+    assert main(["evaluate", *options, "--num-threads", "1", "--out", str(file)]) == 0
+    printed, rows = capsys.readouterr().out, read_trials(file)
+    assert len(rows) == sets and all(word in printed for word in words) and "decisions" not in printed
+    if "balanced" in options:
+        assert [row["fidelity"] for row in rows] == ["fast"] * 4 + ["balanced"] * 4
+        assert {row["success_rate"] for row in rows} == {0.0}
 
 
 # Means over seeds and tasks, their intervals, and performance profiles.
 
 
-def test_an_interval_is_of_other_seeds_on_the_same_paths():
-    paths = np.linspace(150.0, 200.0, 16)
-    shifted = paths + np.array([[-1.0], [0.0], [1.0], [0.5]])
-    found = statistics.estimate(shifted)
-    assert found.mean == pytest.approx(trim_mean(shifted.ravel(), 0.25))
-    assert found.low < found.mean < found.high
-    assert found.high - found.low < 1.5  # the paths differ by 50
-    assert statistics.estimate(np.tile(paths, (3, 1))) == (found := statistics.interquartile_mean(paths), found, found)
-    assert np.isnan(statistics.estimate(paths[None]).low)
-
-
-def test_a_profile_is_the_share_of_scores_that_reach_a_level():
-    scores = np.array([[0.2, 0.9], [0.4, 0.9], [0.6, 0.9], [0.8, 0.9]])
-    share, low, high = statistics.profile(scores, [0.0, 0.5, 0.85, 1.0])
-    assert share.tolist() == [1.0, 0.75, 0.5, 0.0]
-    assert (low <= share).all() and (share <= high).all()
-    assert low[1] < 0.6 and high[1] > 0.9 and low[0] == high[0] == 1.0  # the second task does not vary
-    assert low[2] == high[2] == 0.5
-
-
-def test_an_interval_is_wide_where_seeds_or_episodes_differ():
+def test_means_intervals_and_profiles_are_as_kept_and_wide_where_seeds_or_episodes_differ(golden):
+    """Of seeds that differ on the same paths, of crossed seeds and episodes, of one seed, of constants, of nothing."""
     rng = np.random.default_rng(0)
+    paths, scores = np.linspace(150.0, 200.0, 16), np.array([[0.2, 0.9], [0.4, 0.9], [0.6, 0.9], [0.8, 0.9]])
+    shifted = paths + np.array([[-1.0], [0.0], [1.0], [0.5]])
+    found = {
+        "of seeds": statistics.estimate(shifted), "of one seed": statistics.estimate(paths[None]),
+        "of equal seeds": statistics.estimate(np.tile(paths, (3, 1))),
+        "of the middle half": statistics.interquartile_mean(shifted),
+        "crossed": statistics.crossed_interval(list(rng.normal(size=(10, 1)) + rng.normal(size=(10, 40)))),
+        "of unequally many": statistics.crossed_interval([np.ones(16), np.ones(64)]),
+        "of a mean": statistics.mean_with_interval(rng.normal(size=400)),
+        "of a constant": statistics.mean_with_interval(np.full(5, 3.0)),
+        "of nothing": statistics.mean_with_interval(np.zeros(0)),
+        "profile": np.transpose(statistics.profile(scores, [0.0, 0.5, 0.85, 1.0])),
+    }  # fmt: skip
+    golden("statistics.txt", "\n".join(f"{name}: {np.round(value, 4).tolist()}" for name, value in found.items()))
     of_seeds, of_episodes = rng.normal(size=(10, 1)), rng.normal(size=(1, 40))
     for drawn in (of_seeds, of_episodes):
         low, high = statistics.crossed_interval(list(drawn + np.zeros((10, 40))))
         assert low < drawn.mean() < high
         assert high - low == pytest.approx(2.0 * 1.96 * drawn.std() / drawn.size**0.5, rel=0.1)
-    assert statistics.crossed_interval([np.ones(16), np.ones(64)]) == (1.0, 1.0)  # the first episodes are the same ones
 
 
 @pytest.mark.parametrize("draw", ["normal", "exponential"])
@@ -209,10 +192,3 @@ def test_an_interval_covers_the_mean_as_often_as_it_says(draw):
     covered = np.mean((low <= mean) & (mean <= high))
     assert 0.90 < covered < 0.97
     assert np.mean(high - low) == pytest.approx(2.0 * 1.96 / np.sqrt(40), rel=0.08)
-
-
-def test_a_mean_lies_in_its_interval_and_a_constant_needs_none():
-    low, high = statistics.mean_with_interval(np.random.default_rng(0).normal(size=400))[1:]
-    assert low < 0.0 < high and high - low == pytest.approx(2 * 1.96 / 20, rel=0.15)
-    assert statistics.mean_with_interval(np.full(5, 3.0)) == (3.0, 3.0, 3.0)
-    assert np.isnan(statistics.mean_with_interval(np.zeros(0))).all()

@@ -10,12 +10,15 @@ import time
 import tty
 from collections import deque
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from evaluation import made_up
 from refusals import assert_refused, assert_told
 from seastar_gym import DomainRandomization, Scene, Seastar, Sight, Simulator, SmaPulse, SmaWires, Uniform
+from seastar_gym.cli.drive import report
 from seastar_gym.cli.main import main
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.description import Description
@@ -78,42 +81,22 @@ def guarded(**limits):
 # The guard
 
 
-def jump_back(plant):
-    plant.time -= 0.05
+WRONG = {
+    "clock has jumped": (-0.05, {}), "clock has gone back": (0.0, {"shift": -0.2}), "s old": (1.0, {"shift": -0.6}),
+    "not finite": (0.1, {"pose": (0.0, np.nan, 0.0)}), "No new picture for 0.12 s": (0.13, {"last": 0.5}),
+    "in the future": (0.0, {"shift": 1.0}),
+}  # fmt: skip
+"""Time that passes [s], and what becomes of a plant, by words of the sentence."""
 
 
-def tracker_goes_back(plant):
-    plant.shift = -0.2
-
-
-def tracker_is_ahead(plant):
-    plant.shift = 1.0
-
-
-def not_a_number(plant):
-    plant.time, plant.pose = plant.time + 0.1, (0.0, np.nan, 0.0)
-
-
-def lose_sight(plant):
-    plant.last = plant.time
-    plant.time += 0.13
-
-
-def sleep(plant):
-    plant.shift -= 0.6
-    plant.time += 1.0
-
-
-@pytest.mark.parametrize(
-    "happens, words",
-    [(jump_back, "clock has jumped"), (tracker_goes_back, "clock has gone back"), (not_a_number, "not finite"),
-     (tracker_is_ahead, "in the future"), (lose_sight, "No new picture for 0.12 s"), (sleep, "s old")],
-)  # fmt: skip
-def test_whatever_is_wrong_stops_all_wires_for_good(happens, words):
+@pytest.mark.parametrize("words", WRONG)
+def test_whatever_is_wrong_stops_all_wires_for_good(words):
     plant, guard = guarded()
     guard.wait_until(0.5)
     guard.heat([1, 0, 0, -1, 0], 0.1)
-    happens(plant)
+    seconds, attributes = WRONG[words]
+    plant.time += seconds
+    vars(plant).update(attributes)
     with pytest.raises(PlantError, match=words) as refused:
         guard.look()
     assert plant.stops >= 1 and str(refused.value).endswith(".")
@@ -142,15 +125,6 @@ def test_pulses_are_as_short_and_wires_rest_as_long_as_they_have_to():
             guard.heat([1, 0, 0, 0, 0], seconds)
         guard.begin()
     assert len(plant.pulses) == 2 and plant.stops >= 4
-
-
-def test_a_robot_that_is_not_seen_does_not_begin():
-    plant = Scripted()
-    plant.sight = lambda: None
-    env = PlantSwim(plant, **OPTIONS)
-    with pytest.raises(PlantError, match=f"not seen the robot for {FIRST:g} s"):
-        env.reset()
-    assert plant.stops >= 2
 
 
 # Lines
@@ -274,28 +248,20 @@ def test_a_simulated_plant_is_seen_as_the_environment_sees_its_robot(sees):
 
 
 def test_policies_drive_a_plant_unchanged(tmp_path):
+    """A learned one that was saved, and one of Stable-Baselines3."""
     plant = PlantSwim(simulated(), **OPTIONS)
-    layout = plant.layout
+    layout, rng = plant.layout, np.random.default_rng(0)
     about = Description("pairs", True, SCENE, (8,), 0.5, entries=layout.entries, shows_limbs=False)
-    rng = np.random.default_rng(0)
-    policy = learned.LearnedPolicy(
-        about, {name: rng.normal(size=shape).astype(np.float32) for name, shape in about.shapes().items()}, {}
-    )
-    learned.save(policy, tmp_path / "policy.safetensors")
-    loaded = learned.load(tmp_path / "policy.safetensors")
-    found = rollout(plant, loaded, seeds=0, until=4, record=("hub_position",))
-    assert np.abs(np.diff(found.entries["hub_position"][:5, 0], axis=0)).max() > 1e-4
+    weights = {name: rng.normal(size=shape).astype(np.float32) for name, shape in about.shapes().items()}
+    learned.save(learned.LearnedPolicy(about, weights, {}), tmp_path / "policy.safetensors")
+    model = pytest.importorskip("stable_baselines3").PPO("MlpPolicy", plant, n_steps=4, batch_size=4, n_epochs=1)
+    for policy in (learned.load(tmp_path / "policy.safetensors"), model.learn(4)):
+        found = rollout(plant, policy, seeds=0, until=4, record=("hub_position",))
+        assert found.decisions == [4]
+        assert np.abs(np.diff(found.entries["hub_position"][:5, 0], axis=0)).max() > 1e-4
 
 
-def test_a_policy_of_stable_baselines_drives_a_plant():
-    sb3 = pytest.importorskip("stable_baselines3")
-    env = PlantSwim(simulated(), **OPTIONS)
-    model = sb3.PPO("MlpPolicy", env, n_steps=4, batch_size=4, n_epochs=1, device="cpu").learn(4)
-    observation, _ = env.reset()
-    assert env.step(model.predict(observation)[0])[0].shape == observation.shape
-
-
-def test_a_plant_that_stops_truncates_the_episode_with_a_sentence():
+def test_a_plant_that_stops_truncates_the_episode_and_one_that_sees_no_robot_begins_none():
     plant = simulated()
     env = PlantSwim(plant, **OPTIONS)
     env.reset(), env.step(3)
@@ -305,9 +271,14 @@ def test_a_plant_that_stops_truncates_the_episode_with_a_sentence():
     assert truncated and not terminated and "No new picture" in info["plant_message"] and not plant.heated().any()
     with pytest.raises(Exception, match="reset"):
         env.step(0)
+    plant = Scripted()
+    plant.sight = lambda: None
+    with pytest.raises(PlantError, match=f"not seen the robot for {FIRST:g} s"):
+        PlantSwim(plant, **OPTIONS).reset()
+    assert plant.stops >= 2
 
 
-def test_decisions_that_are_late_make_the_clock_wait():
+def test_late_decisions_make_the_clock_wait_and_wires_that_have_to_rest_are_masked():
     plant = simulated(Sight(rate=100.0))
     env = PlantSwim(plant, Limits(oldest=2.0), **OPTIONS)
     _, info = env.reset()
@@ -316,9 +287,6 @@ def test_decisions_that_are_late_make_the_clock_wait():
     assert info["late"] == pytest.approx(0.3) and info["time"] == 0.5 and plant.now() == pytest.approx(0.8, abs=0.06)
     assert env.step(8)[4]["late"] == pytest.approx(0.0, abs=1e-9)
     assert info["sight_age"] == pytest.approx(0.0, abs=0.011)
-
-
-def test_wires_that_have_to_rest_are_masked():
     env = PlantSwim(simulated(), Limits(shortest_rest=0.6), **OPTIONS)
     env.reset()
     heated = [env.step(action)[4] for action in (3, 3, 3)]
@@ -328,7 +296,7 @@ def test_wires_that_have_to_rest_are_masked():
 
 
 def test_logs_are_what_identify_reads(tmp_path):
-    """The robot begins turned; its logs are in the frame in which it lay."""
+    """The robot begins turned; its logs are in the frame in which it lay. Markers between nodes are not tracked."""
     sight = Sight(rate=50.0, delay=0.1, sees=1)
     env = PlantSwim(simulated(sight, heading=1.0), logs=tmp_path, sight=sight, **OPTIONS)
     env.reset()
@@ -341,9 +309,6 @@ def test_logs_are_what_identify_reads(tmp_path):
     assert np.abs(measured.positions - expected).max() < 1e-3 < np.abs(expected - expected[0]).max() / 10
     poses = np.loadtxt(tmp_path / "poses.csv", delimiter=",", skiprows=1)
     assert poses[0, 4] == pytest.approx(1.0, abs=1e-6) and (poses[:, 0] < poses[:, 1]).all() and len(poses) > 100
-
-
-def test_markers_between_nodes_are_not_tracked():
     assert nodes_of(Seastar(nodes_per_limb=10), 9) == {k: k + 1 for k in range(45)}
     assert list(nodes_of(Seastar(nodes_per_limb=7), 3).values())[:4] == [2, 4, 6, 8]
     assert nodes_of(Seastar(nodes_per_limb=5), 3) == {2: 4, 5: 8, 8: 12, 11: 16, 14: 20}
@@ -353,46 +318,43 @@ def test_markers_between_nodes_are_not_tracked():
 def test_a_full_disk_stops_the_wires_in_a_sentence(name, tmp_path):
     (tmp_path / f"{name}.csv").symlink_to("/dev/full")
     plant = simulated()
-    if name == "commands":
-        env = PlantSwim(plant, logs=tmp_path, **OPTIONS)
+    env = PlantSwim(plant, logs=tmp_path, **OPTIONS)
+    try:
         env.reset()
-        info = env.step(3)[4]
-        assert "no space left on device" in info["plant_message"] and info["plant_message"].endswith(".")
+        told = env.step(3)[4]["plant_message"]
         env.close()
-    else:
-        with pytest.raises(PlantError, match=r"no space left on device\.$"):
-            PlantSwim(plant, logs=tmp_path, **OPTIONS).reset()
-    assert not plant.heated().any()
+    except PlantError as stopped:
+        told = str(stopped)
+    assert told.endswith("no space left on device.") and not plant.heated().any()
+
+
+def swim(**arguments):
+    return PlantSwim(**{"plant": Scripted(), **OPTIONS, **arguments})
+
+
+def simulation(**arguments):
+    return SimulatedPlant(**{"simulator": Simulator(SCENE), **arguments})
+
+
+DENSITIES = DomainRandomization({"robot.density": Uniform(1.0, 2.0)})
+FOUR = Scene(Seastar(n_limbs=4), actuator=SmaWires(heating_time=0.08))
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
-    [({"sight": Sight(sees="nodes")}, "sees no nodes"), ({"action_delay": 0.5}, "late"),
-     ({"randomization": DomainRandomization({"robot.density": Uniform(1.0, 2.0)})}, "randomization"),
-     ({"random_heading": True}, "at random"), ({"limits": Limits(0.05)}, "the guard allows 0.05 s"),
-     ({"scene": Scene(Seastar(n_limbs=4), actuator=SmaWires(heating_time=0.08))}, "has 5 limbs"),
-     ({"plant": 3}, "must be a Plant")],
+    ("make", "arguments", "words"),
+    [(swim, {"sight": Sight(sees="nodes")}, "sees no nodes"), (swim, {"action_delay": 0.5}, "late"),
+     (swim, {"randomization": DENSITIES}, "randomization"), (swim, {"random_heading": True}, "at random"),
+     (swim, {"limits": Limits(0.05)}, "the guard allows 0.05 s"), (swim, {"scene": FOUR}, "has 5 limbs"),
+     (swim, {"plant": 3}, "must be a Plant"), (simulation, {"sight": Sight(sees="nodes")}, "sees no nodes"),
+     (simulation, {"simulator": Simulator(SCENE, 2)}, "one robot with wires"), (simulation, {"seed": -1}, "seed"),
+     (simulation, {"simulator": Simulator(Scene(actuator=SmaPulse()))}, "one robot with wires"),
+     (simulation, {"paced": 1}, "paced"), (simulation, {"simulator": SCENE}, "a Simulator"),
+     (simulation, {"sight": 30}, "a Sight"),
+     *((Limits, {name: 0.0}, f"Limits.{name}") for name in ("longest_pulse", "patience", "oldest"))],
 )  # fmt: skip
-def test_what_no_plant_can_do_is_refused(arguments, words):
+def test_what_no_plant_can_be_or_do_is_refused(make, arguments, words):
     with assert_refused(words):
-        PlantSwim(**{"plant": Scripted(), **OPTIONS, **arguments})
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [({"simulator": Simulator(SCENE, 2)}, "one robot with wires"), ({"sight": Sight(sees="nodes")}, "sees no nodes"),
-     ({"simulator": Simulator(Scene(actuator=SmaPulse()))}, "one robot with wires"), ({"seed": -1}, "seed"),
-     ({"paced": 1}, "paced"), ({"simulator": SCENE}, "a Simulator"), ({"sight": 30}, "a Sight")],
-)  # fmt: skip
-def test_what_cannot_be_simulated_is_refused(arguments, words):
-    with assert_refused(words):
-        SimulatedPlant(**{"simulator": Simulator(SCENE), **arguments})
-
-
-@pytest.mark.parametrize("name", ["longest_pulse", "patience", "oldest"])
-def test_limits_are_positive(name):
-    with assert_refused(f"Limits.{name}"):
-        Limits(**{name: 0.0})
+        make(**arguments)
 
 
 # `seastar drive`: it plans, asks, drives and reports, and says in a sentence why it does not.
@@ -427,24 +389,34 @@ def test_a_simulated_drive_is_planned_driven_and_reported(tmp_path, capsys):
     assert "Plan: 0 of 1 waypoints, 0.4 s of heat in 4 decisions" in said and "The guard had nothing to stop." in said
     names = {"plan.png", "driven.png", "report.md", "tracking.csv", "commands.csv", "poses.csv"}
     assert {file.name for file in out.iterdir()} == names
-    report = (out / "report.md").read_text()
-    assert "| policy | straight |" in report and "| decisions | 4, every 0.5 s" in report
     measured = Measurement.from_csv(out / "tracking.csv", out / "commands.csv")
     assert measured.commands.tolist() == [[0, 1, 0, 0, -1], [0] * 5] * 2 and len(measured.nodes) == 6
 
 
-@pytest.mark.parametrize("answer, is_heated", [("n\n", False), ("", False), ("yes\n", True)])
-def test_it_asks_before_wires_are_heated(answer, is_heated, tmp_path, capsys, monkeypatch):
+def test_the_report_of_a_drive_is_as_kept(golden, tmp_path):
+    (tmp_path / "poses.csv").write_text("captured,received,x,y,turn\n0,0.05,0,0,0\n0.03,0.09,0,0,0\n0.13,0.17,0,0,0\n")
+    options = SimpleNamespace(out=tmp_path, policy="straight", plant="serial:/dev/ttyACM0", decision_period=0.5)
+    planned, swum, _ = made_up.swims()
+    envs = [SimpleNamespace(stopped=stopped, latest=0.0123) for stopped in ("", "No new picture.")]
+    golden("report.md", "\n".join(report(options, planned, swum, env) for env in envs))
+
+
+@pytest.mark.parametrize(
+    "more, answer, is_heated",
+    [
+        ([], "n\n", False),
+        ([], "", False),
+        ([], "yes\n", True),
+        (["--dry", "--plant", "serial:/dev/null"], "y\n", False),
+    ],
+)
+def test_it_asks_before_wires_are_heated(more, answer, is_heated, tmp_path, capsys, monkeypatch):
+    """A dry run heats nothing, and asks nothing."""
     monkeypatch.setattr(sys, "stdin", io.StringIO(answer))
-    assert drive(tmp_path) == 0
-    assert "Heat the wires? [y/N] " in (said := capsys.readouterr().out)
-    assert ("No wire was heated." in said) != is_heated
+    assert drive(tmp_path, *more) == 0
+    assert ("Heat the wires? [y/N] " in (said := capsys.readouterr().out)) == (not more)
+    assert said.endswith("No wire was heated.\n") != is_heated
     assert (tmp_path / "out" / "tracking.csv").exists() == is_heated and (tmp_path / "out" / "plan.png").exists()
-
-
-def test_a_dry_run_heats_nothing(tmp_path, capsys):
-    assert drive(tmp_path, "--dry", "--plant", "serial:/dev/null") == 0
-    assert capsys.readouterr().out.endswith("No wire was heated.\n")
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="There are no pseudo-terminals here.")
@@ -468,13 +440,11 @@ def test_a_drive_over_a_serial_line(tank, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    "arguments, words",
-    [(["straight", "--plant", "usb"], "A plant is sim, or serial:/dev/"), (["learned", "--dry"], "policy sees 196"),
-     (["straight", "--yes", "--plant", "serial:/dev/none"], "/dev/none cannot be opened: no such file or directory."),
-     (["straight", "--yes", "--plant", "serial:/dev/null"], "/dev/null is no serial line."),
-     (["straight", "--sight", "nodes"], "A tracker sees no nodes"), (["straight", "--seconds", "0"], "--seconds must"),
-     (["nobody"], "Unknown scripted agent"), (["straight", "--scene", "none.py"], "none.py is no file.")],
+    "line, words",
+    [("/dev/none", "/dev/none cannot be opened: no such file or directory."),
+     ("/dev/null", "/dev/null is no serial line.")],
 )  # fmt: skip
-def test_what_cannot_be_driven_is_said_in_a_sentence(arguments, words, tmp_path, capsys):
-    assert main(["drive", *SHORT, "--out", str(tmp_path), *arguments]) != 0
+def test_what_is_no_serial_line_is_said_in_a_sentence(line, words, tmp_path, capsys):
+    """Of other commands that cannot be done: cli/test_cli.py."""
+    assert drive(tmp_path, "--yes", "--plant", f"serial:{line}") != 0
     assert_told(capsys, words)

@@ -79,26 +79,19 @@ def ros_plant(monkeypatch):
     return make
 
 
-def test_a_gait_drives_a_robot_over_ros(ros_plant):
-    ros, plant = ros_plant()
+@pytest.mark.parametrize("lost_after", [math.inf, 1.0])
+def test_a_gait_drives_a_robot_over_ros_until_its_tracker_falls_silent(lost_after, ros_plant):
+    ros, plant = ros_plant(lost_after=lost_after)
     env, gait = PlantSwim(plant, Limits(), scene=SCENE, decision_period=0.5), scripted("straight")
-    observation, info = env.reset()
-    for _ in range(6):
+    (observation, info), truncated, decisions = env.reset(), False, 0
+    while not truncated and decisions < 6:
         observation, _, _, truncated, info = env.step(gait.predict(observation)[0])
-        assert not truncated and not info["plant_message"]
+        decisions += 1
+    assert truncated == bool(info["plant_message"]) == (lost_after < math.inf)
+    if truncated:
+        assert ros.said[-1] == "stop" and not ros.plant.heated().any()
+        return
     env.close()
     assert {line.split()[0] for line in ros.said} == {"beat", "heat", "stop"}
     assert np.linalg.norm(ros.plant.simulator.hub_position()) > 1e-4
     np.testing.assert_allclose(info["hub_position"], ros.plant.simulator.hub_position()[0], atol=5e-3)
-
-
-def test_a_tracker_that_falls_silent_stops_the_wires(ros_plant):
-    ros, plant = ros_plant(lost_after=1.0)
-    env, gait = PlantSwim(plant, Limits(), scene=SCENE, decision_period=0.5), scripted("straight")
-    observation, _ = env.reset()
-    for _ in range(6):
-        observation, _, _, truncated, info = env.step(gait.predict(observation)[0])
-        if truncated:
-            break
-    assert truncated and info["plant_message"] and ros.said[-1] == "stop"
-    assert not ros.plant.heated().any()

@@ -1,0 +1,190 @@
+"""What every agent does: the same again, of one robot as in a batch, in its action mode, and nothing where it does not
+fit. Agents are bundled policies, gaits, greedy and planning ones, models of Stable-Baselines3 and functions."""
+
+from copy import deepcopy
+from dataclasses import replace
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from stable_baselines3 import A2C, DQN, PPO
+
+from refusals import assert_refused
+from seastar_gym import HeadingTargets, Scene, Seastar, SmaWires
+from seastar_gym.controllers import registry
+from seastar_gym.controllers.contract import actions_of, require_fit
+from seastar_gym.controllers.learned import by_name, load
+from seastar_gym.controllers.planner import Budget, Planner, gait_planner
+from seastar_gym.controllers.registry import load_agents
+from seastar_gym.controllers.scripted import GAITS, RandomPolicy, scripted
+from seastar_gym.envs.commands import Actions, action_space
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.many import swim_many
+from seastar_gym.evaluation.swim import swim
+
+FAST = Scene.preset("fast")
+WIRES = Scene(actuator=SmaWires(), numerics=FAST.numerics)
+FOUR = Scene(Seastar(n_limbs=4, nodes_per_limb=4), numerics=FAST.numerics)
+N_ROBOTS, N_DECISIONS = 4, 3
+FEW = Budget(2, 3)
+LEARNERS = {
+    "limbs": (PPO, {"n_steps": 8, "batch_size": 8, "n_epochs": 1}),
+    "pairs": (DQN, {"learning_starts": 4, "buffer_size": 100, "batch_size": 4}),
+    "joint": (A2C, {"n_steps": 4}),
+}
+"""Learners of Stable-Baselines3, by action mode."""
+
+
+def train(actions, scene=FAST):
+    """A model that has learned for a few strokes, on the plain environment."""
+    kind, arguments = LEARNERS[actions]
+    env = gym.make("SeastarSwim-v0", actions=actions, scene=scene, max_episode_steps=5)
+    return kind("MlpPolicy", env, policy_kwargs={"net_arch": [8]}, seed=0, device="cpu", **arguments).learn(16)
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    """Models by action mode, and the files that they were saved in."""
+    models = {actions: train(actions) for actions in LEARNERS}
+    files = {actions: tmp_path_factory.mktemp("models") / "model.zip" for actions in LEARNERS}
+    for actions, model in models.items():
+        model.save(files[actions])
+    return models, files
+
+
+@pytest.fixture(scope="module", autouse=True)
+def cache(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        patch.syspath_prepend(Path(__file__).parent)
+        yield
+
+
+def named(name, decision_period=None):
+    return lambda: load_agents([name], fidelity="fast", decision_period=decision_period)[name]
+
+
+SEARCHING = {
+    **{name: (named(name), FAST, {}) for name in (*registry.AGENTS, "own_agents:Towards") if name != "learned"},
+    "planner": (lambda: Planner(FAST, budget=FEW, threads=1), FAST, {}),
+    "timed planner": (
+        lambda: Planner(decision_period=0.5, budget=Budget(2, 3, 0.5), threads=1, headings=HeadingTargets()), WIRES,
+        {"decision_period": 0.5, "headings": HeadingTargets()},
+    ),
+    "gait-planner": (lambda: gait_planner(0.05, Budget(1, 2), threads=1), WIRES, {"decision_period": 0.05}),
+}  # fmt: skip
+"""Agents that need the state of robots that swim: what makes one, its scene and arguments of its environment."""
+SCRIPTED = {
+    **{f"{name} in {mode}": (lambda name=name, mode=mode: scripted(name, mode)) for mode in ("limbs", "joint", "pairs")
+       for name in ("pentagon", "4+,1-", "random")},
+    **{name: named(name, 0.1) for name in GAITS},
+    "random in continuous": lambda: scripted("random", "continuous"),
+}  # fmt: skip
+BLIND = {**SCRIPTED, **{name: (lambda file=file: load(file)) for name, file in by_name().items()}}
+"""Agents that are shown numbers drawn at random."""
+AGENTS = [*BLIND, *SEARCHING, *(f"model in {actions}" for actions in LEARNERS)]
+
+
+@pytest.fixture
+def shown(request, trained):
+    """An agent, and what its robots see in some decisions, shape (N_DECISIONS, N_ROBOTS, size)."""
+    name = request.param
+    if name in SEARCHING:
+        make, scene, more = SEARCHING[name]
+        policy = make()
+        batch = gym.make_vec(
+            "SeastarSwim-v0", N_ROBOTS, vectorization_mode="vector_entry_point", threads=1, path="random", scene=scene,
+            random_heading=True, actions="continuous", **more,
+        )  # fmt: skip
+        batch.action_space.seed(4)
+        seen = [batch.reset(seed=3)[0], *(batch.step(batch.action_space.sample())[0] for _ in range(N_DECISIONS - 1))]
+        return policy, np.array(seen)
+    policy = BLIND[name]() if name in BLIND else load_agents([str(trained[1][name.split()[-1]])])["model"]
+    size = policy.description.observation_size if hasattr(policy, "description") else 186
+    return policy, np.random.default_rng(0).normal(size=(N_DECISIONS, N_ROBOTS, size)).astype(np.float32)
+
+
+def decisions(policy, seen, begun):
+    """Actions in a row; some robots begin an episode with the last decision but one."""
+    state, actions = None, []
+    for k, observation in enumerate(seen):
+        action, state = policy.predict(observation, state, begun if k == N_DECISIONS - 2 else None, deterministic=True)
+        actions.append(action)
+    return np.array(actions)
+
+
+@pytest.mark.parametrize("shown", AGENTS, indirect=True)
+def test_an_agent_decides_the_same_again_for_one_robot_and_for_many(shown):
+    """Whatever begins a new episode beside it; a copy does so, too. What no robot sees is refused."""
+    policy, seen = shown
+    for wrong in (np.zeros((1, 1, 186), np.float32), np.float32(1.0), np.zeros((2, 186), bool)):
+        if type(policy).__module__.startswith("seastar_gym"):  # others say what they like
+            with assert_refused("bservation"):
+                policy.predict(wrong)
+    copy, begun = deepcopy(policy), np.array([False, True, False, True])
+    together = decisions(policy, seen, begun)
+    np.testing.assert_array_equal(decisions(copy, seen, begun), together)
+    space = action_space(actions_of(policy, 5), 5)
+    assert together.shape == (N_DECISIONS, N_ROBOTS, *space.shape)
+    assert all(action in space for action in together.reshape(-1, *space.shape))
+    if isinstance(policy, RandomPolicy):
+        return
+    for robot in range(N_ROBOTS):
+        alone = decisions(policy, seen[:, robot], begun[robot : robot + 1])
+        np.testing.assert_array_equal(alone, together[:, robot])
+    anew = decisions(policy, seen[1:], None)
+    np.testing.assert_array_equal(anew[:, begun], together[1:, begun])
+
+
+# Models of Stable-Baselines3
+
+
+@pytest.mark.parametrize("actions", LEARNERS)
+def test_a_model_acts_and_swims_as_it_did_when_it_was_saved(actions, trained):
+    model, file = (of[actions] for of in trained)
+    (policy,) = load_agents([str(file)]).values()
+    observations = np.random.default_rng(0).normal(size=(50, 186)).astype(np.float32)
+    acted, expected = (each.predict(observations, deterministic=True)[0] for each in (policy, model))
+    np.testing.assert_array_equal(acted, expected)
+    alone = swim("mine", policy, SeastarSwimEnv(actions=actions, scene=FAST), max_strokes=4)
+    for done in swim_many("mine", model, "pentagon", 2, FAST, max_strokes=4, threads=1):
+        np.testing.assert_allclose(done.hub, alone.hub, atol=1e-12)
+
+
+@pytest.mark.parametrize("actions", LEARNERS)
+def test_a_model_of_another_robot_or_mode_is_refused_before_the_first_stroke(actions, trained):
+    of_four, env = train(actions, FOUR).policy, SeastarSwimEnv(actions=actions, scene=FAST)
+    with assert_refused("sees observations of shape (150,), the environment's have (186,)"):
+        swim("mine", of_four, env, max_strokes=1)
+    with assert_refused("acts in"):
+        swim_many("mine", of_four, "line", 2, FAST, threads=1)
+    other: Actions = {"limbs": "joint", "pairs": "limbs", "joint": "pairs"}[actions]
+    with assert_refused("The policy acts in", f'actions="{other}"'):
+        swim("mine", trained[0][actions], SeastarSwimEnv(actions=other, scene=FAST), max_strokes=1)
+
+
+# Bundled policies
+
+
+@pytest.mark.parametrize("name, file", by_name().items(), ids=by_name())
+def test_a_bundled_policy_fits_its_robot_and_mode_alone(name, file):
+    policy = load(file)
+    about = policy.description
+    own = about.scene, about.actions, about.decision_period, about.observation_size
+    task = None if about.task is None else deepcopy(challenge_of(about.task))
+    require_fit(policy, *own, task)
+    for change, words in (
+        ((replace(about.scene, robot=Seastar(n_limbs=4)), *own[1:]), "robot of 5 limbs, the environment's has 4."),
+        ((own[0], "continuous", *own[2:]), "takes actions=\"continuous\"."),
+        ((*own[:3], 3), "the environment shows 3"),
+        ((*own[:2], 0.3, own[3]), "make them equal"),
+    ):  # fmt: skip
+        with assert_refused(words):
+            require_fit(policy, *change, task)
+
+
+def challenge_of(name):
+    from seastar_gym.envs.tasks.envs import CHALLENGES
+
+    return CHALLENGES[name]
