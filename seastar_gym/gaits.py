@@ -166,8 +166,8 @@ ALONG = (
     (0.0, -0.13), (0.0, -0.45), (0.0, 0.0),
 )  # fmt: skip
 """Evolved gait along limb 1: shares of a pulse of limbs 2 and 3; limbs 5 and 4 do the opposite. It is that of
-docs/results/gaits/gaits.json with slots of 0.05 s and a price of 0.5 mm/J, its pulses parted where they are longer than
-a slot."""
+docs/results/gaits/gaits.json at commit 055100c4 with slots of 0.05 s and a price of 0.5 mm/J, its pulses parted where
+they are longer than a slot."""
 AWAY = (
     (-0.5, 0.0), (-0.35, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.31, 0.0), (0.0, 0.0), (0.0, -0.5),
     (0.0, -0.47), (0.0, -0.5), (0.0, -0.21), (0.0, -0.14), (0.0, 0.0), (0.0, 0.5), (0.0, 0.29), (0.5, 0.13),

@@ -1,4 +1,4 @@
-"""Robots on a GPU: the bits of the processor, speed over the size of the batch, compilation, and a learner.
+"""Robots on a GPU: the bits of the processor, speed over the size of the batch, and a learner.
 
 Every scene is swum on the processor and on the device with the same random commands, and compared to the last bit.
 So are environments whose observations stay on the device.
@@ -34,15 +34,18 @@ from seastar_gym.scene import (
     Seastar,
     SmaPulse,
     SmaWires,
+    Stiffening,
     ThermalSma,
+    relaxation_time,
 )
+from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
+from seastar_gym.scene.fluid import Water
 from seastar_gym.scene.numerics import Fidelity, SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simulator import Simulator
-from studies.frame import Results, Study, rounded
+from studies.frame import Results, Study, require_known, rounded
+from studies.operations import count_operations, numbers_moved
 from studies.pages import markdown
-from studies.speed.operations import count_operations, numbers_moved
-from studies.speed.terms import scenes as scenes_of_terms
 from studies.style import CYCLE, FAINT, subplots
 
 PRESETS: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
@@ -51,47 +54,73 @@ LONGEST = 4.0
 """A batch whose stroke takes longer than this [s] is the largest one, from USUAL robots on."""
 USUAL, DECIDING = 4096, 65536
 N_ROBOTS, N_STROKES = 64, 3
-"""Robots that are compared with the processor's, if a scene has no number of its own, and their strokes."""
+"""Robots that are compared with the processor's, and their strokes."""
 EVERYTHING = "all, a body, bent along, contact"
 ON_DEVICE = "cuda, observations left there"
 LEARNER: dict[str, Any] = {"n_steps": 8, "batch_size": 8192, "n_epochs": 4}
 ROBOTS_OF_LEARNER, ROUNDS_OF_LEARNER = 4096, 4
+ROBOTS_OBSERVED, EPISODE = 35, 3
+"""Robots of an environment that is compared, and decisions of its episodes."""
+NOT_ON_DEVICES = "energy_growth"
+"""Field of a report that only the processor knows."""
+
+
+def swirl(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Velocity of a cellular current [m/s] at positions x, y [m]."""
+    return 0.02 * np.sin(10.0 * x) * np.cos(10.0 * y), -0.02 * np.cos(10.0 * x) * np.sin(10.0 * y)
 
 
 def scenes() -> dict[str, Scene]:
     """Scenes that are compared, by name: every term, scheme, preset and kind of actuator, and other robots."""
-    of_terms = scenes_of_terms()
-    chapter, everything = of_terms["the chapter's scene"], of_terms[EVERYTHING]
-    found = dict(of_terms)
+    contact, rectangle = Contact(), Body.rectangle(0.06, 0.03)
+    chapter = Scene(Seastar(nodes_per_limb=10), numerics=Numerics())
+    of, robot = partial(replace, chapter), partial(replace, chapter.robot)
+    grid = GridCurrent.from_function(swirl, (-1.0, 1.0), (-1.0, 1.0), 0.02)
+    water = Water(tangential_drag_coefficient=0.02, added_mass_coefficient=1.0, current=grid)
+    silicone = relaxation_time(0.1, 10.0)  # of a soft one's loss factor, 0.1 at 10 Hz
+    of_each = {"youngs_modulus": np.full(N_ROBOTS, 1e6), "relaxation_time": silicone}
+    along: dict[str, Any] = {"along": AlongLimb(), "stiffening": Stiffening()}
+    everything = of(robot=robot(**of_each, **along, body=rectangle), fluid=water, contact=contact)
+    row = Body.rectangle(0.06, 0.03, attachments=(Attachment(0.02, 0.0, 0.0), Attachment(-0.02, 0.0, np.pi)))
+    found = {
+        "the chapter's scene": chapter,
+        "no fluid": of(fluid=None),
+        "drag along limbs": of(fluid=Water(tangential_drag_coefficient=0.02)),
+        "uniform current": of(fluid=Water(current=UniformCurrent(0.01, 0.0))),
+        "shear": of(fluid=Water(current=ShearCurrent(0.1))),
+        "vortex": of(fluid=Water(current=Vortex(0.01, 0.2, 0.2))),
+        "current on a grid": of(fluid=Water(current=grid)),
+        "added mass": of(fluid=Water(added_mass_coefficient=1.0)),
+        "material damping": of(robot=robot(relaxation_time=silicone)),
+        "bent along the limbs": of(robot=robot(along=AlongLimb())),
+        "bent along, stiff when hot": of(robot=robot(**along)),
+        "a disc for a body": of(robot=robot(body=Body(radius=0.02))),
+        "a rectangle for a body": of(robot=robot(body=rectangle)),
+        "joints of the limbs": of(robot=robot(limbs=(Limb(joint_stiffness=2e-4),) * 5)),
+        "contact, limbs apart": of(contact=contact),
+        "a rectangle for a body, contact": of(robot=robot(body=rectangle), contact=contact),
+        "numbers of each robot": of(robot=robot(youngs_modulus=np.full(N_ROBOTS, 1e6))),
+        "all of these": of(robot=robot(**of_each), fluid=water),
+        EVERYTHING: everything,
+        "adapted steps": of(numerics=Numerics("implicit-midpoint", 0.005, path_tolerance=0.02)),
+        "wires": of(actuator=SmaWires()),
+        "thermal": of(actuator=ThermalSma()),
+        "limited": of(actuator=Limited(SmaPulse(), 0.5, 3.0)),
+        "pulses of each robot": of(actuator=SmaPulse(peak_angle=np.linspace(0.2, 0.5, N_ROBOTS))),
+        "three limbs": Scene(robot(n_limbs=3)),
+        "eight limbs in contact": Scene(robot(n_limbs=8), contact=contact),
+        "unequal limbs": Scene(robot(limbs=(Limb(length=0.08), *[Limb()] * 4))),
+        "hub hinges": Scene(robot(discretisation="chapter")),
+        "limbs in a row on a body": Scene(robot(n_limbs=2, along=AlongLimb(), body=row)),
+        "held nodes, loads": Scene(chapter.robot, fluid=None, held_nodes=(0, 1), loads=((9, 0.0, 1e-3),)),
+        "weak limbs": of(limb_strengths=(1.0, 0.5, 0.0, 1.0, 0.8)),
+    }
     for scheme in get_args(SchemeName):
-        stepped = Numerics(scheme, 0.005)
-        found[f"{scheme}"] = replace(chapter, numerics=stepped)
-        found[f"{scheme}, {EVERYTHING}"] = replace(everything, numerics=stepped)
-    found["adapted steps"] = replace(chapter, numerics=Numerics("implicit-midpoint", 0.005, path_tolerance=0.02))
+        found[scheme] = of(numerics=Numerics(scheme, 0.005))
+        found[f"{scheme}, {EVERYTHING}"] = replace(everything, numerics=Numerics(scheme, 0.005))
     for preset in (*PRESETS, "accurate", "chapter"):
         found[f"preset {preset}"] = Scene.preset(preset)
-        if preset in PRESETS:
-            found[f"preset {preset}, contact"] = replace(Scene.preset(preset), contact=Contact())
-    actuators = {
-        "wires": SmaWires(), "thermal": ThermalSma(), "limited": Limited(SmaPulse(), 0.5, 3.0),
-        "pulses of each robot": SmaPulse(peak_angle=np.linspace(0.2, 0.5, N_ROBOTS)),
-    }  # fmt: skip
-    found |= {name: replace(chapter, actuator=actuator) for name, actuator in actuators.items()}
-    robots = {
-        "three limbs": Seastar(n_limbs=3, nodes_per_limb=10),
-        "eight limbs in contact": Seastar(n_limbs=8, nodes_per_limb=10),
-        "unequal limbs": Seastar(nodes_per_limb=10, limbs=(Limb(length=0.08), *[Limb()] * 4)),
-        "hub hinges": Seastar(nodes_per_limb=10, discretisation="chapter"),
-        "limbs in a row on a body": Seastar(
-            nodes_per_limb=10, n_limbs=2, along=AlongLimb(), body=Body.rectangle(
-                0.06, 0.03, attachments=(Attachment(0.02, 0.0, 0.0), Attachment(-0.02, 0.0, np.pi))
-            ),
-        ),
-    }  # fmt: skip
-    for name, robot in robots.items():
-        found[name] = Scene(robot, contact=Contact() if "contact" in name else None)
-    held = Scene(Seastar(nodes_per_limb=10), fluid=None, held_nodes=(0, 1), loads=((9, 0.0, 1e-3),))
-    return found | {"held nodes, loads": held, "weak limbs": replace(chapter, limb_strengths=(1.0, 0.5, 0.0, 1.0, 0.8))}
+    return found | {f"preset {name}, contact": replace(Scene.preset(name), contact=contact) for name in PRESETS}
 
 
 def commands_of(scene: Scene, n_robots: int, n_strokes: int) -> NDArray[np.float64]:
@@ -101,35 +130,19 @@ def commands_of(scene: Scene, n_robots: int, n_strokes: int) -> NDArray[np.float
     return commands
 
 
-ROBOTS_OBSERVED, EPISODE = 35, 3
-"""Robots of an environment that is compared, and decisions of its episodes."""
-NOT_ON_DEVICES = "energy_growth"
-"""Field of a report that only the processor knows."""
-
-
 def compared(name: str, device: str) -> dict[str, Any]:
-    """How a scene swims on the device: whether all bits are the processor's, and what its code cost.
-
-    seconds: Processor time of the device's first stroke, with all compilation, and that of the processor's own.
-    """
+    """How a scene swims on the device: whether all bits are the processor's, and names of what differs."""
     scene = scenes()[name]
-    n_robots = scene.n_robots or N_ROBOTS
-    both = Simulator(scene, n_robots, threads=1), Simulator(scene, n_robots, device=device)
+    both = Simulator(scene, N_ROBOTS, threads=1), Simulator(scene, N_ROBOTS, device=device)
     differing: set[str] = set()
-    seconds: dict[str, float] = {}
-    for commands in commands_of(scene, n_robots, N_STROKES):
-        reports = []
-        for simulator in both:
-            began = time.process_time()
-            reports.append(simulator.stroke(commands))
-            seconds.setdefault(simulator.device, rounded(time.process_time() - began, 3))
-        seen = [
-            {**report._asdict(), **simulator.get_state()._asdict(), "elastic_energy": simulator.elastic_energy()}
-            for simulator, report in zip(both, reports, strict=True)
-        ]
-        differing |= {key for key in seen[0] if key != NOT_ON_DEVICES and not same(seen[0][key], seen[1][key])}
-    failed = int(both[0].failed.sum())
-    return {"same": not differing, "differing": sorted(differing), "failed": failed, "seconds": seconds}
+    for commands in commands_of(scene, N_ROBOTS, N_STROKES):
+        here, there = (
+            {**simulator.stroke(commands)._asdict(), **simulator.get_state()._asdict(),
+             "elastic_energy": simulator.elastic_energy()}
+            for simulator in both
+        )  # fmt: skip
+        differing |= {key for key in here if key != NOT_ON_DEVICES and not same(here[key], there[key])}
+    return {"same": not differing, "differing": sorted(differing), "failed": int(both[0].failed.sum())}
 
 
 def environments() -> dict[str, dict[str, Any]]:
@@ -215,7 +228,6 @@ def batches(preset: Fidelity, contact: bool, device: str) -> dict[str, dict[str,
             "steps_per_second": rounded(steps / seconds), "seconds": rounded(seconds),
             "iterations_per_step": rounded(iterations / steps), "failed": int(simulator.failed.sum()),
         }  # fmt: skip
-        print(preset, "contact" * contact, device, n_robots, row[str(n_robots)], flush=True)
     return row
 
 
@@ -287,21 +299,24 @@ class Options:
 
     device: str = "cuda"
     """"cuda", or "scalar", which compares bits alone."""
+    compared: tuple[str, ...] = (*scenes(), *environments())
+    """Scenes and environments that are compared."""
+
+    def __post_init__(self) -> None:
+        require_known("scene", self.compared, (*scenes(), *environments()))
 
 
 def run(options: Options, results: Results) -> str | None:
-    """Compare all scenes, and measure, but for what is in the file; what is measured is kept at once."""
+    """Compare scenes and environments, and measure, but for what is in the file; what is measured is kept at once."""
     if options.device == "cuda":
         results["gpu"] = gpu()
-    context = multiprocessing.get_context("spawn")
     bits, observations = results.setdefault("bits", {}), results.setdefault("observations", {})
-    with ProcessPoolExecutor(mp_context=context) as pool:
+    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
         for kept, compare, ours in ((bits, compared, scenes()), (observations, observed, environments())):
-            missing = [name for name in ours if name not in kept]
+            missing = [name for name in ours if name in options.compared and name not in kept]
             for name, found in zip(missing, pool.map(compare, missing, [options.device] * len(missing)), strict=True):
                 kept[name] = found
-                told = "same bits" if found["same"] else ", ".join(found["differing"])
-                print(name, told, found.get("seconds", ""), sep=": ", flush=True)
+                print(name, "same bits" if found["same"] else ", ".join(found["differing"]), sep=": ", flush=True)
                 results.save()
     if options.device == "cuda":
         measure(results)
@@ -313,15 +328,15 @@ def measure(results: Results) -> None:
     """Speed of the GPU and of the processor beside it."""
     results["bandwidth"] = rounded(bandwidth())
     results["traffic"] = {preset: traffic(preset) for preset in PRESETS}
-    devices = ("cuda", "cpu")
-    cells: dict[tuple[str, ...], Callable[[], Any]] = {
-        ("speed", f"{preset}{', contact' * contact}", device): partial(batches, preset, contact, device)
-        for preset, contact, device in product(PRESETS, (False, True), devices)
-    }
-    cells |= {("environment", device): partial(decisions, device) for device in devices}
-    cells |= {("learner", device): partial(learning, device) for device in devices}
     results.save()
-    results.fill(cells | {("environment", ON_DEVICE): partial(decisions, "cuda", on_device=True)}, str)
+    cells: dict[tuple[str, ...], Callable[[], Any]] = {("environment", ON_DEVICE): partial(decisions, "cuda", True)}
+    for device in ("cuda", "cpu"):
+        for preset, contact in product(PRESETS, (False, True)):
+            name = f"{preset}{', contact' * contact}"
+            cells["speed", name, device] = partial(batches, preset, contact, device)
+        cells["environment", device] = partial(decisions, device)
+        cells["learner", device] = partial(learning, device)
+    results.fill(cells, str)
 
 
 def share_of_bandwidth(results: Mapping[str, Any], preset: str, n_robots: str) -> float:
@@ -372,12 +387,7 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
     save_figure(figure, path)
 
 
-def settings(options: Options) -> dict[str, Any]:
-    """What all numbers of a file have in common."""
-    return {"device": options.device, "robots": N_ROBOTS, "strokes": N_STROKES}
-
-
 STUDY = Study(
-    "gpu", run, Options, file="speed/gpu.json", out=Path("runs/gpu"), settings=settings,
-    pictures={"gpu.png": draw}, tables={"gpu": speeds},
+    "gpu", run, Options, "speed/gpu.json", Path("runs/gpu"), pictures={"gpu.png": draw}, tables={"gpu": speeds},
+    settings=lambda options: {"device": options.device, "robots": N_ROBOTS, "strokes": N_STROKES},
 )  # fmt: skip

@@ -29,7 +29,7 @@ def commands(folder: str) -> list[str]:
     return [name.removesuffix(".__main__") for name in names]
 
 
-STUDIES, AGENTS = ("studies", "studies.tasks", "studies.scenes.gallery"), commands("agents")
+STUDIES, AGENTS = ("studies", "studies.tasks", "studies.gallery"), commands("agents")
 
 
 def python(tmp_path, missing, *arguments):
@@ -98,7 +98,7 @@ WITHOUT = [
     *(("train", OF_TRAIN, ("-m", command, "--help")) for command in AGENTS),
     *(("train", missing, ("train.py", "--help"))
       for missing in (("tyro",), ("tensorboard",), ("torch", "stable_baselines3"), ("plotly",))),
-    ("train", ("torch", "stable_baselines3"), ("-m", "studies.learning.robustness", "--help")),
+    ("train", ("torch", "stable_baselines3"), ("-m", "studies.robustness")),
     ("sweep", ("pyarrow",), ("-m", "seastar_gym.sweep", "--help")),
     ("studies", ("matplotlib",), ("-m", "seastar_gym.identify", "--synthetic", "--picture", "fit.png")),
     ("render", ("pygame",), ("-c", PICTURE)),
@@ -142,7 +142,7 @@ def test_an_executor_without_its_extra_says_how_to_get_it(extra, module, tmp_pat
 
 
 def test_importing_a_study_without_its_extra_is_a_missing_module(tmp_path):
-    code = "import studies.speed.terms"
+    code = "import studies.operations"
     done = python(tmp_path, ("rich",), "-c", code)
     assert done.stderr.splitlines()[-1] == (
         'seastar_gym.extras.MissingExtra: The studies need rich: pip install "seastar-gym[studies]".'

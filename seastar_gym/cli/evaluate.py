@@ -67,7 +67,7 @@ def parser() -> argparse.ArgumentParser:
     report.add_argument("--runs", nargs="+", type=Path, default=[], help="trainings (default: those of learned agents)")
     report.add_argument("--trials", type=Path, help="CSV file that --sets wrote")
     bound = Path("docs/results/learning/bound.json")
-    report.add_argument("--bound", type=Path, default=bound, help=f"results of studies.learning.bound {DEFAULT}")
+    report.add_argument("--bound", type=Path, default=bound, help=f"JSON file of speeds by direction {DEFAULT}")
     many = found.add_argument_group("many swims")
     many.add_argument("--sets", nargs="+", choices=SETS, help="named paths; random paths or the pentagon, disturbed")
     many.add_argument("--swims", type=int, default=1000, help=f"number of random paths of every set {DEFAULT}")

@@ -26,8 +26,8 @@ Kernels are called by entry points alone, or one by one as plain Python: `drag_s
 ask of a processor is listed in numpy_lanes.py. NUMBA_DISABLE_JIT=1 runs everything so, in any debugger, thousands of
 times slower.
 
-Work of a Newton iteration of the chapter's discretisation (46 nodes), counted by studies.speed.operations; shares of
-the time are those of an AVX-512 processor, `python -m studies.speed.throughput` measures them on any:
+Work of a Newton iteration of the chapter's discretisation (46 nodes), counted by studies/operations.py; shares of
+the time are those of an AVX-512 processor, by `python -m studies.speed.throughput` at commit 055100c4:
 
 part            kflop   time    what
 hub hinges       0.2     3 %    root edges, five hinges, their couplings (potential.py)

@@ -15,7 +15,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from seastar_gym.simd.compilation import kept_code
 from seastar_gym.simd.device import ALL_ROBOTS, I64, PARAMETERS, Program
 
-TRIPLE, ARCHITECTURE, VERSION = "nvptx64-nvidia-cuda", "sm_70", "ptx70"  # studies/gpu_code.py: assembled for newer
+TRIPLE, ARCHITECTURE, VERSION = "nvptx64-nvidia-cuda", "sm_70", "ptx70"  # drivers assemble it for newer
 THREADS = 64
 """Threads of a block, a choice: 32 to 128 are alike."""
 I32 = ir.IntType(32)

@@ -1,6 +1,5 @@
 """Agents that decide several times a second: gaits, evaluation, planner, training and policies."""
 
-import json
 from dataclasses import replace
 
 import gymnasium as gym
@@ -27,10 +26,8 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.results import as_text
-from seastar_gym.evaluation.statistics import mean_with_interval
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import lagged_gait, straight_gait, thrifty_gait, timed, turning_wave
-from studies.frame import DOCS
 from symmetries import assert_equivariant
 
 PERIODS = (0.5, 0.2, 0.1)
@@ -267,31 +264,3 @@ def test_a_swim_is_counted_in_decisions_unless_they_take_a_second():
         assert done.counted_in == word and done.result == f"{done.strokes} {word}"
         assert as_text([done]).split()[0] == word
         assert replace(done, waypoints=np.ones((7, 2))).result == "1 of 7 waypoints"
-
-
-# All trainings in time
-
-
-def all_trainings():
-    """Results of every training by its seed, as docs/results.md has them."""
-    return json.loads((DOCS / "results" / "learning" / "in_time.json").read_text(encoding="utf-8"))["runs"]
-
-
-def test_no_seed_is_left_out_of_the_committed_results():
-    assert all(list(found) == [str(seed) for seed in range(len(found))] for found in all_trainings().values())
-
-
-@pytest.mark.parametrize("page", ["results.md", "training.md"])
-def test_pages_beside_the_study_quote_its_mean_of_ten_seeds(page):
-    """The fastest training stands beside all ten, and each is named once."""
-    runs = all_trainings()["0.2 s, coasting"]
-    text = (DOCS / page).read_text(encoding="utf-8")
-    seconds = {
-        fidelity: np.array([run["pentagon"][fidelity]["seconds"] for run in runs.values()])
-        for fidelity in ("fast", "balanced", "reference")
-    }
-    shown = ["{:.1f} [{:.1f}, {:.1f}] s".format(*mean_with_interval(each)) for each in seconds.values()]
-    if page == "results.md":
-        assert f"| 0.2 s | {' | '.join(shown)} |" in text
-        assert "seed 1 |" not in text
-    assert f"{seconds['fast'].mean():.1f}" in text

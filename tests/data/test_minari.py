@@ -137,7 +137,7 @@ def test_the_tasks_have_datasets_of_three_qualities_by_one_command(tmp_path, mon
     from studies.command import main as make
 
     monkeypatch.setenv("MINARI_DATASETS_PATH", "")
-    arguments = ["tasks.data", "--tasks", "SeastarPrey-v0", "--episodes", "2", "--out", str(tmp_path)]
+    arguments = ["tasks", "--tasks", "SeastarPrey-v0", "--episodes", "2", "--out", str(tmp_path)]
     assert make(arguments) == 0
     names = [f"SeastarPrey/{quality}-v0" for quality in ("random", "greedy", "learned")]
     assert set(names) <= set(minari.list_local_datasets())

@@ -26,10 +26,13 @@ from seastar_gym import (
     Uniform,
 )
 from seastar_gym.envs.buffers import Buffers
+from seastar_gym.envs.pictures import observing
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simd import cuda
+from seastar_gym.simd.compilation import kept_code
+from seastar_gym.simd.device import Program
 from seastar_gym.simulator import device_batch
-from seastar_gym.simulator.device_batch import DEVICES, DeviceBatch
+from seastar_gym.simulator.device_batch import DEVICES, DeviceBatch, program_of
 from seastar_gym.sweep.axes import Choices
 from seastar_gym.sweep.command import main as sweep_command
 from seastar_gym.sweep.designs import Sweep
@@ -45,7 +48,6 @@ from studies.gpu import (
     on_processor,
     scenes,
 )
-from studies.gpu_code import code_of, code_of_observations
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="devices have compiled code alone")
 
@@ -293,6 +295,15 @@ EXACT = re.compile(r"(neg|abs|mov|selp|min|max|setp\.\w+|cvt\.(rmi|rzi)(\.s64|\.
 """Whole numbers become floating-point ones without rounding: none is above 2^53."""
 
 
+def kept(program: Program) -> str:
+    return kept_code(f"{program.key}-{cuda.ARCHITECTURE}.ptx", lambda: cuda.ptx_of(program).encode()).decode()
+
+
+def code_of_observations(scene: Scene) -> str:
+    batch = DeviceBatch(scene, 1, "scalar", effort=False)
+    return kept(batch.filling(*observing(batch.coefficients, scene.robot, np.zeros((1, 4)))))
+
+
 CODES = {scheme: replace(SMALL, numerics=Numerics(scheme, 0.005)) for scheme in get_args(SchemeName)}
 
 
@@ -302,7 +313,7 @@ CODES = {scheme: replace(SMALL, numerics=Numerics(scheme, 0.005)) for scheme in 
     ids=[*CODES, "everything"],
 )
 def test_the_code_for_gpus_rounds_every_operation_by_itself_and_calls_nothing(scene):
-    assert_strict(code_of(scene))
+    assert_strict(kept(program_of(scene)))
 
 
 @pytest.mark.parametrize("name", ["three limbs", "eight limbs in contact", "limbs in a row on a body"])

@@ -52,7 +52,7 @@ class Remarks:
     curves: Sequence[Curve] = ()
     tables: Sequence[ResultsTable] = ()
     bound: Mapping[str, Any] | None = None
-    """Results of studies.learning.bound."""
+    """Speeds of gaits by direction, as `read_bound` has them."""
 
 
 def write_report(
@@ -134,7 +134,7 @@ def trials_table(file: Path) -> ResultsTable:
 
 
 def read_bound(file: Path) -> dict[str, Any]:
-    """The JSON that studies.learning.bound wrote. ValueError: it is none."""
+    """Speeds by direction, in the form of docs/results/learning/bound.json. ValueError: it has another."""
     found = read_json(file)
     match found:
         case {"fidelity": str(), "directions_deg": list(directions), "mm_per_stroke": dict(speeds)} if directions:
@@ -142,7 +142,7 @@ def read_bound(file: Path) -> dict[str, Any]:
             sound = all(isinstance(row, list) and all(map(is_finite_number, row)) for row in rows)
             if sound and {len(row) for row in rows} == {len(directions)}:
                 return dict(found)
-    raise ValueError(f"{file} is no result of studies.learning.bound.")
+    raise ValueError(f"{file} is no file of speeds by direction, such as docs/results/learning/bound.json.")
 
 
 def _cell(row: Row, name: str) -> str:

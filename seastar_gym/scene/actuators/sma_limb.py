@@ -14,7 +14,7 @@ logistic in temperature, less that in cold water, and 1 at most:
 The limb rotates by the peak angle times share_+ - share_-. A measured limb is bent at rest, and its wire straightens it
 from the rest curvature by curvature_change * share.
 
-`python -m studies.measurements.limbs` fits the numbers to 48 measured curves of limbs in water and says how far each
+`python -m studies.fit` fits the numbers to 48 measured curves of limbs in water and says how far each
 curve is from its fit. The repeated pulse of any period follows from them, warm wires included. The curves are of the
 repository `softmachineslab/frog`, which states no licence; the package has the fitted numbers alone.
 """
@@ -57,7 +57,7 @@ MEASURED: dict[int, Measured] = {
     40: Measured(121.2, 81.0, 11.55, 18.05, 0.839, 0.0139, 0.0177),
     50: Measured(118.2, 77.9, 10.37, 13.41, 0.628, 0.0158, 0.0151),
 }
-"""Fits of `python -m studies.measurements.limbs`, by volume fraction of liquid metal in the limb's elastomer [%].
+"""Fits of `python -m studies.fit`, by volume fraction of liquid metal in the limb's elastomer [%].
 
 Root mean square error over the peak of the curve: 0.026, 0.027, 0.033 and 0.030 up to 30 %, 0.050 at 40 % and 0.065 at
 50 %. Limbs of 40 and 50 % were measured at high frequencies only, that is warm: by these fits the first pulses hardly

@@ -16,10 +16,10 @@ phase the temperature is monotone, so xi = clip(xi_0, up(T), down(T)) at any tim
 times xi_+ - xi_-. Latent heat and the heat of the limb are neglected.
 
 The defaults make a full command come closest to the pulse of Fig. 13.5b, from rest and in later strokes, rounded;
-`python -m studies.scenes.thermal` fits them. The deviation is 6 to 7 % of the peak angle in the root mean square and
-16 % at most, at the end of a stroke, where an exponential has a tail and the pulse has none. Latent heat, gradual
-transformation, natural convection or a shorter pulse reduce it to 5.3 % at best, and are not modelled. The defaults are
-effective numbers, not those of one alloy.
+`python -m studies.scenes.thermal` at commit 055100c4 fitted them. The deviation is 6 to 7 % of the peak angle in the
+root mean square and 16 % at most, at the end of a stroke, where an exponential has a tail and the pulse has none.
+Latent heat, gradual transformation, natural convection or a shorter pulse reduce it to 5.3 % at best, and are not
+modelled. The defaults are effective numbers, not those of one alloy.
 """
 
 import math

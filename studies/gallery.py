@@ -83,13 +83,13 @@ EXHIBITS = (
 """Scenes of the gallery, the default first."""
 
 
-def measure_costs(shown: Sequence[Exhibit], rounds: int = ROUNDS, n_robots: int = ROBOTS) -> tuple[Floats, Floats]:
+def measure_costs(shown: Sequence[Exhibit]) -> tuple[Floats, Floats]:
     """Processor time of a stroke relative to the first scene, and Newton iterations per step, shape (n_scenes,)."""
-    simulators = [Simulator(exhibit.scene, n_robots, threads=1) for exhibit in shown]
-    seconds, per_step = np.zeros((rounds, len(shown))), np.zeros((rounds, len(shown)))
-    for k in range(-1, rounds):  # the first round compiles
+    simulators = [Simulator(exhibit.scene, ROBOTS, threads=1) for exhibit in shown]
+    seconds, per_step = np.zeros((2, ROUNDS, len(shown)))
+    for k in range(-1, ROUNDS):  # the first round compiles
         for i, simulator in enumerate(simulators):
-            commands = np.random.default_rng(k + 1).integers(-1, 2, (n_robots, simulator.scene.robot.n_limbs))
+            commands = np.random.default_rng(k + 1).integers(-1, 2, (ROBOTS, simulator.scene.robot.n_limbs))
             begin = time.process_time()
             report = simulator.stroke(commands)
             if k >= 0:
@@ -121,11 +121,11 @@ def draw_sections(axes: Any, section: AnySection) -> None:
         axes.text(x, -122.0, f"{LARGER:.0f} : 1" if same else name, color=INK, fontsize=8, ha="center")
 
 
-def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
-    """Draw the robot at rest and at the end of the first heating, and its hub's path over some strokes."""
+def draw(exhibit: Exhibit, file: Path) -> None:
+    """Draw the robot at rest and at the end of the first heating, and its hub's path over STROKES."""
     simulator, robot = Simulator(exhibit.scene, threads=1), exhibit.scene.robot
     shapes, hub = [simulator.positions[0]], [np.zeros(2)]
-    for _ in range(strokes):
+    for _ in range(STROKES):
         for since in simulator.stroke_in_parts([exhibit.command], 20):
             hub.append(simulator.hub_position()[0])
             if len(shapes) == 1 and since >= exhibit.scene.actuator.corners[1] - 1e-9:
@@ -161,25 +161,17 @@ def _file_name(exhibit: Exhibit) -> str:
     return exhibit.name.replace(" ", "_") + ".png"
 
 
-def draw_all(out: Path, strokes: int = STROKES) -> None:
-    """Write the pictures into a folder."""
-    out.mkdir(parents=True, exist_ok=True)
-    for exhibit in EXHIBITS:
-        draw(exhibit, out / _file_name(exhibit), strokes)
-
-
-def measured(rounds: int = ROUNDS, n_robots: int = ROBOTS) -> dict[str, Any]:
-    """Costs of all scenes as plain data."""
-    found = zip(EXHIBITS, *measure_costs(EXHIBITS, rounds, n_robots), strict=True)
-    scenes = {one.name: {"cost": round(cost, 3), "iterations_per_step": round(each, 3)} for one, cost, each in found}
-    return {"scenes": scenes}
-
-
 def run(results: Results) -> None:
     """Draw the pictures into docs/gallery, or where --out says, and measure the costs."""
     folder = results.out.parent if results.out.suffix else results.out
-    draw_all(Path("docs/gallery") if results.out == STUDY.default_out else folder)
-    results.update(measured())
+    folder = Path("docs/gallery") if results.out == STUDY.default_out else folder
+    folder.mkdir(parents=True, exist_ok=True)
+    for exhibit in EXHIBITS:
+        draw(exhibit, folder / _file_name(exhibit))
+    found = zip(EXHIBITS, *measure_costs(EXHIBITS), strict=True)
+    results["scenes"] = {
+        one.name: {"cost": round(cost, 3), "iterations_per_step": round(each, 3)} for one, cost, each in found
+    }
 
 
-STUDY = Study("scenes.gallery", run, file="gallery/gallery.json", tables={"gallery": table})
+STUDY = Study("gallery", run, file="gallery/gallery.json", tables={"gallery": table})

@@ -27,7 +27,7 @@ from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator
 from studies.frame import Floats, Results, Study
 
-TEMPLATE = Path(__file__).with_name("page.html")
+TEMPLATE = Path(__file__).with_suffix(".html")
 UNIT = 1e-4
 """[m]: positions are kept as whole numbers of tenths of a millimetre."""
 FRAMES_PER_SECOND = 10
@@ -153,4 +153,4 @@ def run(results: Results) -> None:
     print(f"Written: {results.out}, {results.out.stat().st_size / 1e3:.0f} kB.")
 
 
-STUDY = Study("scenes.page", run, out=Path("docs/swim.html"))
+STUDY = Study("swim_page", run, out=Path("docs/swim.html"))

@@ -1,9 +1,4 @@
-"""The searches leave nothing out that symmetry does not bring back, and find what is known."""
-
-import itertools
-import json
-from dataclasses import replace
-from functools import partial
+"""Progress by where the hub would come to rest: what is predicted, and what it adds to the reward."""
 
 import numpy as np
 import pytest
@@ -13,88 +8,11 @@ from agents import coasting
 from agents.coasting import CoastingProgress, fit_coasting
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_training_env
-from seastar_gym import Numerics, Scene
-from seastar_gym.controllers.scripted import to_actions
-from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.options import make_scene
-from seastar_gym.envs.paths import make_path
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import body_heading
-from seastar_gym.envs.symmetry import action_table
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.gaits import pair_gait
 from seastar_gym.simulator import Simulator
-from studies.command import main
-from studies.learning import bound
-from studies.learning.bound import (
-    all_directions,
-    distinct_gaits,
-    draw,
-    measure,
-    mixed_speed,
-    search_path,
-)
-
-FAST = Scene(numerics=Numerics.preset("fast"))
-
-
-@pytest.mark.parametrize(("period", "actions", "classes"), [(1, "pairs", 5), (1, "joint", 30), (2, "pairs", 35)])
-def test_every_gait_is_the_image_of_exactly_one(period, actions, classes):
-    gaits = distinct_gaits(period, actions)
-    assert len(gaits) == classes
-    images = [
-        {tuple(np.roll(carried[gait], shift)) for carried in action_table(actions, 5) for shift in range(period)}
-        for gait in gaits
-    ]
-    n_actions = len(command_table(actions, 5))
-    assert set().union(*images) == set(itertools.product(range(n_actions), repeat=period))
-    assert sum(map(len, images)) == n_actions**period
-
-
-def test_the_alternation_is_faster_than_either_pair():
-    pairs = to_actions(np.concatenate([pair_gait(3, 4), pair_gait(2, 5)]), "pairs", 5)
-    gaits = np.array([[pairs[0], pairs[0]], [pairs[1], pairs[1]], pairs])
-    first, second, both = np.linalg.norm(measure(FAST, gaits, "pairs").hub, axis=1)
-    assert both > 1.05 * max(first, second)
-
-
-def test_gaits_in_turns_make_the_speeds_of_their_convex_hull():
-    square = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [0.5, 0.0]])
-    np.testing.assert_allclose(mixed_speed(square, np.radians([0.0, 45.0, 180.0])), [1.0, np.sqrt(2.0), 1.0])
-
-
-def test_directions_are_turned_and_mirrored():
-    ten = all_directions(np.array([[np.cos(0.1), np.sin(0.1)]]))
-    angles = np.sort(np.arctan2(ten[:, 1], ten[:, 0]))
-    expected = np.concatenate([k * 0.4 * np.pi + np.array([-0.1, 0.1]) for k in (-2, -1, 0, 1, 2)])
-    np.testing.assert_allclose(angles, expected, atol=1e-12)
-
-
-def test_the_path_search_visits_all_waypoints_or_says_that_it_did_not():
-    corner = np.array([[0.03, 0.0], [0.03, 0.03]])
-    assert 8 <= len(search_path(FAST, corner, "pairs", beam=4)) <= 12
-    assert len(search_path(FAST, corner, "pairs", beam=1, max_strokes=3)) == 0
-
-
-def test_the_narrowest_search_swims_round_the_pentagon():
-    waypoints = make_path("pentagon", np.random.default_rng(0))
-    assert 145 < len(search_path(FAST, waypoints, "pairs", beam=1)) < 180
-
-
-@pytest.mark.slow
-def test_the_study_writes_numbers_and_a_picture(tmp_path, monkeypatch):
-    file = tmp_path / "bound.json"
-    monkeypatch.setattr(bound, "STUDY", replace(bound.STUDY, run=partial(bound.run, beam=1)))
-    assert main(["learning.bound", "--out", str(file)]) == 0
-    results = json.loads(file.read_text(encoding="utf-8"))
-    assert results["fastest_gaits"][0]["searched"] == 30
-    assert len(results["pentagon"]["gait"]) == results["pentagon"]["strokes"] > 150
-    draw(results, tmp_path / "again.png")
-    assert file.with_suffix(".png").stat().st_size > 10_000
-
-
-# Progress by where the hub would come to rest: what is predicted, and what it adds to the reward.
-
 
 PERIOD = 0.2
 SCENE = make_scene(None, "fast", PERIOD)

@@ -59,4 +59,4 @@ def run(results: Results) -> None:
     print(f"Written: {results.out}, {len(film)} frames of {BETWEEN} s.")
 
 
-STUDY = Study("scenes.film", run, out=Path("docs/swim.gif"))
+STUDY = Study("film", run, out=Path("docs/swim.gif"))

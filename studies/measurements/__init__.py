@@ -1,1 +1,0 @@
-"""Measurements of real robots, and what the simulator's parts make of them."""

@@ -1,1 +1,0 @@
-"""Scenes beyond the chapter's: the gallery, material damping, and the thermal actuator."""

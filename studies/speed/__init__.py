@@ -1,1 +1,0 @@
-"""Measurements of speed: real-time factors, shares of time, operation counts, and the cost of terms."""

@@ -1,0 +1,196 @@
+"""Greedy rules of the tasks, and Minari datasets of three qualities: random actions, these rules, a learned policy.
+
+    python -m studies.tasks --episodes 100 --out data
+    python -m studies.tasks --held-out
+
+The learned policy is the bundled one. A dataset that is there is not made again, so the command goes on where it
+stopped. Read them with MINARI_DATASETS_PATH=OUT, under the names TASK/random-v0, TASK/greedy-v0 and TASK/learned-v0.
+With --held-out the rules swim the held-out episodes of docs/tasks.md, whose column "greedy" is printed.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym import TASKS
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.greedy import Searcher, displacement_map, waypoints_of
+from seastar_gym.controllers.learned import load
+from seastar_gym.controllers.scripted import scripted
+from seastar_gym.data.command import name_of, write_to
+from seastar_gym.data.dataset import summary, write
+from seastar_gym.data.recorder import Episode, Recorder
+from seastar_gym.envs.commands import unless_strokes
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
+from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.tasks.discs import rims
+from seastar_gym.envs.tasks.obst_trap import ObstTrap
+from seastar_gym.envs.tasks.prey import Prey
+from seastar_gym.envs.tasks.prizes import Prizes
+from seastar_gym.envs.tasks.station import Station
+from seastar_gym.evaluation.measures import measure_of_challenge
+from seastar_gym.evaluation.rollout import Batch, rollout
+from seastar_gym.evaluation.tasks import RECORDED, make_batch
+from seastar_gym.extras import require_extra
+from seastar_gym.scene.checks import require_count
+from seastar_gym.scene.numerics import Fidelity
+from studies.frame import Floats, Results, Study, require_known
+from studies.pages import markdown, show
+
+QUALITIES = ("random", "greedy", "learned")
+FIDELITY: Fidelity = "fast"
+HELD_OUT = 64
+"""Held-out episodes of the page: the first of the split "test"."""
+SPEED_IN_STROKES, SPEED_IN_TIME = 0.0043, 0.0075
+"""Speed at which a robot swims any way [m/s]."""
+CLEAR, TOO_NEAR = 0.008, 1e3
+"""Distance from rims below which no decision is to end [m], and the cost of one that does."""
+Floats32 = NDArray[np.float32]
+
+
+# Greedy rules
+
+
+def length(vectors: Floats) -> Floats:
+    """Length over the last axis."""
+    return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
+
+
+class OnRoute(Searcher):
+    """Takes the action whose mean displacement leaves the shortest rewarded route."""
+
+    def __init__(self, inner: Any):
+        self.scene, self.layout, self.challenge = inner.scene, inner.layout, inner.challenge
+        self.in_strokes = unless_strokes(inner.decision_period, inner.scene) is None
+        period = None if self.in_strokes else inner.decision_period
+        self.hub = displacement_map(inner.scene, inner.actions, period).hub[None]
+
+    def choose(self, observations: Floats32) -> NDArray[np.int64]:
+        """Actions, shape (n,), for observations of shape (n, size)."""
+        target, after = waypoints_of(observations, self.scene, self.layout)
+        return np.argmin(self.cost(observations, target[:, None], after[:, None]), axis=1)
+
+    def cost(self, observations: Floats32, target: Floats, after: Floats) -> Floats:
+        """Cost of all actions, shape (n, n_actions). target, after: In the body frame [m], shape (n, 1, 2)."""
+        return RewardWeights().way_to_next(self.hub, target, after, WAYPOINT_RADIUS)
+
+    def own(self, observations: Floats32) -> Floats:
+        """Numbers that the task shows of its own, shape (n, size)."""
+        return observations[:, self.layout.further].astype(np.float64)
+
+
+class Nearest(OnRoute):
+    """Takes the action whose mean displacement ends nearest to the target."""
+
+    def cost(self, observations: Floats32, target: Floats, after: Floats) -> Floats:
+        return length(self.hub - target)
+
+
+class Clear(OnRoute):
+    """Likewise, and takes no action that ends near a disc that it sees."""
+
+    def cost(self, observations: Floats32, target: Floats, after: Floats) -> Floats:
+        discs = self.scene.robot.limb_length * self.own(observations).reshape(len(observations), 1, -1, 3)
+        clear = rims(self.hub, discs).min(axis=-1)
+        return np.where(clear < CLEAR, TOO_NEAR - clear, length(self.hub - target))
+
+
+class MostPerMetre(OnRoute):
+    """Swims to the prize of most worth per metre of those that it can reach in time."""
+
+    def cost(self, observations: Floats32, target: Floats, after: Floats) -> Floats:
+        own = self.own(observations)
+        seen = own[:, :-1].reshape(len(own), -1, 3)
+        places, worth = self.scene.robot.limb_length * seen[..., :2], seen[..., 2]
+        way = (SPEED_IN_STROKES if self.in_strokes else SPEED_IN_TIME) * self.challenge.seconds * own[:, -1:]
+        to = np.maximum(length(places) - self.challenge.radius, 1e-4)
+        value = np.where((worth > 0.0) & (to <= way), worth / to, worth * 1e-6 / to)
+        chosen = places[np.arange(len(own)), np.argmax(value, axis=1)]
+        return length(self.hub - chosen[:, None])
+
+
+RULES: dict[type, type[OnRoute]] = {Prey: Nearest, Station: Nearest, ObstTrap: Clear, Prizes: MostPerMetre}
+"""Rules of challenges, of others `OnRoute`."""
+
+
+def greedy(batch: Batch) -> Policy:
+    """Greedy rule of the task of a batch."""
+    inner: Any = batch.unwrapped
+    return RULES.get(type(inner.challenge), OnRoute)(inner)
+
+
+def held_out(id: str, n: int = HELD_OUT) -> float:
+    """Mean measure of the greedy rule over the first held-out episodes of a task."""
+    batch: Any = make_batch(id, n, split="test", fidelity=FIDELITY)
+    done = rollout(batch, greedy(batch), seeds=0, record=RECORDED, options={"instance": np.arange(n)})
+    batch.close()
+    inner = batch.unwrapped
+    limited = done._replace(limit=inner.max_episode_steps * inner.decision_period)
+    return float(measure_of_challenge(inner.challenge).of(limited).mean())
+
+
+# Datasets
+
+
+def agent_of(quality: str, id: str, recorder: Recorder) -> Policy:
+    """Agent of a quality."""
+    if quality == "random":
+        return scripted("random", TASKS[id][1], rng=np.random.default_rng(0))
+    if quality == "greedy":
+        return greedy(recorder)
+    from agents.tasks.command import file_of
+
+    return load(file_of(id))
+
+
+def record(id: str, quality: str, n_episodes: int) -> list[Episode]:
+    """Episodes of a task, each from its reset to its end."""
+    recorder = Recorder(make_batch(id, n_episodes, split="train", fidelity=FIDELITY))
+    rollout(recorder, agent_of(quality, id, recorder), seeds=list(range(n_episodes)))
+    recorder.close()
+    return recorder.episodes(only_first=True)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Greedy rules of the tasks, and Minari datasets of three qualities."""
+
+    tasks: tuple[str, ...] = tuple(TASKS)
+    """Environments."""
+    episodes: int = 100
+    """Episodes of every dataset, of the split "train", with the seeds 0, 1, ..."""
+    held_out: bool = False
+    """Measure the greedy rules on held-out episodes, and write no datasets."""
+
+    def __post_init__(self) -> None:
+        require_count("episodes", self.episodes, 1, 100_000)
+        require_known("task", self.tasks, TASKS)
+
+
+def run(options: Options, results: Results) -> None:
+    """Measure the greedy rules, or write the datasets that are missing; says a line on each."""
+    if options.held_out:
+        show(markdown(["task", "greedy"], [[id, f"{held_out(id):.3g}"] for id in options.tasks]))
+        return
+    require_extra("Datasets", "data", "minari", "h5py")
+    import minari
+
+    write_to(results.out)
+    there = minari.list_local_datasets()
+    for id in options.tasks:
+        for quality in QUALITIES:
+            name = name_of(id, quality)
+            if name in there:
+                print(f"{name} is there already.")
+                continue
+            episodes = record(id, quality, options.episodes)
+            write(
+                episodes, name, id, quality, "Written by python -m studies.tasks", split="train", fidelity=FIDELITY
+            )  # fmt: skip
+            print(f"{name}: {summary(episodes)}", flush=True)
+
+
+STUDY = Study("tasks", run, Options, out=Path("runs/data"))

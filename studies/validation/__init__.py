@@ -1,1 +1,0 @@
-"""Validation against a measured swimmer: its unknowns from four speeds, and predictions of the others."""

@@ -1,0 +1,172 @@
+"""Every study of speed, devices, policies and pictures runs in its shortest form, and what its numbers promise."""
+
+import json
+import re
+import subprocess
+from functools import partial
+
+import numpy as np
+import pytest
+
+from agents.tasks import learning
+from seastar_gym import Numerics, Scene, Seastar, der
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.tasks import make_batch
+from seastar_gym.scene.actuators.sma_limb import FREQUENCIES, MEASURED
+from studies import benchmark, film, fit, gallery, gpu, mutants, robustness, swim_page, tasks
+from studies.command import main
+from studies.frame import DOCS
+from studies.operations import count_operations, flops
+from studies.pages import numbers
+
+CURVES = fit.read_curves()
+SHORTEST = {
+    "benchmark --also throughput --seconds 0": ({"speed_history.json", "speed_history.png"}, {
+        benchmark: {"things": lambda: {"a": (1, lambda: lambda: 2.0)}, "unit": lambda: 0.5, "NODES_PER_LIMB": (5, 10),
+                    "BATCH": 8},
+    }),
+    "film": ({""}, {film: {"SeastarSwimEnv": partial(SeastarSwimEnv, path=[[0.02, 0.0]])}}),
+    "fit": (set(), {fit: {"read_curves": lambda: {40: CURVES[40]}}}),
+    "gallery": ({"gallery.json", "default.png", "tubes.png"}, {
+        gallery: {"EXHIBITS": [each for each in gallery.EXHIBITS if each.name in ("default", "tubes")],
+                  "STROKES": 1, "ROUNDS": 1, "ROBOTS": 1},
+    }),
+    "gpu --device scalar --compared 'observations, pairs'": ({"gpu.json"}, {}),
+    "robustness": ({"robustness.json"}, {
+        robustness: {"N_PATHS": 1, "SEEDS": range(1), "OF_SEEDS": ("soft",), "PERIODS": {robustness.CAMERA: 0.2},
+                     "CONDITIONS": {"soft": robustness.Condition(modulus=0.5)}},
+        learning: {"ENOUGH": 2048},
+    }),
+    "swim_page": ({""}, {swim_page: {"record": partial(swim_page.record, "fast", 1)}}),
+    "tasks --held-out --tasks SeastarPrizes-v0": (set(), {tasks: {"held_out": partial(tasks.held_out, n=2)}}),
+}  # fmt: skip
+"""Commands, files that they write, "" for the one that --out names, and what of them is made shorter."""
+
+
+@pytest.mark.parametrize("command", SHORTEST)
+def test_a_study_runs_in_its_shortest_form_and_writes_its_files(command, tmp_path, monkeypatch, capsys):
+    files, shorter = SHORTEST[command]
+    for module, values in shorter.items():
+        for name, value in values.items():
+            monkeypatch.setattr(module, name, value)
+    out = tmp_path / ("file.gif" if files == {""} else "folder")
+    words = [word.strip("'") for word in re.findall(r"'[^']*'|\S+", command)]
+    assert main([*words, "--out", str(out)]) == 0
+    assert out.is_file() if files == {""} else files <= {each.name for each in out.glob("*")}
+    assert capsys.readouterr().out
+
+
+def test_the_history_keeps_what_was_timed_before_in_units_of_a_fixed_loop(monkeypatch, tmp_path):
+    assert len(benchmark.things()) == 10 and benchmark.unit() > 0.0
+    for day, seconds in ("2026-01-01 10:00", 4.0), ("2026-01-02 10:00", 2.0):
+        monkeypatch.setattr(benchmark, "unit", iter([1.0, 1.0, 3.0, 4.0, 4.0, 1.0, 1.0]).__next__)
+        clock = iter([2.0 * seconds, 4.0 * seconds, 9.0]).__next__
+        monkeypatch.setattr(benchmark, "things", lambda clock=clock: {"a stroke": (3, lambda: clock)})
+        monkeypatch.setattr(benchmark.time, "strftime", lambda _, day=day: day)
+        assert main(["benchmark", "--out", str(tmp_path)]) == 0
+    told = benchmark.table(json.loads((tmp_path / "speed_history.json").read_text()))
+    assert re.search(r"2026-01-01 .* 2026-01-02 ", told) and told.endswith("| a stroke | 4 | 2 | 0.50 |")
+
+
+def test_a_robot_is_small_and_a_stroke_leaves_nothing_behind():
+    held, left = benchmark.memory_per_robot(Scene())
+    assert held < 64.0 and left < 8.0  # KiB, and B: less than one number per robot
+
+
+# Operations of a Newton iteration: they show on any machine when kernels become slower.
+
+
+THE_CHAPTERS = Scene(Seastar(discretisation="chapter"), numerics=Numerics.preset("chapter"))
+TEN = Scene(Seastar(nodes_per_limb=10), numerics=Numerics.preset("chapter"))
+
+
+@pytest.mark.parametrize("scene, most", [(THE_CHAPTERS, (11_600, 227, 91, 1_300)), (TEN, (13_720, 276, 137, 1_310))])
+def test_an_iteration_costs_no_more_than_when_it_was_tuned(scene, most):
+    parts = count_operations(scene)
+    iteration = parts["iteration"]
+    found = flops(iteration), iteration["divide"], iteration["root"], flops(parts["step"])
+    assert all(now <= before for now, before in zip(found, most, strict=True)), found  # lower them when it is less
+
+
+@pytest.mark.parametrize("number, values", [("nodes_per_limb", (10, 20, 30)), ("n_limbs", (4, 6, 8))])
+def test_every_node_and_every_limb_costs_the_same(number, values):
+    few, more, most = (flops(count_operations(Scene(Seastar(**{number: n})))["iteration"]) for n in values)
+    assert most - more == more - few > 0
+
+
+def test_the_table_of_the_rods_says_what_is_counted():
+    parts, told = count_operations(THE_CHAPTERS), der.__doc__
+    for part in ("hub hinges", "limbs", "ring", "substitution"):
+        (kflop,) = re.findall(rf"^{part} +([\d.]+) ", told, flags=re.MULTILINE)
+        assert float(kflop) == round(flops(parts[part]) / 1e3, 1)
+    of_node = told.partition("A node of a limb")[2]
+    kinds = {"products": "multiply", "fused products": "fused", "sums": "add", "divisions": "divide", "roots": "root"}
+    for words, kind in kinds.items():
+        said, counted = re.search(rf"([\d.]+) {words}", of_node)[1], parts["limbs"][kind] / 45
+        assert float(said) == round(counted, len(said.partition(".")[2]))
+    assert f"{flops(parts['limbs']) / 45:.0f} flop per node" in told
+
+
+# What other studies promise
+
+
+def test_all_scenes_and_environments_had_the_bits_of_the_processor_on_the_gpu():
+    results = numbers(DOCS, gpu.STUDY)
+    bits, observations = results["bits"], results["observations"]
+    assert set(bits) == set(gpu.scenes()) and set(observations) == set(gpu.environments())
+    assert all(found["same"] for found in (*bits.values(), *observations.values()))
+    assert not any(found["failed"] for found in bits.values())
+    assert results["traffic"] == {preset: gpu.traffic(preset) for preset in gpu.PRESETS}
+
+
+@pytest.mark.parametrize("liquid_metal", MEASURED)
+def test_presets_of_limbs_are_as_near_to_the_measurements_as_a_fit(liquid_metal):
+    curves = CURVES[liquid_metal]
+    assert (curves[0].frequency, curves[-1].frequency) == FREQUENCIES[liquid_metal]
+    both = MEASURED[liquid_metal], fit.fit(curves, starts=2)
+    error, fitted = (np.sqrt(np.mean(fit.errors(numbers, curves) ** 2)) for numbers in both)
+    assert error < 1.01 * fitted and error < (0.07 if liquid_metal > 30 else 0.035)
+
+
+def test_greedy_rules_end_near_no_disc_and_swim_to_the_prize_of_most_worth_per_metre():
+    batch = make_batch("SeastarObstTrap-v0", 1, split="test", fidelity="fast")
+    rule, seen = tasks.greedy(batch), np.array(batch.reset(seed=0)[0])
+    disc = 2.5 * rule.hub[0, rule.choose(seen)[0]]
+    seen[:, batch.unwrapped.layout.further] = np.tile([*disc / batch.unwrapped.scene.robot.limb_length, 1e-3], 6)
+    away = np.hypot(*(rule.hub[0, rule.choose(seen)[0]] - disc))
+    assert 0.6 * np.hypot(*disc) < tasks.CLEAR < away
+    batch = make_batch("SeastarPrizes-v0", 1, split="test", fidelity="fast")
+    batch.reset(seed=0)
+    task, rule = batch.unwrapped._task, tasks.greedy(batch)
+    for worth, towards in ((4.0, 1.0), (9.0, -1.0)):
+        task.prizes[0] = 0.0
+        task.prizes[0, :2] = [[0.1, 0.0, 3.0], [-0.2, 0.0, worth]]
+        end, heading = rule.hub[0, rule.choose(task.observe())[0]], task.heading()[0]
+        assert towards * (end @ [np.cos(heading), -np.sin(heading)]) > 1e-3
+
+
+TOY = {
+    "toy/code.py": 'def larger(x: int, /):\n    if x > 1:\n        raise ValueError(f"{1 + 1}")\n    return x * 3\n',
+    "tests/toy/test_code.py": "from pytest import mark\nfrom toy.code import larger\n"
+    "def test_core(): assert larger(1) > 0\n"
+    "@mark.skipif('not config.option.all')\ndef test_all(): assert larger(1) == 3\n",
+    "conftest.py": "def pytest_addoption(parser):\n    parser.addoption('--all', action='store_true')\n",
+}
+
+
+def test_mutants_are_killed_by_the_core_by_all_or_by_nothing_and_the_checkout_stays(tmp_path, monkeypatch):
+    for name, text in TOY.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    for words in (["init", "-q"], ["add", "."]):
+        subprocess.run(["git", *words], cwd=tmp_path, check=True)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(mutants, "PACKAGE", "toy")
+    for _ in range(2):  # what has a line is not run again
+        assert main(["mutants", "--count", "9", "--kernels", "0", "--out", "runs"]) == 0
+        rows = [json.loads(line) for line in (tmp_path / "runs/mutants.jsonl").read_text().splitlines()]
+        assert len(rows) == 4 and {row["after"]: row["killed by"] for row in rows} == {
+            "if x <= 1:": "core", "if x > 2:": "nothing", "return x / 3": "all", "return x * 4": "all",
+        }  # fmt: skip
+    assert all((tmp_path / name).read_text() == text for name, text in TOY.items())
+    assert mutants.drawn(tmp_path, 3, 0, 1) == mutants.drawn(tmp_path, 3, 0, 1) != mutants.drawn(tmp_path, 3, 0, 2)
