@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from studies.frame import DOCS, Study
 
@@ -15,6 +16,11 @@ def markdown(head: Sequence[object], rows: Iterable[Sequence[object]], texts: Co
     rule = "|".join("---" if column in texts else "---:" for column in range(len(head)))
     first, *others = (f"| {' | '.join(map(str, line))} |" for line in (head, *rows))
     return "\n".join([first, f"|{rule}|", *others])
+
+
+def numbers(docs: Path, study: Study) -> Any:
+    """Numbers of a study in docs/, if it keeps any."""
+    return json.loads((docs / "results" / study.file).read_text("utf-8")) if study.file else {}
 
 
 def show(text: str, title: str = "") -> None:
@@ -30,8 +36,7 @@ def content(name: str, studies: Sequence[Study]) -> str:
         return f"*Numbers: {'; '.join(f'[{Path(n).name}](results/{n}) by `{made[n]}`' for n in files)}.*"
     for study in studies:
         if name in study.tables:
-            kept = DOCS / "results" / study.file
-            return study.tables[name](json.loads(kept.read_text("utf-8")) if study.file else {}).strip()
+            return study.tables[name](numbers(DOCS, study)).strip()
     raise ValueError(f"No study makes {name!r}.")
 
 
