@@ -32,7 +32,8 @@ def filmed_beside(gait: str | None, options: Options, folder: Path) -> Iterator[
         yield lambda: None
         return
     with tempfile.TemporaryDirectory(prefix="seastar-film-", ignore_cleanup_errors=True) as place:
-        process = _begun(["--agents", gait, *physics(options, folder.resolve()), "--video", "--out", place])
+        words = ["--agents", gait, *physics(options, folder.resolve()), "--seconds", str(options.seconds)]
+        process = _begun([*words, "--video", "--out", place])
 
         def film() -> Path | None:
             file = Path(place, f"{gait}.mp4")
