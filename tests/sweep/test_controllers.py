@@ -103,7 +103,7 @@ def test_a_part_says_controller_time_and_waypoints_with_the_same_bits_in_other_p
     for batch in sweep.batches():
         assert ResultFiles(tmp_path).file(batch.name).read_bytes() == result_file_of(batch)
     table = pyarrow.parquet.read_table(ResultFiles(tmp_path).file(batch.name))
-    assert table.column_names == ["robot.limb_length", "controller", *UNITS, *OF_CONTROLLERS]
+    assert table.column_names == ["controller", "robot.limb_length", *UNITS, *OF_CONTROLLERS]
     assert table.schema.field("time").metadata == {b"unit": b"s"}
     told = json.loads(table.schema.metadata[b"seastar_gym"])["pilot"]
     assert told["name"] == "straight" and told["waypoints"] == [[0.04, 0.0], [0.04, 0.03]]

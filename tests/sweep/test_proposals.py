@@ -102,12 +102,12 @@ def test_a_search_goes_on_where_it_was_and_keeps_to_its_number(sqlite, tmp_path)
 def test_another_sweep_or_another_file_of_a_controller_is_another_study(sqlite, tmp_path):
     file = tmp_path / "second.zip"
     other = Sweep(SWEEP.scene, AXES[:2], settling=0, measured=1, samples=1)
-    of_file = Sweep(SWEEP.scene, (*AXES[:2], Choices("controller", ("straight", "rest", str(file)))), samples=1)
     names = [study_of(*each, sqlite).study_name for each in ((SWEEP, Search()), (other, Search()),
              (SWEEP, Search("turn")), (SWEEP, Search("speed", False)))]  # fmt: skip
     for contents in (b"one", b"two", b"one"):
         file.write_bytes(contents)
-        names.append(study_of(of_file, Search(), sqlite).study_name)
+        axes = *AXES[:2], Choices("controller", ("straight", "rest", str(file)))
+        names.append(study_of(Sweep(SWEEP.scene, axes, samples=1), Search(), sqlite).study_name)
     assert len(set(names)) == 6 and names[-1] == names[-3]
 
 

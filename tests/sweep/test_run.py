@@ -70,7 +70,7 @@ def test_only_cells_without_parts_are_run(tmp_path, sweep):
     seen = []
     run(sweep.batches(), tmp_path, Here(), lambda now: seen.append((now.done, now.kept, now.designs, now.intervals)),
         works.named)  # fmt: skip
-    assert seen == [(0, 1, 0, 0), (0, 2, 0, 0), (1, 2, 4, 4), (2, 2, 8, 8)]
+    assert seen == [(1, 2, 4, 4), (2, 2, 8, 8)]
     assert set(ResultFiles(tmp_path).names()) == {batch.name for batch in sweep.batches()}
 
 
@@ -331,4 +331,4 @@ def planned(plan, n_batches, named):
 @pytest.mark.parametrize("plan", [grid, latin, one_axis])
 def test_planning_holds_less_than_a_kilobyte_for_ten_cells_and_of_a_grid_the_same_for_any_number(plan):
     few = planned(plan, 1_000, 500)
-    assert planned(plan, 100_000, 2_000) < few + (1.0 if plan is grid else 10.0) and few < 9.0
+    assert few < 9.0 and planned(plan, 100_000, 2_000) < (few + 1.0 if plan is grid else 20.0)
