@@ -190,7 +190,7 @@ REFUSED = {
     "waypoints of texts": (lambda: path([["a", "b"]]), "array of numbers"),
     "one place twice": (lambda: path([[0.1, 0.0], [0.1, 0.0]]), "are the same point"),
     "a path that stays": (lambda: path([[0.0, 0.0]]), "must lead away from the origin"),
-    "a path beyond": (lambda: path([[1.1e6, 0.0]]), "within"),
+    "a path beyond": (lambda: path([[0.0, -1.1e6]]), "within"),
     "one name for two paths": (lambda: register_path("line")(lambda rng: LEG), "a path of the name 'line' already"),
     "a body's drag that is not": (lambda: drawn_of("robot.body.drag_along"), "number 'robot.body.drag_along' to draw",
                                   ", since it leaves that out (None): give it a value there."),
@@ -231,6 +231,8 @@ def test_what_nobody_could_use_is_refused_in_a_sentence(case):
 
 
 def test_what_is_just_allowed_is_taken():
+    for actuator in (SmaPulse(), CURVE, Limited(SmaPulse(), 0.3)):
+        assert SeastarSwimEnv(scene=Scene(actuator=actuator), decision_period=1.0).decision_period == 1.0
     assert SeastarSwimEnv(scene=WIRED, decision_period=1.01 * SHORTEST_DECISION).decision_period < 0.01
     assert goals(np.zeros((3, 2)), np.zeros((3, 2))).tolist() == [0.0] * 3
     near = [[0.1 - 1e-9, 0.0], [0.1 + 1e-9, 0.0]]  # the radius of waypoints in limb lengths
