@@ -35,7 +35,6 @@ PROGRESS = {
     MARKUP: [[1000, 400, 4], [2000, 180, 5], [3000, 180, 5], [4000, 150, 5]],
 }
 """Learning curves: strokes trained, strokes round the pentagon, waypoints reached."""
-BOUND = {"fidelity": "fast", "directions_deg": [0, 18, 36], "mm_per_stroke": {"a": [4.0, 5.0, 3.0], MARKUP: [3, 3, 3]}}
 ENDS = [name + end for name in MEASURED for end in ("", "_low", "_high")]
 TRIALS = ["path", "disturbance", "agent", "fidelity", "swims", *ENDS]
 OF_SUCCESS, OF_OTHERS = (0.9951, 0.9912, 0.9983), (423, 400, 450, 80.02, 79.5, 80.5, 300, 290, 310)
@@ -134,7 +133,7 @@ def test_a_report_is_as_kept(kept, monkeypatch, tmp_path):
     curves = [Curve.of(name, rows) for name, rows in PROGRESS.items()]
     evil = {"agent": MARKUP, "success_rate": 1.0, "agent_low": MARKUP, "agent_high": MARKUP}
     table = ResultsTable("<Trials>", {"agent": "<agent>", "success_rate": "success"}, [evil])
-    remarks = Remarks("<Test>", ["It was <easy>."], ["python <one>", "python two"], curves, [table], BOUND)
+    remarks = Remarks("<Test>", ["It was <easy>."], ["python <one>", "python two"], curves, [table])
     for name, path, more, films, current in (
         ("full", "pentagon", remarks, {MARKUP: "stray &.mp4"}, Vortex(1e-3)),
         ("curves", SHORT, Remarks(curves=[Curve.of("a", PROGRESS["b"])]), {}, None),
@@ -157,7 +156,7 @@ def test_a_report_is_as_kept(kept, monkeypatch, tmp_path):
 
 
 READ = {
-    "trials.csv": page.trials_table, "bound.json": page.read_bound, "progress.csv": lambda file:
+    "trials.csv": page.trials_table, "progress.csv": lambda file:
     charts.read_progress(file.parent), "curve": lambda file: Curve.of("a", []),
 }  # fmt: skip
 """Readers of files that a report shows."""
@@ -175,12 +174,6 @@ READ = {
         ("progress.csv", "1,2,x\n", "'x' is no number"),
         ("progress.csv", "1,2,.5\n", "be whole"),
         ("curve", "", "The training of a has no learning curve yet"),
-        *(("bound.json", text, "bound.json is no ") for text in (
-            "", "[" * 100_000, "[]", "{}", json.dumps(BOUND | {"directions_deg": []}),
-            json.dumps(BOUND | {"directions_deg": [0, 18]}), json.dumps(BOUND | {"directions_deg": 5}),
-            json.dumps(BOUND | {"directions_deg": [0, float("nan"), 36]}), json.dumps(BOUND | {"fidelity": 5}),
-            json.dumps(BOUND | {"mm_per_stroke": {"a": ["<b>", 2, 3]}}),
-        )),
     ],
 )  # fmt: skip
 def test_damaged_files_of_a_report_are_refused(name, text, words, tmp_path):
@@ -221,7 +214,7 @@ def test_a_recording_is_the_swim_in_frames_and_changes_nothing():
 def evaluated(tmp_path_factory):
     """Folder and swims of an evaluation with a report."""
     folder = tmp_path_factory.mktemp("report")
-    remarks = Remarks(curves=[Curve.of("straight", PROGRESS["straight"])], bound=BOUND)
+    remarks = Remarks(curves=[Curve.of("straight", PROGRESS["straight"])])
     agents = {"straight": scripted("straight"), MARKUP: ForthAndBack()}
     options = {"max_strokes": 9, "waypoint_radius": 2e-3, "fidelity": "fast", "video": False, "say": lambda text: None}
     return folder, evaluate(agents, SHORT, out=folder, report=remarks, **options)
