@@ -1,6 +1,7 @@
 """What the reference documents outside the top level, each with arguments that it accepts."""
 
 # ruff: noqa: C408 - what is given reads as a call
+import inspect
 import re
 import tempfile
 from collections.abc import Callable, Iterator
@@ -26,6 +27,7 @@ MOTIVE = (
     "Format Version,1.23,Length Units,Meters\n,Type,Marker,Marker,Marker\n,Name,a,a,a\n,,Position,Position,Position\n"
     "Frame,Time (Seconds),X,Y,Z\n0,0,1,2,3\n"
 )
+DEEPLABCUT = "scorer,s,s,s\nbodyparts,a,a,a\ncoords,x,y,likelihood\n0,1,2,1\n"
 MADE_BY_THE_PACKAGE = {
     "Setting", "Episode", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Progress",
     "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
@@ -35,6 +37,8 @@ MADE_BY_THE_PACKAGE = {
 UNCALLED = {*MADE_BY_THE_PACKAGE, "Here", "RayTasks", "SlurmArrays", "chapters_certificate",
             "LinePlant", "open_serial", "serve"}  # fmt: skip
 """What takes no arguments, or needs Ray, submitit or a serial line, is not called either."""
+UNCHECKED = {"route", "tensorboard_log"}
+"""Arguments that are not checked where they are given: those of `Sweep` and `make_model`."""
 
 
 def documented() -> dict[str, str]:
@@ -45,6 +49,12 @@ def documented() -> dict[str, str]:
 def named(name: str) -> Any:
     """What is documented by this name."""
     return getattr(import_module(documented()[name]), name)
+
+
+def complete(call: Callable[..., Any], given: dict[str, Any]) -> dict[str, Any]:
+    """All arguments of a function: the given ones, and the defaults of the others."""
+    parameters = inspect.signature(call).parameters.values()
+    return {each.name: each.default for each in parameters if each.kind is not each.VAR_KEYWORD} | given
 
 
 def of_work(swim: Any) -> Any:
@@ -163,88 +173,75 @@ def calls() -> list[tuple[str, Callable[..., Any], dict[str, Any]]]:
 
 def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     rng = np.random.default_rng
-    gaits = {"n_limbs": 5}
     for name, arguments in {
+        **{name: dict(decision_period=0.1) for name in ("lagged_gait", "lagged_pentagon", "thrifty_gait")},
+        **{name: {} for name in ("Layout", "Limits", "pair_gait", "pentagon_gait", "pretrained", "straight_gait")},
+        **{name: dict(scene=FAST) for name in ("GreedyPolicy", "symmetry_of")},
+        "turning_wave": dict(decision_period=0.1),
+        "memory_mirror": dict(actuator=FAST.actuator),
         "decisions_per_second": dict(decision_period=0.5),
         "timed": dict(strokes=np.zeros((2, 5)), decision_period=0.5),
-        "lagged_gait": dict(decision_period=0.1, n_limbs=5, lag=0.6, level=1.0),
-        "lagged_pentagon": dict(decision_period=0.1),
-        "pair_gait": dict(plus=1, minus=2, n_limbs=5),
-        "pentagon_gait": dict(swimming=45, resting=5),
-        "straight_gait": gaits,
-        "thrifty_gait": dict(decision_period=0.1, n_limbs=5),
-        "turning_wave": dict(decision_period=0.1),
         "load_scene": dict(file=None),
         "timed_certificate": dict(decision_period=0.2),
         "make_path": dict(path="random", rng=rng(0)),
-        "Layout": dict(n_limbs=5, of_limb=0, entries=(), shows_limbs=True, stations=9),
-        "Limits": dict(longest_pulse=0.12, shortest_rest=0.1, patience=0.12, oldest=0.5),
-        "SimulatedPlant": dict(simulator=Simulator(WIRES), sight=Sight(), seed=0, paced=False),
-        "PlantSwim": dict(plant=named("SimulatedPlant")(Simulator(WIRES)), limits=named("Limits")(), logs=None,
-                          render_mode=None, frames_per_stroke=None, decision_period=0.5, scene=WIRES),
-        "FrameStack": dict(symmetry=symmetry_for(5), past=1),
-        "Symmetry": dict(group=5, mirror=(), layout=named("Layout")(5), actions="limbs"),
+        "SimulatedPlant": dict(simulator=Simulator(WIRES), sight=Sight()),
+        "PlantSwim": dict(plant=named("SimulatedPlant")(Simulator(WIRES)), limits=named("Limits")(),
+                          decision_period=0.5, scene=WIRES),
+        "FrameStack": dict(symmetry=symmetry_for(5)),
+        "Symmetry": dict(group=5, mirror=(), layout=named("Layout")(5)),
         "VectorFrameStack": dict(env=batch(), past=1),
-        "memory_mirror": dict(actuator=FAST.actuator),
-        "symmetry_of": dict(scene=FAST),
         "GoalForm": dict(env=env()),
-        "GreedyPolicy": dict(scene=FAST, waypoint_radius=0.01, decision_period=None),
-        "LearnedPolicy": dict(description=learned().description, weights=learned().weights, training=None, rng=None),
-        "Planner": dict(scene=FAST, waypoint_radius=0.01, budget=None, threads=1, decision_period=None, headings=None),
-        "pretrained": dict(name="strokes"),
+        "LearnedPolicy": dict(description=learned().description, weights=learned().weights),
+        "Planner": dict(scene=FAST, threads=1),
         "load": dict(path=bundled_file(None)),
-        "load_agent": dict(name="straight", env=env(), seed=0),
-        "load_agents": dict(names=["straight"], seed=0, fidelity="fast", decision_period=None, scene=FAST),
-        "scripted": dict(name="straight", actions=None, n_limbs=5, rng=None, decision_period=None),
+        "load_agent": dict(name="straight", env=env()),
+        "load_agents": dict(names=["straight"], fidelity="fast", scene=FAST),
+        "scripted": dict(name="straight"),
         "save": dict(policy=learned(), path=folder() / "policy.safetensors"),
-        "Budget": dict(depth=2, beam=2, coasting=0.0),
-        "OpenLoopPolicy": dict(commands=np.zeros((1, 5)), actions="limbs", decision_period=None),
-        "RandomPolicy": dict(rng=rng(0), actions="limbs", n_limbs=5),
-        "rollout": dict(env=env(), policy=straight(), seeds=0, options=None, until=1, record=["time"], on_step=None),
+        "Budget": dict(depth=2, beam=2),
+        "OpenLoopPolicy": dict(commands=np.zeros((1, 5))),
+        "RandomPolicy": dict(rng=rng(0)),
+        "rollout": dict(env=env(), policy=straight(), seeds=0, until=1, record=["time"]),
         "swim": dict(agent="a", policy=straight(), env=gym.make("SeastarSwim-v0", scene=FAST, path=PATH).unwrapped,
-                     max_strokes=1, seed=0, reset_options=None, watch=None),
-        "swim_many": dict(agent="a", policy=straight(), path=PATH, n_swims=1, scene=FAST, max_strokes=1,
-                          waypoint_radius=0.01, seed=0, threads=1, decision_period=None),
-        "Measurement": dict(time=np.zeros(1), positions=np.zeros((1, 1, 2)), nodes=(0,), commands=np.zeros((1, 5)),
-                            command_times=None),
+                     max_strokes=1, seed=0),
+        "swim_many": dict(agent="a", policy=straight(), path=PATH, n_swims=1, scene=FAST, max_strokes=1, threads=1),
+        "Measurement": dict(time=np.zeros(1), positions=np.zeros((1, 1, 2)), nodes=(0,), commands=np.zeros((1, 5))),
         "get_parameter": dict(scene=FAST, name="fluid.density"),
-        "synthetic": dict(scene=FAST, truth={}, n_strokes=1, rate=2.0, noise=1e-3, seed=0, delay=0.0),
-        "trajectory": dict(time=np.zeros(1), nodes=(0,), commands=np.zeros((1, 5)), scene=FAST, command_times=None),
+        "synthetic": dict(scene=FAST, truth={}, n_strokes=1, rate=2.0),
+        "trajectory": dict(time=np.zeros(1), nodes=(0,), commands=np.zeros((1, 5)), scene=FAST),
         "with_parameters": dict(scene=FAST, names=["fluid.density"], values=[900.0]),
-        "Choices": dict(name="robot.n_limbs", values=(3, 4), labels=()),
-        "Range": dict(name="robot.limb_length", low=0.1, high=0.2, is_log=False),
-        "Route": dict(path=PATH, seconds=1.0, decision_period=None),
-        "Sweep": dict(scene=FAST, axes=(), gait="straight", settling=0, measured=1, samples=0, seed=0, robots=1),
+        "Choices": dict(name="robot.n_limbs", values=(3, 4)),
+        "Range": dict(name="robot.limb_length", low=0.1, high=0.2),
+        "Route": dict(path=PATH, seconds=1.0),
+        "Sweep": dict(scene=FAST, axes=(), settling=0, measured=1, robots=1),
         "read_results": dict(folder=folder()),
         "Processes": dict(workers=1),
         "Recorder": dict(env=batch()),
         "BatchVecEnv": dict(env=batch("SameStep")),
         "native_batch": dict(context=dict(num_envs=2, scene=FAST)),
         "Hyperparameters": dict(vars(training())),
-        "make_model": dict(env=training_env(), hyperparameters=training(), seed=0, device="cpu"),
-        "make_training_env": dict(hyperparameters=training(), path=PATH, random_heading=False, fidelity=None,
-                                  scene=FAST, threads=1, actions="pairs", randomization=None),
-        "read_deeplabcut": dict(file=tracked("scorer,s,s,s\nbodyparts,a,a,a\ncoords,x,y,likelihood\n0,1,2,1\n"),
-                                rate=30.0, individual=None, likelihood=0.6),
-        "read_motive": dict(file=tracked(MOTIVE), up="y"),
+        "make_model": dict(env=training_env(), hyperparameters=training(), seed=0),
+        "make_training_env": dict(hyperparameters=training(), path=PATH, random_heading=False, scene=FAST, threads=1,
+                                  actions="pairs", randomization=None),
+        "read_deeplabcut": dict(file=tracked(DEEPLABCUT), rate=30.0),
+        "read_motive": dict(file=tracked(MOTIVE)),
         "read_pose": dict(file=tracked("time,x,y\n0,1,2\n")),
-        "read_sleap": dict(file=tracked("track,frame_idx,instance.score,a.x,a.y\n,0,1,2,3\n"), rate=30.0,
-                           individual=None),
-        "to_c": dict(policy=learned(), name="a", points_per_limb=None),
+        "read_sleap": dict(file=tracked("track,frame_idx,instance.score,a.x,a.y\n,0,1,2,3\n"), rate=30.0),
+        "to_c": dict(policy=learned(), name="a"),
         "policy_of": dict(model=named("make_model")(training_env(), training(), 0)),
     }.items():  # fmt: skip
-        yield name, named(name), arguments
+        all_of_them = complete(named(name), arguments)
+        yield name, named(name), {each: all_of_them[each] for each in all_of_them.keys() - UNCHECKED}
     about = learned().description
     yield "Description", lambda **entries: named("Description")(**entries).check(), {**about._asdict(), "scene": FAST}
     yield "Description", about.from_json, dict(text=about.to_json())
     yield "identify", partial(named("identify"), FAST), dict(
         parameters=["x"], measurement=measurement(), confidence=0.9, largest_delay=None)  # fmt: skip
     yield "identify", lambda scene: named("identify")(scene, ["x"], measurement()), dict(scene=FAST)
-    yield "differentiate", named("differentiate"), dict(
-        scene=FAST, commands=np.zeros((1, 5)), by=["commands"], state=None, duration=0.1)  # fmt: skip
-    yield "gradient", lambda **others: named("gradient")(objective=of_work, **others), dict(
-        scene=FAST, commands=np.zeros((1, 5)), by=["commands"], state=None, duration=0.1)  # fmt: skip
-    yield "record", named("record"), dict(scene=FAST, commands=np.zeros((1, 5)), state=None, duration=0.1)
+    swum = dict(scene=FAST, commands=np.zeros((1, 5)), state=None, duration=0.1)
+    yield "differentiate", named("differentiate"), swum | dict(by=["commands"])
+    yield "gradient", partial(named("gradient"), objective=of_work), swum | dict(by=["commands"])
+    yield "record", named("record"), swum
     yield "Measurement", named("Measurement").from_csv, dict(trajectory="a.csv", commands="b.csv")
     yield "Measurement", measurement().to_csv, dict(trajectory=folder() / "a.csv", commands=folder() / "b.csv")
     yield "film", filmed, dict(file=folder() / "swim.gif", fps=10.0)

@@ -1,7 +1,6 @@
 """Frames from which a robot can be seen: what is drawn there is the same physics in other numbers."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,25 +24,49 @@ from seastar_gym.scene.actuators.actuator import complete, mirrored
 Floats = np.ndarray
 
 
-def same(thing: Any, *_: Any) -> Any:
-    return thing
-
-
 @dataclass(frozen=True)
 class Frame:
-    """What becomes of places [m], velocities [m/s] and other vectors, of currents, and whether limbs swap sides.
+    """A frame whose axes are turned or mirrored, that lies elsewhere, or moves.
 
-    drift: Velocity at which robots are seen to move along [m/s]. angle: By which all is turned [rad].
+    angle: By which all is turned [rad]. is_mirror: Whether sides are swapped. way: By which all is moved [m].
+    drift: Velocity at which robots are seen to move along [m/s].
     """
 
     name: str
-    places: Callable[[Floats], Floats] = same
-    velocities: Callable[[Floats], Floats] = same
-    vectors: Callable[[Floats], Floats] = same
-    current: Callable[[Any], Any] = same
-    mirrored: bool = False
-    drift: tuple[float, float] = (0.0, 0.0)
     angle: float = 0.0
+    is_mirror: bool = False
+    way: tuple[float, float] = (0.0, 0.0)
+    drift: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def sign(self) -> float:
+        """Of turns and other pseudoscalars."""
+        return -1.0 if self.is_mirror else 1.0
+
+    def vectors(self, vectors: Floats) -> Floats:
+        """Vectors, shape (..., 2), as they are seen."""
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        return vectors @ np.array([[c, s], [-s, c]]) * [1.0, self.sign]
+
+    def current(self, current: Any) -> Any:
+        """Current as it is seen; one that cannot be said stays, see `can_be_seen_from`."""
+
+        def seen(x: Any, y: Any) -> list[Any]:
+            found = self.vectors(np.stack(np.broadcast_arrays(x, y), axis=-1).astype(float))
+            return [found[..., 0], found[..., 1]]
+
+        match current:
+            case UniformCurrent(u_x, u_y):
+                return UniformCurrent(*(np.add(u, by)[()] for u, by in zip(seen(u_x, u_y), self.drift, strict=True)))
+            case ShearCurrent(rate, direction):
+                turned = np.multiply(self.sign, direction) + self.angle
+                return ShearCurrent(np.multiply(self.sign, rate)[()], turned[()])
+            case Vortex(circulation, x, y, core):
+                places = (np.add(at, by)[()] for at, by in zip(seen(x, y), self.way, strict=True))
+                return Vortex(np.multiply(self.sign, circulation)[()], *places, core)
+            case GridCurrent(corner, spacing, velocities):
+                return GridCurrent(tuple(np.add(corner, self.way).tolist()), spacing, velocities)
+        return current
 
     def scene(self, scene: Scene) -> Scene:
         loads = tuple((self.node(scene, node), *self.vectors(np.array(force)).tolist()) for node, *force in scene.loads)
@@ -52,12 +75,12 @@ class Frame:
             fluid = replace(fluid, current=self.current(fluid.current))
         held = tuple(self.node(scene, node) for node in scene.held_nodes)
         seen = replace(scene, fluid=fluid, loads=loads, held_nodes=held)
-        return mirrored_limbs(seen) if self.mirrored else seen
+        return mirrored_limbs(seen) if self.is_mirror else seen
 
     def node(self, scene: Scene, node: int) -> int:
         """Its number where limbs have swapped sides."""
         per_limb = scene.robot.nodes_per_limb - 1
-        if not self.mirrored or node == 0:
+        if not self.is_mirror or node == 0:
             return node
         limb, place = divmod(node - 1, per_limb)
         return 1 + (-limb % scene.robot.n_limbs) * per_limb + place
@@ -66,19 +89,19 @@ class Frame:
         order = [self.node(scene, node) for node in range(scene.robot.n_nodes)]
         q, v = (array[:, order] for array in (state.positions, state.velocities))
         actuators = state.actuators
-        if self.mirrored and actuators is not None:
+        if self.is_mirror and actuators is not None:
             actuators = mirrored_actuators(actuators[:, swapped(scene.robot.n_limbs)], scene)
         commands = state.commands
-        if self.mirrored and commands is not None:
+        if self.is_mirror and commands is not None:
             commands = -commands[:, swapped(scene.robot.n_limbs)]
-        moved = self.places(q) + np.multiply.outer(state.time, self.drift)[:, None]
-        sign = -1.0 if self.mirrored else 1.0
-        orientation = None if state.orientation is None else sign * state.orientation + self.angle
-        spin = None if state.spin is None else sign * state.spin
-        return State(moved, self.velocities(v), state.time, actuators, commands, state.phase, orientation, spin)
+        moved = self.vectors(q) + self.way + np.multiply.outer(state.time, self.drift)[:, None]
+        orientation = None if state.orientation is None else self.sign * state.orientation + self.angle
+        spin = None if state.spin is None else self.sign * state.spin
+        velocities = self.vectors(v) + self.drift
+        return State(moved, velocities, state.time, actuators, commands, state.phase, orientation, spin)
 
     def case(self, case: Case) -> Case:
-        commands = -case.commands[..., swapped(case.scene.robot.n_limbs)] if self.mirrored else case.commands
+        commands = -case.commands[..., swapped(case.scene.robot.n_limbs)] if self.is_mirror else case.commands
         return Case(self.scene(case.scene), case.n_robots, self.state(case.state, case.scene), commands)
 
 
@@ -116,85 +139,10 @@ def mirrored_actuators(remembered: Floats, scene: Scene) -> Floats:
     return mirrored(complete(scene.actuator), remembered) if remembered.shape[-1] else remembered
 
 
-# --- currents --------------------------------------------------------------------------------------------------------
-
-
-def turned_current(current: Any, angle: float) -> Any:
-    c, s = math.cos(angle), math.sin(angle)
-    match current:
-        case UniformCurrent(u_x, u_y):
-            u_x, u_y = np.asarray(u_x), np.asarray(u_y)
-            return UniformCurrent((c * u_x - s * u_y)[()], (s * u_x + c * u_y)[()])
-        case ShearCurrent(rate, direction):
-            return ShearCurrent(rate, np.add(direction, angle)[()])
-        case Vortex(circulation, x, y, core):
-            x, y = np.asarray(x), np.asarray(y)
-            return Vortex(circulation, (c * x - s * y)[()], (s * x + c * y)[()], core)
-    return current
-
-
-def mirrored_current(current: Any) -> Any:
-    match current:
-        case UniformCurrent(u_x, u_y):
-            return UniformCurrent(u_x, np.negative(u_y)[()])
-        case ShearCurrent(rate, direction):
-            return ShearCurrent(np.negative(rate)[()], np.negative(direction)[()])
-        case Vortex(circulation, x, y, core):
-            return Vortex(np.negative(circulation)[()], x, np.negative(y)[()], core)
-    return current
-
-
-def shifted_current(current: Any, way: Floats) -> Any:
-    match current:
-        case Vortex(circulation, x, y, core):
-            return Vortex(circulation, np.add(x, way[0])[()], np.add(y, way[1])[()], core)
-        case GridCurrent(corner, spacing, velocities):
-            return GridCurrent(tuple((np.array(corner) + way).tolist()), spacing, velocities)
-    return current
-
-
-# --- frames ----------------------------------------------------------------------------------------------------------
-
-
-def turn(angle: float) -> Frame:
-    c, s = math.cos(angle), math.sin(angle)
-    matrix = np.array([[c, s], [-s, c]])
-
-    def carried(vectors: Floats) -> Floats:
-        return vectors @ matrix
-
-    return Frame(f"turned by {angle} rad", carried, carried, carried,
-                 lambda current: turned_current(current, angle), angle=angle)  # fmt: skip
-
-
-def shift(way: Floats) -> Frame:
-    return Frame(f"moved by {way} m", lambda q: q + way, current=lambda current: shifted_current(current, way))
-
-
-def mirror() -> Frame:
-    def carried(vectors: Floats) -> Floats:
-        return vectors * np.array([1.0, -1.0])
-
-    return Frame("mirrored", carried, carried, carried, mirrored_current, mirrored=True)
-
-
 REST = Frame("at rest")
-TURN, SHIFT, MIRROR = turn(1.1), shift(np.array([0.3, -0.2])), mirror()
+TURN, SHIFT, MIRROR = Frame("turned", angle=1.1), Frame("moved", way=(0.3, -0.2)), Frame("mirrored", is_mirror=True)
 FRAMES = (TURN, SHIFT, MIRROR)
-
-
-def moving(velocity: tuple[float, float]) -> Frame:
-    """The frame from which everything is seen to move at a velocity [m/s] more."""
-
-    def current(found: Any) -> Any:
-        if isinstance(found, UniformCurrent):
-            return UniformCurrent(np.add(found.u_x, velocity[0])[()], np.add(found.u_y, velocity[1])[()])
-        return found
-
-    return Frame(f"moving at {velocity} m/s", velocities=lambda v: v + velocity, current=current, drift=velocity)
-
-
-MOVING = moving((0.03, -0.02))
+MOVING = Frame("moving", drift=(0.03, -0.02))
 """At a speed at which nodes swim, and currents flow."""
 
 

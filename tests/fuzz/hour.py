@@ -3,14 +3,13 @@
 A trial is a promise, a set of terms and a seed, and its name says all three: "bits alone/contact, loads/17".
 """
 
-import contextlib
 import itertools
 import multiprocessing
-import os
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from multiprocessing.pool import AsyncResult, Pool
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from random import Random
 from typing import NamedTuple
 
@@ -23,8 +22,6 @@ from fuzz.scenes import (
     CONTACT,
     EVERYTHING,
     FLUID,
-    N_ROBOTS,
-    N_STROKES,
     OWN,
     PLAIN,
     RARE,
@@ -35,11 +32,8 @@ from fuzz.scenes import (
     draw_case,
 )
 
-LIMIT = 120.0
-"""Seconds of processor time for a trial, and for machine code that it may have to compile: others may use it, too."""
-
-WAIT = 10.0 * LIMIT
-"""Seconds in which one uses less than a second of processor time before it is taken for one that waits for ever."""
+LIMIT = 1200.0
+"""Seconds for a trial, and for machine code that it may have to compile: others may use the processor, too."""
 
 BLOCK = 8
 """Cases of a set of terms, which has to be compiled, before the next."""
@@ -109,84 +103,44 @@ class Workers:
     """One process at a time: a fresh one after a hang, and for every set of terms, whose machine code stays loaded."""
 
     def __init__(self) -> None:
-        self._terms = PLAIN
-        self._start()
+        self._begin(PLAIN)
 
-    def _start(self) -> None:
-        self._pool: Pool = multiprocessing.get_context("spawn").Pool(1)
-        self._process = self._pool.apply(os.getpid)
+    def _begin(self, terms: Terms) -> None:
+        self._terms = terms
+        self._pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
 
-    def failure(self, trial: Trial) -> BaseException | None:
-        """What the trial raised, TimeoutError for one that hung or crashed."""
+    def failure(self, trial: Trial) -> Exception | None:
+        """What the trial raised, or that it hung or crashed."""
         if trial.terms and trial.terms != self._terms:
-            self._renew()
-            self._terms = trial.terms
-        raised: list[BaseException] = []
-        answer = self._pool.apply_async(attempt, (trial,), error_callback=raised.append)
-        with contextlib.suppress(OSError):  # there is no such process: it crashed
-            self._wait(answer)
-        if answer.ready():
-            return raised[0] if raised else None
-        self._renew()
-        return TimeoutError(f"no answer within {LIMIT:g} s: it hangs, or its process crashed")
-
-    def _wait(self, answer: AsyncResult) -> None:
-        """Wait until there is an answer, or time is up."""
-        begin = used = processor_time(self._process)
-        since = time.monotonic()
-        while not answer.ready() and used < begin + LIMIT and time.monotonic() < since + WAIT:
-            answer.wait(0.5)
-            now = processor_time(self._process)
-            if now > used + 1.0:
-                used, since = now, time.monotonic()
-
-    def _renew(self) -> None:
-        self.stop()
-        self._start()
+            self.stop()
+            self._begin(trial.terms)
+        try:
+            self._pool.submit(attempt, trial).result(LIMIT)
+        except (TimeoutError, BrokenProcessPool) as lost:
+            self.stop()
+            self._begin(self._terms)
+            return lost
+        except Exception as raised:  # whatever a trial finds
+            return raised
+        return None
 
     def stop(self) -> None:
-        self._pool.terminate()
-        self._pool.join()
+        for process in multiprocessing.active_children():
+            process.kill()
+        self._pool.shutdown()
 
 
-def processor_time(process: int) -> float:
-    """Seconds of processor time that a process has used, as Linux counts them (clock_getcpuclockid)."""
-    return time.clock_gettime(~process << 3 | 2)
-
-
-class Tally:
-    """Counts of a run, and what it found."""
-
-    def __init__(self) -> None:
-        self.tried: Counter[str] = Counter()
-        self.failed: Counter[str] = Counter()
-        self.cases: set[tuple[Terms, int]] = set()
-
-    def note(self, trial: Trial, failure: BaseException | None) -> None:
-        self.tried[trial.promise] += 1
-        if trial.promise not in OF_SWIMS:
-            self.cases.add((trial.terms, trial.seed))
-        if failure is not None:
-            self.failed[f"{trial.promise}: {type(failure).__name__}"] += 1
-            text = f"{type(failure).__name__}: {' '.join(str(failure).split()):.300}"
-            print(f'FAILED pytest tests/fuzz --fuzz-case "{trial}"  # {text}', flush=True)
-
-    def __str__(self) -> str:
-        strokes = sum(self.tried[name] for name in (*PROMISES, *TAME_PROMISES)) * N_ROBOTS * N_STROKES
-        sets = len({terms for terms, _ in self.cases})
-        lines = [f"{len(self.cases)} cases of {sets} sets of terms, at least {strokes} strokes of a robot, tried:"]
-        lines += [f"  {name}: {count}" for name, count in sorted(self.tried.items())]
-        lines += [f"failures: {sum(self.failed.values())}"]
-        lines += [f"  {kind}: {count}" for kind, count in sorted(self.failed.items())]
-        return "\n".join(lines)
-
-
-def run(minutes: float, seed: int) -> Tally:
-    """Try until time is up."""
-    tally, workers, end = Tally(), Workers(), time.monotonic() + 60.0 * minutes
+def run(minutes: float, seed: int) -> tuple[int, list[str]]:
+    """Try until time is up; returns the number of trials, and the lines on those that failed, printed as they come."""
+    workers, end, tried, failed = Workers(), time.monotonic() + 60.0 * minutes, Counter[str](), list[str]()
     for trial in trials(seed):
         if time.monotonic() > end:
             break
-        tally.note(trial, workers.failure(trial))
+        tried[trial.promise] += 1
+        if (failure := workers.failure(trial)) is not None:
+            text = f"{type(failure).__name__}: {' '.join(str(failure).split()):.300}"
+            failed.append(f'FAILED pytest tests/fuzz --fuzz-case "{trial}"  # {text}')
+            print(failed[-1], flush=True)
     workers.stop()
-    return tally
+    print(*(f"{name}: {count}" for name, count in sorted(tried.items())), sep="\n")
+    return tried.total(), failed

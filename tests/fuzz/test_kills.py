@@ -114,30 +114,9 @@ def assert_every_checkpoint(folder):
         assert load(folder / "checkpoints" / f"model_{strokes:09d}.zip").actions == "pairs"
 
 
-def some(few, many):
-    """Seeds: few of them, the others only with --slow."""
-    return [*range(few), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(few, many))]
-
-
-@pytest.mark.parametrize("seed", some(1, 30))
-def test_a_run_killed_at_any_touch_of_a_file_continues(seed, tmp_path, touches, ends):
-    at = random.Random(seed).randint(1, touches["kill"])
-    process = start("kill", at, tmp_path / "run")
-    process.communicate()
-    assert process.returncode == -9
-    assert_readable(tmp_path / "run")
-    assert_continues(tmp_path / "run", ends)
-
-
-@pytest.mark.parametrize("seed", some(1, 24))
-def test_a_run_killed_at_any_moment_continues(seed, tmp_path, touches, ends):
-    process = start("kill", 0, tmp_path / "run")
-    with suppress(subprocess.TimeoutExpired):
-        process.wait(random.Random(seed).uniform(0.3, 1.0) * touches["seconds"])
-    process.kill()
-    process.communicate()
-    assert_readable(tmp_path / "run")
-    assert_continues(tmp_path / "run", ends)
+def some(end, many):
+    """An end and its seeds: one, the others only with --slow."""
+    return [(end, 0), *(pytest.param(end, seed, marks=pytest.mark.slow) for seed in range(1, many))]
 
 
 def assert_one_sentence(process):
@@ -146,12 +125,22 @@ def assert_one_sentence(process):
     assert errors.count("\n") == 1 and errors.endswith("no space left on device.\n"), errors
 
 
-@pytest.mark.parametrize("seed", some(1, 12))
-def test_a_run_on_a_full_disk_ends_in_a_sentence_and_continues(seed, tmp_path, touches, ends):
-    process = start("full", random.Random(seed).randint(1, touches["full"]), tmp_path / "run")
-    assert_one_sentence(process)
-    assert_readable(tmp_path / "run")
-    assert_continues(tmp_path / "run", ends)
+@pytest.mark.parametrize("end, seed", [*some("touch", 30), *some("moment", 24), *some("full disk", 12)])
+def test_a_run_continues_that_is_killed_at_any_touch_of_a_file_or_moment_or_meets_a_full_disk(
+    end, seed, tmp_path, touches, ends
+):
+    rng, folder = random.Random(seed), tmp_path / "run"
+    if end == "full disk":
+        assert_one_sentence(start("full", rng.randint(1, touches["full"]), folder))
+    else:
+        process = start("kill", rng.randint(1, touches["kill"]) if end == "touch" else 0, folder)
+        with suppress(subprocess.TimeoutExpired):
+            process.communicate(timeout=None if end == "touch" else rng.uniform(0.3, 1.0) * touches["seconds"])
+        process.kill()
+        process.communicate()
+        assert process.returncode == -9 or end == "moment"
+    assert_readable(folder)
+    assert_continues(folder, ends)
 
 
 @pytest.mark.slow
