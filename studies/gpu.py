@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from itertools import product
 from pathlib import Path
 from typing import Any, get_args
@@ -70,6 +70,7 @@ def swirl(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.fl
     return 0.02 * np.sin(10.0 * x) * np.cos(10.0 * y), -0.02 * np.cos(10.0 * x) * np.sin(10.0 * y)
 
 
+@cache
 def scenes() -> dict[str, Scene]:
     """Scenes that are compared, by name: every term, scheme, preset and kind of actuator, and other robots."""
     contact, rectangle = Contact(), Body.rectangle(0.06, 0.03)
@@ -299,21 +300,21 @@ class Options:
 
     device: str = "cuda"
     """"cuda", or "scalar", which compares bits alone."""
-    compared: tuple[str, ...] = (*scenes(), *environments())
-    """Scenes and environments that are compared."""
-
-    def __post_init__(self) -> None:
-        require_known("scene", self.compared, (*scenes(), *environments()))
+    compared: tuple[str, ...] = ()
+    """Scenes and environments that are compared; all if none is named."""
 
 
 def run(options: Options, results: Results) -> str | None:
     """Compare scenes and environments, and measure, but for what is in the file; what is measured is kept at once."""
     if options.device == "cuda":
         results["gpu"] = gpu()
+    all_of_them = (*scenes(), *environments())
+    require_known("scene", options.compared, all_of_them)
+    chosen = options.compared or all_of_them
     bits, observations = results.setdefault("bits", {}), results.setdefault("observations", {})
     with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
         for kept, compare, ours in ((bits, compared, scenes()), (observations, observed, environments())):
-            missing = [name for name in ours if name in options.compared and name not in kept]
+            missing = [name for name in ours if name in chosen and name not in kept]
             for name, found in zip(missing, pool.map(compare, missing, [options.device] * len(missing)), strict=True):
                 kept[name] = found
                 print(name, "same bits" if found["same"] else ", ".join(found["differing"]), sep=": ", flush=True)

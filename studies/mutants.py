@@ -104,9 +104,9 @@ def run(options: Options, results: Results) -> None:
         subprocess.run(["git", "checkout-index", "--all", f"--prefix={root}/"], check=True)
         if not passes(root, "--collect-only", "--all", *options.tests):
             raise ValueError("Without a change the tests cannot be collected.")
-        for name, line, *change in drawn(root, options.count, options.kernels, options.seed):
-            before, after, text = changed(root, name, line, *change)
-            told = {"file": name, "line": line, "before": before, "after": after}
+        for mutant in drawn(root, options.count, options.kernels, options.seed):
+            name, (before, after, text) = mutant[0], changed(root, *mutant)
+            told = {"file": name, "line": mutant[1], "before": before, "after": after}
             if json.dumps(told)[:-1] not in known:
                 original, began = (root / name).read_bytes(), time.perf_counter()
                 (root / name).write_text(text, encoding="utf-8")

@@ -8,12 +8,11 @@ from functools import partial
 import numpy as np
 import pytest
 
-from agents.tasks import learning
 from seastar_gym import Numerics, Scene, Seastar, der
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.tasks import make_batch
 from seastar_gym.scene.actuators.sma_limb import FREQUENCIES, MEASURED
-from studies import benchmark, film, fit, gallery, gpu, mutants, robustness, swim_page, tasks
+from studies import benchmark, fit, gallery, gpu, mutants, robustness, swim_page, tasks
 from studies.command import main
 from studies.frame import DOCS
 from studies.operations import count_operations, flops
@@ -22,23 +21,24 @@ from studies.pages import numbers
 CURVES = fit.read_curves()
 SHORTEST = {
     "benchmark --also throughput --seconds 0": ({"speed_history.json", "speed_history.png"}, {
-        benchmark: {"things": lambda: {"a": (1, lambda: lambda: 2.0)}, "unit": lambda: 0.5, "NODES_PER_LIMB": (5, 10),
-                    "BATCH": 8},
+        "studies.benchmark": {"things": lambda: {"a": (1, lambda: lambda: 2.0)}, "unit": lambda: 0.5,
+                              "NODES_PER_LIMB": (5, 10), "BATCH": 8},
     }),
-    "film": ({""}, {film: {"SeastarSwimEnv": partial(SeastarSwimEnv, path=[[0.02, 0.0]])}}),
-    "fit": (set(), {fit: {"read_curves": lambda: {40: CURVES[40]}}}),
+    "film": ({""}, {"studies.film": {"SeastarSwimEnv": partial(SeastarSwimEnv, path=[[0.02, 0.0]])}}),
+    "fit": (set(), {"studies.fit": {"read_curves": lambda: {40: CURVES[40]}}}),
     "gallery": ({"gallery.json", "default.png", "tubes.png"}, {
-        gallery: {"EXHIBITS": [each for each in gallery.EXHIBITS if each.name in ("default", "tubes")],
-                  "STROKES": 1, "ROUNDS": 1, "ROBOTS": 1},
+        "studies.gallery": {"EXHIBITS": [each for each in gallery.EXHIBITS if each.name in ("default", "tubes")],
+                            "STROKES": 1, "ROUNDS": 1, "ROBOTS": 1},
     }),
     "gpu --device scalar --compared 'observations, pairs'": ({"gpu.json"}, {}),
     "robustness": ({"robustness.json"}, {
-        robustness: {"N_PATHS": 1, "SEEDS": range(1), "OF_SEEDS": ("soft",), "PERIODS": {robustness.CAMERA: 0.2},
-                     "CONDITIONS": {"soft": robustness.Condition(modulus=0.5)}},
-        learning: {"ENOUGH": 2048},
+        "studies.robustness": {"N_PATHS": 1, "SEEDS": range(1), "OF_SEEDS": ("soft",),
+                               "PERIODS": {robustness.CAMERA: 0.2},
+                               "CONDITIONS": {"soft": robustness.Condition(modulus=0.5)}},
+        "agents.tasks.learning": {"ENOUGH": 2048},
     }),
-    "swim_page": ({""}, {swim_page: {"record": partial(swim_page.record, "fast", 1)}}),
-    "tasks --held-out --tasks SeastarPrizes-v0": (set(), {tasks: {"held_out": partial(tasks.held_out, n=2)}}),
+    "swim_page": ({""}, {"studies.swim_page": {"record": partial(swim_page.record, "fast", 1)}}),
+    "tasks --held-out --tasks SeastarPrizes-v0": (set(), {"studies.tasks": {"held_out": partial(tasks.held_out, n=2)}}),
 }  # fmt: skip
 """Commands, files that they write, "" for the one that --out names, and what of them is made shorter."""
 
@@ -48,7 +48,7 @@ def test_a_study_runs_in_its_shortest_form_and_writes_its_files(command, tmp_pat
     files, shorter = SHORTEST[command]
     for module, values in shorter.items():
         for name, value in values.items():
-            monkeypatch.setattr(module, name, value)
+            monkeypatch.setattr(f"{module}.{name}", value)
     out = tmp_path / ("file.gif" if files == {""} else "folder")
     words = [word.strip("'") for word in re.findall(r"'[^']*'|\S+", command)]
     assert main([*words, "--out", str(out)]) == 0
