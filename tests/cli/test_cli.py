@@ -34,7 +34,7 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(Path(__file__).parents[1] / "controllers")
     for name, content in {
-        "path.csv": "0.03, 0.0\n", "ragged.csv": "0.1, 0.0\n0.2\n", "three.py": THREE_LIMBS, "bound.json": "{}",
+        "path.csv": "0.03, 0.0\n", "ragged.csv": "0.1, 0.0\n0.2\n", "three.py": THREE_LIMBS,
         "three.json": json.dumps(Scene(robot=Seastar(n_limbs=3)).to_dict()), "damaged.zip": "PK\x03\x04 and nothing",
         "wrong.py": "import math\nscene = nothing\n", "damaged.safetensors": "nothing", "damaged.json": "{}",
     }.items():  # fmt: skip
@@ -318,7 +318,6 @@ def test_a_report_has_the_curves_of_runs_and_how_it_was_made(folder, capsys):
     (folder / "run").mkdir()
     Path("run", "progress.csv").write_text("1000,200,5\n2000,190,5\n")
     arguments = ["--agents", "learned", "straight", "--waypoint-radius", "0.5", "--report", "--runs", "run"]
-    arguments += ["--bound", "none.json"]  # the learned policy's speeds stand there too
     assert main(["evaluate", *arguments, "--fidelity", "fast", "--out", "out"]) == 0
     assert "report.html" in capsys.readouterr().out
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
