@@ -74,14 +74,16 @@ class Certificate:
     def __post_init__(self) -> None:
         if not isinstance(self.scene, Scene):
             raise ValueError(f"scene must be a Scene, not {shown(self.scene)}.")
-        if not self.settings or not all(isinstance(each, Setting) for each in self.settings):
+        settings = self.settings if isinstance(self.settings, tuple | list) else ()
+        if not settings or not all(isinstance(each, Setting) for each in settings):
             raise ValueError(f"settings must be some Settings, not {shown(self.settings)}.")
         known = set(self.settings[0].errors)
         if any(set(each.errors) != known for each in self.settings):
             raise ValueError("settings must have errors of the same classes of commands.")
         for name in ("promised", "actions"):
             some = getattr(self, name)
-            if not some or not known.issuperset(some):
+            classes = [each for each in some if isinstance(each, str)] if isinstance(some, tuple | list) else []
+            if not classes or len(classes) != len(some) or not known.issuperset(classes):
                 raise ValueError(f"{name} must be some of {', '.join(sorted(known))}, not {shown(some)}.")
         require_count("samples", self.samples, 2, MOST_SAMPLES)
         require_measured("limit_error", self.limit_error)

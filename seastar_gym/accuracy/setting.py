@@ -126,7 +126,7 @@ def _require_classes(name: str, errors: Any) -> None:
 
 def require_measured(name: str, error: float) -> None:
     """Refuse what is no measured error: a number from 0 on, or inf for a swim that failed."""
-    if error != math.inf:
+    if not (isinstance(error, float) and error == math.inf):
         require_number(name, error, "1", zero_allowed=True)
 
 

@@ -57,7 +57,9 @@ class Entry:
         texts = (self.task, self.agent, self.measure, self.unit, self.version)
         if not all(isinstance(text, str) and text.isprintable() and len(text) <= LONGEST for text in texts):
             raise ValueError(f"its names are not all texts on one line, of {LONGEST} characters at most")
-        if self.better not in ("less", "more") or self.fidelity not in ("", *get_args(Fidelity)) or not self._is_whole:
+        words = all(isinstance(word, str) for word in (self.better, self.fidelity))
+        known = words and self.better in ("less", "more") and self.fidelity in ("", *get_args(Fidelity))
+        if not known or not self._is_whole:
             raise ValueError(f"the entry of {self.agent} on {self.task} is not whole")
         if self.seeds != list(range(HELD_OUT_SEED, HELD_OUT_SEED + len(self.seeds))):
             raise ValueError(f"the seeds of {self.agent} on {self.task} are not {HELD_OUT_SEED} and those that follow")

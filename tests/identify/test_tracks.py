@@ -2,6 +2,7 @@
 
 import math
 import sys
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -198,7 +199,10 @@ REFUSED = [
     (lambda file: read_deeplabcut(file, 30.0, "c"), SEVERAL, "has the individuals a, b: name one"),
     (lambda file: read_deeplabcut(file, 30.0, "a"), DEEPLABCUT, "names no individuals: leave --individual out"),
     (lambda file: read_sleap(sleap_h5(file.parent, "sleap.h5", ""), 10.0), "", "has the individuals a, b"),
-    (lambda file: read_sleap(file.rename(file.with_suffix(".h5")), 10.0), "x", "h5 is no analysis file of SLEAP"),
+    pytest.param(
+        lambda file: read_sleap(file.rename(file.with_suffix(".h5")), 10.0), "x", "h5 is no analysis file of SLEAP",
+        marks=pytest.mark.skipif(find_spec("h5py") is None, reason="needs h5py"),
+    ),
     (read_pose, "time,x\n0,1\n", "the first line must be time,x,y,theta"),
     (read_pose, "time,x,y\n", "the first line must be time,x,y,theta"),
     (read_pose, "time,x,y\n0,1\n", "line 2: the line must have 3 fields"),
