@@ -91,7 +91,7 @@ def killed_by(root: Path, file: str, tests: tuple[str, ...]) -> str:
     tests = tests or (room if (root / room).exists() else "tests",)
     with tempfile.TemporaryDirectory() as cache:
         own = {"NUMBA_CACHE_DIR": cache} if root / file in kernel_sources(root / PACKAGE) else {}
-        runs = {"core": tests, "all": (*tests, "--all")}
+        runs = {"core": (*tests, "--core"), "all": (*tests, "--all")}
         return next((by for by, words in runs.items() if not passes(root, *words, **own)), "nothing")
 
 
@@ -102,7 +102,7 @@ def run(options: Options, results: Results) -> None:
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder).resolve()
         subprocess.run(["git", "checkout-index", "--all", f"--prefix={root}/"], check=True)
-        if not passes(root, "--collect-only", "--all", *options.tests):
+        if not passes(root, "--collect-only", *options.tests):
             raise ValueError("Without a change the tests cannot be collected.")
         for mutant in drawn(root, options.count, options.kernels, options.seed):
             name, (before, after, text) = mutant[0], changed(root, *mutant)

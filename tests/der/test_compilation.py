@@ -44,14 +44,15 @@ class Copy:
         self.folder, self.cache = folder / "copy", folder / "cache"
         shutil.copytree(PACKAGE, self.folder / "seastar_gym", ignore=shutil.ignore_patterns("__pycache__"))
 
-    def run(self, code: str = ENERGY, **environment: str) -> list[float]:
+    def start(self, code: str = ENERGY, **environment: str) -> subprocess.Popen[str]:
         path = {"PYTHONPATH": str(self.folder), "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": str(self.cache)}
-        answer = subprocess.run(
-            [sys.executable, "-c", code],
-            cwd=self.folder, env={**os.environ, **path, **environment}, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert answer.returncode == 0, answer.stderr
-        return [float(word) for word in answer.stdout.split()]
+        env, pipe = {**os.environ, **path, **environment}, subprocess.PIPE
+        return subprocess.Popen(
+            [sys.executable, "-c", code], cwd=self.folder, env=env, stdout=pipe, stderr=pipe, text=True
+        )
+
+    def run(self, code: str = ENERGY, **environment: str) -> list[float]:
+        return numbers(self.start(code, **environment))
 
     def edit(self, file: str, old: str, new: str) -> None:
         """Replace text in a file without a change of its size or time, so that only its content tells."""
@@ -60,6 +61,13 @@ class Copy:
         assert text.count(old) == 1 and len(old) == len(new)
         path.write_text(text.replace(old, new), encoding="utf-8")
         os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+
+
+def numbers(process: subprocess.Popen[str]) -> list[float]:
+    """What a process prints before it ends."""
+    out, err = process.communicate()
+    assert process.returncode == 0, err
+    return [float(word) for word in out.split()]
 
 
 @pytest.fixture
@@ -81,6 +89,32 @@ def test_an_edited_kernel_never_runs_from_the_cache_and_an_unchanged_one_always_
     assert copy.run() == [pytest.approx(7.0 * energy), 0, 1]
     copy.edit("seastar_gym/der/terms/stretching.py", "return 3.5 * load", "return 0.5 * load")
     assert copy.run() == [energy, 1, 0]
+
+
+def test_processes_that_want_the_same_code_at_once_compile_it_once(copy):
+    answers = [numbers(process) for process in [copy.start() for _ in range(3)]]
+    assert sorted(answer[1:] for answer in answers) == [[0, 1], [1, 0], [1, 0]]
+    assert len({answer[0] for answer in answers}) == 1
+
+
+KEPT = """
+import time
+from seastar_gym.simd.compilation import kept_code
+def make():
+    print("makes", flush=True)
+    time.sleep({})
+    return b"code"
+print(kept_code("name", make))
+"""
+
+
+def test_a_process_that_is_killed_while_it_compiles_lets_the_others_go_on(copy):
+    first = copy.start(KEPT.format(600.0))
+    assert first.stdout.readline() == "makes\n"
+    second = copy.start(KEPT.format(0.0))
+    first.kill()
+    first.communicate()
+    assert second.communicate()[0].split() == ["makes", "b'code'"]
 
 
 def test_code_of_another_lane_width_is_another_code(copy):

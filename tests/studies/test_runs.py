@@ -150,7 +150,8 @@ TOY = {
     "tests/toy/test_code.py": "from pytest import mark\nfrom toy.code import larger\n"
     "def test_core(): assert larger(1) > 0\n"
     "@mark.skipif('not config.option.all')\ndef test_all(): assert larger(1) == 3\n",
-    "conftest.py": "def pytest_addoption(parser):\n    parser.addoption('--all', action='store_true')\n",
+    "conftest.py": "def pytest_addoption(parser):\n"
+    "    parser.addoption('--all', action='store_true')\n    parser.addoption('--core', action='store_true')\n",
 }
 
 
