@@ -187,12 +187,10 @@ CHANGED = [
     ({"limb_mirror": [[5, 1]]}, "an index of its limb_mirror must be a whole number from 0 to 0"),
     *(({"limb_mirror": pairs}, "its limb_mirror is no mirror, which undoes itself")
       for pairs in ([[1, 1], [1, 1]], [[1, 1], [0, -1]])),
-    ({"own": {"kinds": []}}, "its own must be an object with kinds and with_stations"),
-    ({"own": {"kinds": [], "with_stations": 1}}, "its own must be an object with kinds and with_stations"),
-    *(({"own": {"kinds": kinds, "with_stations": True}}, "the kinds of its own numbers must be of")
-      for kinds in (["spin"], [["scalar"]], ["scalar"] * 1001)),
-    *(({"own": {"kinds": [], "with_stations": True, "stations": count}}, "its stations must be a whole number")
-      for count in (0, 10)),
+    *(({"entries": entries}, "entries must be a tuple of")
+      for entries in (None, 3, "scalar", ["spin"], [["scalar"]])),
+    *(({"stations": stations}, "stations must be a whole number") for stations in (None, 0, 10)),
+    *(({"shows_limbs": shows}, "shows_limbs must be True or False") for shows in (None, 1)),
 ]  # fmt: skip
 """Entries of the description, and words of the sentence."""
 TEXTS = [
@@ -257,8 +255,8 @@ OF_OWN = Description("pairs", False, Scene(actuator=Own()), (3,))
         (lambda: save(random_policy(OF_OWN), "own.safetensors"), "Scene.actuator is a Own, "),
         (lambda: save(random_policy(OF_OWN), "own.safetensors"), "register_part"),
         (lambda: TASK._replace(limb_mirror=[(0, 1)]).check(), "ts limb_mirror"),
-        (lambda: TASK._replace(entries=("colour",)).check(), "must be of scalar, turn, vector"),
-        (lambda: TASK._replace(shows_limbs=1).check(), "must be an object with kinds and with_stations"),
+        (lambda: TASK._replace(entries=("colour",)).check(), "must be a tuple of scalar, pseudoscalar, vector"),
+        (lambda: TASK._replace(shows_limbs=1).check(), "shows_limbs must be True or False"),
         (lambda: TASK._replace(hidden=[8]).check(), "hidden must be a tuple of widths"),
     ],
 )
