@@ -227,7 +227,7 @@ def test_odd_entries_are_refused(certificate, golden):
     for name, part in {"certificate.txt": certificate, "setting.txt": first}.items():
         kept = {field.name: getattr(part, field.name) for field in fields(part)}
         entries = {name: value for name, value in kept.items() if name not in ("errors", "typical")}
-        golden(name, "\n".join(taken(partial(replace, part), entries)))
+        golden(f"odd_{name}", "\n".join(taken(partial(replace, part), entries)))
     own, negative = {"own": 0.1}, first.errors | {"small": -0.1}
     for change in ({"typical": own}, {"errors": own, "typical": own}, {"errors": negative}, {"typical": negative}):
         with assert_refused("errors" if "errors" in change else "typical"):
