@@ -10,7 +10,6 @@ once wait for the first of them, which compiles it, and load it then.
 """
 
 import contextlib
-import fcntl
 import functools
 import hashlib
 import logging
@@ -164,22 +163,19 @@ class _SoundFile(IndexDataCacheFile):
 def _alone(path: Path) -> Iterator[None]:
     """Hold a lock file, for one process at a time; whoever ends, even by a kill, lets go. Without where none can be."""
     with contextlib.ExitStack() as stack:
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, ImportError):  # Windows has no fcntl
+            import fcntl
+
             path.parent.mkdir(parents=True, exist_ok=True)
             file = stack.enter_context(path.open("ab"))
             stack.callback(fcntl.flock, file, fcntl.LOCK_UN)  # a forked child has the file open, too
             until = time.monotonic() + PATIENCE
-            while not _has_locked(file) and time.monotonic() < until:
+            while time.monotonic() < until:
+                with contextlib.suppress(BlockingIOError):
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    break
                 time.sleep(0.05)
         yield
-
-
-def _has_locked(file) -> bool:
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
 
 
 class _DigestCache(FunctionCache):
@@ -210,10 +206,7 @@ class _DigestCache(FunctionCache):
 
     def save_overload(self, sig, data):
         # OSError: the disk is full, or the folder is gone or no longer ours.
-        with (
-            contextlib.suppress(OSError),
-            self._lock(self._impl.filename_base),
-        ):  # the index is read, and written with one line more
+        with contextlib.suppress(OSError), self._lock(self._impl.filename_base):  # of the index, which gets a line
             super().save_overload(sig, data)
 
     def end_turn(self):
@@ -225,9 +218,6 @@ class _NoCache(NullCache):
     def load_overload(self, sig, target_context):
         return _say_that_it_compiles("in every process, as no folder for the code can be written: set NUMBA_CACHE_DIR")
 
-    def end_turn(self):
-        """Nobody waits."""
-
 
 class EntryPoint(CPUDispatcher):
     """A function that Python calls, each kind of which one process compiles while others wait for it."""
@@ -236,7 +226,8 @@ class EntryPoint(CPUDispatcher):
         try:
             return super().compile(sig)
         finally:
-            self._cache.end_turn()
+            if isinstance(self._cache, _DigestCache):
+                self._cache.end_turn()
 
 
 def kept_code(name: str, make: Callable[[], bytes]) -> bytes:
