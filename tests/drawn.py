@@ -2,12 +2,15 @@
 
 from pathlib import Path
 
+import matplotlib.style
+
 
 def drawn(monkeypatch, module, draw):
     """Text of the one figure that a function of a module draws into a file."""
     figures = []
     monkeypatch.setattr(module, "save_figure", lambda figure, file, **options: figures.append(told(figure, options)))
-    draw(Path("picture.png"))
+    with matplotlib.style.context("default"):
+        draw(Path("picture.png"))
     (text,) = figures
     return text
 
