@@ -27,6 +27,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="also run the tests marked slow")
     parser.addoption("--all", action="store_true", help="run all tests, not only the core: see core.py")
     parser.addoption("--core", action="store_true", help="run the core of the files that are named, too")
+    parser.addoption("--left", action="store_true", help="with --all, after a core: only the tests that it left")
     parser.addoption("--record", action="store_true", help="write what the tests take into times.json")
     parser.addoption("--update", action="store_true", help="write what the tests make into tests/golden")
     parser.addoption("--fuzz-minutes", type=float, default=0.0, help="how long tests/fuzz tries what it draws")

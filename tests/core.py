@@ -4,6 +4,7 @@ Most of a first run is compilation, 8 to 10 s for each kind of scene, and most k
 for machine code of another kind than `KINDS` is left to `--all` as it asks, and so is one that starts a process.
 `times.json` names the tests that take longer than `LONG`, and what each file takes, so that the longest begin first;
 `--record` writes it, of a run with the code on disk. Files named on the command line run whole, but with `--core`.
+After a core, `--all --left` runs what it left and nothing else.
 """
 
 import hashlib
@@ -22,6 +23,7 @@ import pytest
 LONG = 2.0
 """Processor time of a test from which on it is left to --all [s]."""
 TIMES = Path(__file__).parent / "times.json"
+LEFT = "runs with --all"
 HELPERS = {"fc-list", "ldconfig", "lscpu", "uname"}
 """Programs that libraries start to look around."""
 IMPORTS = """
@@ -96,7 +98,7 @@ class Core:
 
     def leave(self, why: str) -> None:
         """End the present test."""
-        self.left = f"{why}: runs with --all"
+        self.left = f"{why}: {LEFT}"
         pytest.skip(self.left)
 
     @pytest.hookimpl(wrapper=True)
@@ -142,6 +144,28 @@ class Core:
         if self.left and report.failed:  # it was left in a thread, or behind an except
             report.outcome, report.longrepr = "skipped", (str(item.path), item.location[1] or 0, self.left)
         return report
+
+
+class Left:
+    """Plugin of pytest: keeps in its cache which tests the core left, and deselects all others if it is asked to."""
+
+    def __init__(self, config: pytest.Config, is_core: bool):
+        self.config, self.is_core, self.tests = config, is_core, list[str]()
+        self.cache = getattr(config, "cache", None)
+
+    def pytest_collection_modifyitems(self, config, items):
+        if config.getoption("--left") and self.cache:
+            wanted = set(self.cache.get("core/left", None) or [item.nodeid for item in items])
+            config.hook.pytest_deselected(items=[item for item in items if item.nodeid not in wanted])
+            items[:] = [item for item in items if item.nodeid in wanted]
+
+    def pytest_runtest_logreport(self, report):
+        if report.skipped and LEFT in str(report.longrepr):
+            self.tests.append(report.nodeid)
+
+    def pytest_sessionfinish(self):
+        if self.is_core and self.cache and not hasattr(self.config, "workerinput"):
+            self.cache.set("core/left", self.tests)
 
 
 class Times:
@@ -219,5 +243,6 @@ def register(config: pytest.Config) -> None:
         kinds = start.kinds
     times = Times("all" if kinds is None else "core", config.getoption("--record"))
     config.pluginmanager.register(times)
+    config.pluginmanager.register(Left(config, kinds is not None))
     if kinds is not None:
         config.pluginmanager.register(Core(set(kinds), set(times.kept.get("long", ()))))
