@@ -43,7 +43,9 @@ try:
     from seastar_gym.command import ended_by_disk
     from seastar_gym.controllers.contract import Policy, actions_of, require_fit
     from seastar_gym.controllers.learned import load as load_policy
+    from seastar_gym.controllers.registry import load_agents
     from seastar_gym.controllers.scripted import scripted
+    from seastar_gym.envs.commands import MOST_LIMBS
     from seastar_gym.evaluation.comparison import evaluate
     from seastar_gym.evaluation.report.charts import Curve, read_progress
     from seastar_gym.evaluation.report.page import Remarks
@@ -87,29 +89,31 @@ def train(options: Options, folder: Path, stop: Callable[[], bool]) -> tuple[PPO
 
 
 def compare(options: Options, folder: Path, remarks: Remarks, film: Callable[[], Path | None]) -> None:
-    """Compare the learned policy with the scripted gait round the pentagon: table, CSV, picture, videos and report.
+    """Compare the learned policy with its rival round the pentagon: table, CSV, picture, videos and report.
 
-    film: Returns the file of the gait's video, if somebody else made it, see `filmed_beside`.
+    film: Returns the file of the rival's video, if somebody else made it, see `filmed_beside`.
     """
     decision_period, robot = options.ppo.decision_period, robot_of(options, folder)
+    others = rivals(decision_period, robot.scene)
     evaluate(
-        {"learned": load_policy(folder / "policy.safetensors"), **script(decision_period, robot.scene)},
+        {"learned": load_policy(folder / "policy.safetensors"), **others},
         "pentagon",
         max_strokes=options.limit(robot.scene),
         decision_period=decision_period,
         scene=robot.scene,
         fidelity=robot.fidelity(options),
         video=options.video,
-        filmed={"script": film},
+        filmed=dict.fromkeys(others, film),
         report=remarks,
         out=folder / "evaluation",
     )
 
 
-def gait_of(decision_period: float | None, scene: Scene | None = None) -> str | None:
-    """Name of the fastest scripted gait round the pentagon for a time between decisions [s]; None if there is none.
+def rival_of(decision_period: float | None, scene: Scene | None = None) -> str | None:
+    """Name of the agent that a policy is compared with for a time between decisions [s]; None if there is none.
 
-    That of a timed environment is the lagged one, where decisions allow it.
+    The fastest scripted gait round the pentagon: in a timed environment the lagged one, where decisions allow it.
+    Gaits are for five limbs; for other numbers of limbs it is the greedy agent.
     """
     for name in ("lagged-pentagon", "pentagon"):
         with suppress(ValueError):  # the gait needs other decisions, or another robot
@@ -117,20 +121,26 @@ def gait_of(decision_period: float | None, scene: Scene | None = None) -> str | 
             if scene is not None:
                 require_fit(gait, scene, actions_of(gait, scene.robot.n_limbs), decision_period)
             return name
-    return None
+    n_limbs = 5 if scene is None else scene.robot.n_limbs
+    return "greedy" if n_limbs != 5 and n_limbs <= MOST_LIMBS else None
 
 
-def script(decision_period: float | None, scene: Scene | None = None) -> dict[str, Policy]:
-    """That gait by its name in the comparison; {} if there is none."""
-    name = gait_of(decision_period, scene)
-    return {} if name is None else {"script": scripted(name, decision_period=decision_period)}
+def rivals(decision_period: float | None, scene: Scene | None = None) -> dict[str, Policy]:
+    """That agent by its name in the comparison, a gait as "script"; {} if there is none."""
+    name = rival_of(decision_period, scene)
+    if name is None:
+        return {}
+    (policy,) = load_agents([name], decision_period=decision_period, scene=scene).values()
+    return {name if name == "greedy" else "script": policy}
 
 
 def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Remarks:
     """Remarks of the report on the training. trained: Length of the whole training [strokes]."""
-    own = robot_of(options, folder).scene is not None
+    scene = robot_of(options, folder).scene
+    rival = rival_of(options.ppo.decision_period, scene)
+    against = {None: "", "greedy": " against greedy"}.get(rival, " against scripted")
     sentences = [
-        f"Swum by the robot of {options.scene}." if own else f'Swum at fidelity "{options.fidelity}".',
+        f"Swum by the robot of {options.scene}." if scene else f'Swum at fidelity "{options.fidelity}".',
         f"Trained for {trained} strokes, seed {options.seed}, by the first of these commands; the last three show the "
         "logs, compare again, and train on.",
     ]
@@ -139,9 +149,9 @@ def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Rema
         sentences.append(
             f"The last session took {seconds:.0f} s, {watch.strokes / seconds:.0f} strokes per second: {shares}."
         )
-    agents = ["--agents", str(folder / "policy.safetensors"), "pentagon", *physics(options, folder)]
+    agents = ["--agents", str(folder / "policy.safetensors"), *filter(None, [rival]), *physics(options, folder)]
     return Remarks(
-        title="Learned against scripted round the pentagon",
+        title=f"Learned{against} round the pentagon",
         sentences=sentences,
         commands=[
             *config_of(folder)["commands"],
@@ -187,13 +197,13 @@ def run(options: Options, arguments: Sequence[str]) -> int:
 
 def train_and_compare(options: Options, folder: Path) -> int:
     """Train, compare, report, in the folder of the run; returns the exit code."""
-    gait = gait_of(options.ppo.decision_period, robot_of(options, folder).scene)
-    with filmed_beside(gait, options, folder) as film:
+    rival = rival_of(options.ppo.decision_period, robot_of(options, folder).scene)
+    with filmed_beside(rival, options, folder) as film:
         return train_beside(film, options, folder)
 
 
 def train_beside(film: Callable[[], Path | None], options: Options, folder: Path) -> int:
-    """Train, compare, report, while the film of the scripted gait is made; returns the exit code."""
+    """Train, compare, report, while the film of its rival is made; returns the exit code."""
     with Interruption() as interruption:
         model, watch = train(options, folder, lambda: interruption.requested)
     export(model, folder)

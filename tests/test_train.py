@@ -18,6 +18,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -32,9 +33,10 @@ from agents.training.folder import held, recorded
 from agents.training.options import Options, read_options, saved_options
 from agents.training.robot import robot_of
 from refusals import assert_told
-from seastar_gym import DomainRandomization, Numerics, Scene, Seastar, Uniform
+from seastar_gym import DomainRandomization, Numerics, Scene, Seastar, SmaWires, Uniform
 from seastar_gym.controllers import learned as policies
 from seastar_gym.controllers.checkpoint import load
+from seastar_gym.controllers.contract import actions_of, require_fit
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import part_name
 
@@ -603,4 +605,19 @@ def test_a_timed_training_is_evaluated_and_kept_in_its_own_decisions(tmp_path, m
     shipped = policies.bundled_file(0.5, tmp_path / "box" / "strokes.safetensors")
     assert policies.load(shipped).decision_period == 0.5
     assert publishing.why_not(policy, saved_options(folder)) is None
-    assert train.script(0.3) == {} and train.script(None)["script"].decision_period is None  # 0.3 s is of no gait
+    assert train.rivals(0.3) == {} and train.rivals(None)["script"].decision_period is None  # 0.3 s is of no gait
+
+
+@pytest.mark.parametrize(
+    "n_limbs, period, name",
+    [(5, None, "pentagon"), (5, 0.2, "lagged-pentagon"), (5, 0.3, None), (3, None, "greedy"), (4, 0.2, "greedy")],
+)
+def test_a_robot_of_any_number_of_limbs_has_a_rival_that_fits(n_limbs, period, name):
+    scene = Scene(Seastar(n_limbs, 3), numerics=Scene.preset("fast").numerics)
+    scene = scene if period is None else replace(scene, actuator=SmaWires())
+    assert train.rival_of(period, scene) == name
+    if name is not None:
+        (policy,) = train.rivals(period, scene).values()
+        require_fit(policy, scene, actions_of(policy, n_limbs), period)
+        with pytest.raises(ValueError, match=f"of {n_limbs} limbs, the environment's has 6"):
+            require_fit(policy, replace(scene, robot=Seastar(6, 3)), actions_of(policy, n_limbs), period)

@@ -1,4 +1,4 @@
-"""The film of the scripted gait, which needs no policy: a process of its own makes it while the policy is trained."""
+"""The film of the agent that a policy is compared with: a process of its own makes it while the policy is trained."""
 
 import os
 import signal
@@ -19,24 +19,24 @@ LOWEST = 19
 
 
 @contextmanager
-def filmed_beside(gait: str | None, options: Options, folder: Path) -> Iterator[Callable[[], Path | None]]:
-    """Context in which `seastar evaluate` films a gait round the pentagon, beside whatever else is done.
+def filmed_beside(agent: str | None, options: Options, folder: Path) -> Iterator[Callable[[], Path | None]]:
+    """Context in which `seastar evaluate` films an agent round the pentagon, beside whatever else is done.
 
     Gives a function that waits for the film and returns its file, which is there until the context ends; None where
-    there is none: no film or gait was asked for, there is one processor only, or no process could be made or it was
+    there is none: no film or agent was asked for, there is one processor only, or no process could be made or it was
     lost.
 
-    gait: Name of the gait, None for none. folder: Of the run with these options.
+    agent: Its name, None for none. folder: Of the run with these options.
     """
-    if gait is None or not options.video or processors() < 2:
+    if agent is None or not options.video or processors() < 2:
         yield lambda: None
         return
     with tempfile.TemporaryDirectory(prefix="seastar-film-", ignore_cleanup_errors=True) as place:
-        words = ["--agents", gait, *physics(options, folder.resolve()), "--seconds", str(options.seconds)]
+        words = ["--agents", agent, *physics(options, folder.resolve()), "--seconds", str(options.seconds)]
         process = _begun([*words, "--video", "--out", place])
 
         def film() -> Path | None:
-            file = Path(place, f"{gait}.mp4")
+            file = Path(place, f"{agent}.mp4")
             return file if process is not None and process.wait() == 0 and file.is_file() else None
 
         try:

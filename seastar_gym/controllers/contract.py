@@ -77,6 +77,9 @@ def require_fit(
     n_seen = Layout.of(scene).size if n_seen is None else n_seen
     if hasattr(policy, "require_fit"):
         policy.require_fit(scene, actions, n_seen, challenge)
+    limbs = getattr(policy, "n_limbs", None)
+    if limbs is not None and limbs != scene.robot.n_limbs:
+        raise ValueError(f"The policy is for a robot of {limbs} limbs, the environment's has {scene.robot.n_limbs}.")
     ours = getattr(policy, "decision_period", None)
     theirs = scene.actuator.period if decision_period is None else decision_period
     if ours is not None and not math.isclose(ours, theirs):

@@ -116,6 +116,13 @@ class Searcher(ABC):
     actions: Actions
     decision_period: float | None = None
     """Time between decisions [s]. None means a stroke."""
+    scene: Scene
+    """Scene that the policy knows."""
+
+    @property
+    def n_limbs(self) -> int:
+        """Number of limbs of the robot that it drives."""
+        return self.scene.robot.n_limbs
 
     @abstractmethod
     def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:

@@ -69,6 +69,7 @@ class OpenLoopPolicy:
         if commands.ndim != 2 or commands.size == 0:
             raise ValueError(f"A gait needs commands of shape (n_strokes, n_limbs), not {commands.shape}.")
         self.actions: Actions = actions
+        self.n_limbs = commands.shape[1]
         self.decision_period = decision_period
         self._gait = to_actions(commands, actions, commands.shape[1])
 
@@ -101,6 +102,7 @@ class RandomPolicy:
         require_kind("rng", rng, np.random.Generator, "a numpy Generator")
         require_limbs(n_limbs)
         self.actions: Actions = actions
+        self.n_limbs = n_limbs
         self._rng = rng
         self._space = action_space(actions, n_limbs)
 
