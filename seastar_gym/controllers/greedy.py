@@ -113,6 +113,7 @@ def require_search(scene: Scene, waypoint_radius: float, reward: object, decisio
 class Searcher(ABC):
     """Base of policies that choose actions by observations alone, for one robot or for many."""
 
+    batched = True
     actions: Actions
     decision_period: float | None = None
     """Time between decisions [s]. None means a stroke."""

@@ -59,6 +59,8 @@ class LearnedPolicy:
     scene=policy.scene, decision_period=policy.decision_period)`.
     """
 
+    batched = True
+
     def __init__(
         self,
         description: Description,

@@ -62,6 +62,8 @@ class OpenLoopPolicy:
     decision_period: Time between decisions [s] that the gait is made for. None means any.
     """
 
+    batched = True
+
     def __init__(self, commands: ArrayLike, actions: Actions = "limbs", decision_period: float | None = None):
         commands = as_finite("commands", commands, ())
         require_choice("actions", actions, get_args(Actions))
@@ -97,6 +99,8 @@ class OpenLoopPolicy:
 
 class RandomPolicy:
     """Policy of uniformly random actions, the baseline that any gait has to beat."""
+
+    batched = True
 
     def __init__(self, rng: np.random.Generator, actions: Actions = "limbs", n_limbs: int = 5):
         require_kind("rng", rng, np.random.Generator, "a numpy Generator")

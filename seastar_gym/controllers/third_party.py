@@ -2,16 +2,23 @@
 
     seastar evaluate --agents runs/mine/model.zip my_agents:make pentagon
 
+Modules are found as by `python -m`, those of the current folder included. A policy of a function answers for one robot;
+one with a true attribute `batched`, and Stable-Baselines3's, is handed the observations of all robots at once.
+
 Both run the code of whoever made them: Stable-Baselines3's files are unpickled, which can execute anything. Load only
 files that you trust. The policies of this project (.safetensors, and the model.zip of train.py) are not unpickled.
 """
 
 import importlib
 import importlib.util
+import os
 import pickle
 import re
+import sys
 import zipfile
 import zlib
+from contextlib import suppress
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +39,7 @@ def is_function(name: str) -> bool:
 def module_file(name: str) -> Path:
     """File of the module of a function of this name. ValueError if there is none."""
     module = name.partition(":")[0]
+    _search_here()
     try:
         spec = importlib.util.find_spec(module)
     except ModuleNotFoundError:
@@ -48,6 +56,7 @@ def call_function(name: str, env: SeastarSwimEnv) -> Policy:
     ValueError, with one sentence, if there is no such function or it returns no policy.
     """
     module, _, function = name.partition(":")
+    _search_here()
     try:
         make = getattr(importlib.import_module(module), function, None)
     except ModuleNotFoundError as missing:
@@ -57,7 +66,64 @@ def call_function(name: str, env: SeastarSwimEnv) -> Policy:
     policy = make(env)
     if not callable(getattr(policy, "predict", None)):
         raise ValueError(f"The agent {name!r} is a {type(policy).__name__}, which has no predict(observation, ...).")
-    return policy
+    return policy if _is_batched(policy) else RobotByRobot(policy)
+
+
+def _search_here() -> None:
+    """Have modules of the current folder found, after all others."""
+    here = os.getcwd()
+    if here not in sys.path:
+        sys.path.append(here)
+        importlib.invalidate_caches()
+
+
+def _is_batched(policy: Any) -> bool:
+    """Whether a policy answers for many robots at once."""
+    third_party = {each.__module__.partition(".")[0] for each in type(policy).__mro__}
+    return bool(getattr(policy, "batched", not third_party.isdisjoint({"stable_baselines3", "sb3_contrib"})))
+
+
+class RobotByRobot:
+    """Policy that has another one answer for every robot of a batch; its other attributes are those of that policy.
+
+    Every robot has a copy of the policy, a new one in every episode, so that what a policy remembers is of its robot.
+    One that cannot be copied is shared.
+    """
+
+    batched = True
+
+    def __init__(self, policy: Policy):
+        self._policy, self._copies = policy, dict[int, Any]()
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self._policy, name)
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> tuple[Any, Any]:
+        """Action and state of one robot, or actions, shape (n, ...), and a list of states of n robots."""
+        if np.ndim(observation) == 1:
+            return self._policy.predict(observation, state, episode_start, deterministic)
+        n = len(observation)
+        begins = np.full(n, state is None) if episode_start is None else np.asarray(episode_start, bool)
+        states = [None] * n if state is None else list(state)
+        answers = [
+            self._of(k, begins[k]).predict(
+                observation[k], None if begins[k] else states[k], begins[k : k + 1], deterministic
+            )
+            for k in range(n)
+        ]
+        return np.stack([action for action, _ in answers]), [state for _, state in answers]
+
+    def _of(self, robot: int, begins: bool) -> Any:
+        """Policy of a robot."""
+        if begins or robot not in self._copies:
+            self._copies[robot] = self._policy
+            with suppress(Exception):  # it holds what cannot be copied, such as a process
+                self._copies[robot] = deepcopy(self._policy)
+        return self._copies[robot]
 
 
 def is_model(path: str | Path) -> bool:
