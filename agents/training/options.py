@@ -75,6 +75,8 @@ class Options(Lengths):
     intervals: Path | None = None
     """JSON file of numbers of the scene by name, with the ends of their intervals, as seastar identify writes it: every
     episode of the training draws a robot from them."""
+    intervals_anyway: bool = False
+    """Confirm --intervals of a fit whose residual is well above the noise of its track."""
     seed: int = 0
     """Seed of the network, the exploration and the paths."""
     seeds: tuple[int, ...] = ()
@@ -110,10 +112,12 @@ class Options(Lengths):
             require_count("num_threads", self.num_threads, 1, 1_000_000)
         require_choice("fidelity", self.fidelity, get_args(Fidelity))
         require_choice("device", self.device, ("cpu", "cuda", "auto"))
-        for name in ("random_heading", "video", "quick"):
+        for name in ("random_heading", "video", "quick", "intervals_anyway"):
             require_flag(name, getattr(self, name))
         if self.seeds and (self.resume is not None or self.publish or len(set(self.seeds)) < len(self.seeds)):
             raise ValueError("--seeds are different ones of new runs, without --resume and --publish.")
+        if self.intervals_anyway and self.intervals is None:
+            raise ValueError("--intervals-anyway confirms --intervals: give both.")
         if self.publish and not (self.scene is None and self.intervals is None):
             raise ValueError("--publish is for policies of the chapter's robot, without --scene and --intervals.")
         make_path(self.path, np.random.default_rng(0))

@@ -7,7 +7,9 @@ from agents.training.options import Options
 from seastar_gym.envs.options import scene_at
 from seastar_gym.envs.randomization import DomainRandomization, Uniform
 from seastar_gym.files import read_json, write_json
+from seastar_gym.identify.fit import DOUBT
 from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import shown
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene
 
@@ -35,18 +37,28 @@ def asked_for(options: Options) -> Robot:
     scene = scene_at(options.scene, options.fidelity)
     if scene is not None:
         scene.to_dict()
-    return Robot(scene, None if options.intervals is None else read_intervals(options.intervals))
+    file = options.intervals
+    return Robot(scene, None if file is None else read_intervals(file, options.intervals_anyway))
 
 
-def read_intervals(file: Path) -> DomainRandomization:
-    """Uniform draws from intervals by name, a JSON file such as `seastar identify --intervals` writes."""
+def read_intervals(file: Path, anyway: bool = False) -> DomainRandomization:
+    """Uniform draws from intervals by name, a JSON file such as `seastar identify --intervals` writes.
+
+    anyway: Whether those of a fit are taken, too, that is doubted.
+    """
     if not file.is_file():
         raise ValueError(f"{file} is no file.")
     try:
         found = read_json(file)
+        doubt = found.pop(DOUBT, None)
         ends = {name: (low, high) for name, (low, high) in found.items()}
     except (AttributeError, TypeError, ValueError) as wrong:
         raise ValueError(f'{file} must be JSON such as {{"robot.youngs_modulus": [9e5, 1.1e6]}}.') from wrong
+    if doubt is not None and not anyway:
+        raise ValueError(
+            f"{file} is of a fit whose residual is {shown(doubt)} times the noise of its track, so its intervals may "
+            "not hold the robot: fit again, or give --intervals-anyway."
+        )
     return DomainRandomization({name: Uniform(low, high) for name, (low, high) in ends.items()})
 
 

@@ -22,11 +22,12 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from seastar_gym.command import answered, command_parser
 from seastar_gym.extras import require_extra
 from seastar_gym.files import save_figure, write_json
-from seastar_gym.identify.fit import Estimate, identify
+from seastar_gym.identify.fit import DOUBT, Estimate, identify
 from seastar_gym.identify.measurement import ARM, ORIENTATION, Measurement
 from seastar_gym.identify.trajectories import synthetic
 from seastar_gym.scene import Numerics
@@ -63,7 +64,8 @@ def fit(options: argparse.Namespace) -> None:
     """Fit, and write what is asked for."""
     if options.picture is not None:
         require_extra("Pictures", "studies", "matplotlib")
-    scene = load_scene(options.scene)
+    asked = load_scene(options.scene)
+    scene = asked
     if options.step is not None or not scene.numerics.named:
         scene = replace(scene, numerics=Numerics("implicit-midpoint", options.step or STEP))
     if options.synthetic:
@@ -77,10 +79,11 @@ def fit(options: argparse.Namespace) -> None:
     if options.picture is not None:
         draw(estimate, measurement, options.picture)
     if options.out is not None:
-        write_json(options.out, estimate.scene.to_dict())
+        write_json(options.out, replace(estimate.scene, numerics=asked.numerics).to_dict())
     if options.intervals is not None:
         ends = zip(estimate.names, estimate.lower.tolist(), estimate.upper.tolist(), strict=True)
-        write_json(options.intervals, {name: [low, high] for name, low, high in ends})
+        found: dict[str, Any] = {name: [low, high] for name, low, high in ends}
+        write_json(options.intervals, found | ({DOUBT: round(estimate.ratio, 2)} if estimate.is_doubted else {}))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -2,9 +2,9 @@
 
 Parameters are fitted by their logarithms, so their errors are relative. Each column of the Jacobian comes from a scene
 in which one parameter has changed a little. These scenes and the scene itself are simulated side by side, as robots of
-one batch. Intervals are those of `covariance.py`, whose residuals may depend on those before them.
-Combinations of parameters, singular vectors of the Jacobian, whose relative error is above UNTOLD are not determined by
-the data, and the estimate says so.
+one batch. `search.py` says where a fit begins, and what is refused. Intervals are those of `covariance.py`, whose
+residuals may depend on those before them. Combinations of parameters, singular vectors of the Jacobian, whose relative
+error is above UNTOLD are not determined by the data, and the estimate says so.
 
 A delay between the logs, of a camera whose clock is not that of the commands, is one more parameter, fitted as it is
 [s]: simulated trajectories are interpolated at the times of the pictures less the delay.
@@ -12,18 +12,28 @@ A delay between the logs, of a camera whose clock is not that of the commands, i
 
 import math
 from collections.abc import Sequence
-from functools import lru_cache
+from contextlib import suppress
+from dataclasses import replace
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import OptimizeResult, least_squares
 from scipy.stats import t as student
 
 from seastar_gym.identify.covariance import uncertainty_of
 from seastar_gym.identify.measurement import ORIENTATION, Measurement
 from seastar_gym.identify.parameters import get_parameter, with_parameters
-from seastar_gym.identify.trajectories import LONGEST_DELAY, delayed_trajectories, trajectories
+from seastar_gym.identify.search import (
+    SUSPICIOUS,
+    Found,
+    ends_of_search,
+    require_clocks,
+    require_places,
+    require_rest,
+    search,
+)
+from seastar_gym.identify.trajectories import LONGEST_DELAY, at_rest, delayed_trajectories, trajectories
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number, require_kind, require_within, shown
 
@@ -41,8 +51,12 @@ DELAYS_APART = 0.02
 """Distance between delays that are tried for a first guess [s]."""
 SHORTEST_DELAY = 1e-3
 """Least bound of a delay that is fitted [s]."""
+TOLERANCE = 1e-7
+"""Largest Newton tolerance of a fit: that of an ordinary run errs by more than a parameter's small change does."""
 NEAR_END = 0.99
 """Share of the largest delay above which the best one may lie beyond."""
+DOUBT = "residual over noise"
+"""Entry in a file of intervals whose fit is doubted."""
 DELAY = "the delay"
 """Name of the delay in sentences."""
 
@@ -63,9 +77,14 @@ class Estimate(NamedTuple):
     lower, upper: Ends of the confidence intervals, shape (p,).
     correlation: Correlation of the estimates, shape (p, p); with a delay (p + 1, p + 1), and it is the last.
     untold: Groups of parameters that the data do not determine, or only in combination; their intervals mean nothing.
-    residuals: Measured minus fitted positions [m], shape (n, n_nodes_seen, 2).
+    residuals: Measured minus fitted positions [m], shape (n, n_nodes_seen, 2); NaN where a point was left out.
     scene: Scene with the fitted values.
     delay: Delay between the logs. None where it was not fitted.
+    noise: Of each coordinate of the track [m], from its fourth differences; NaN for fewer than five pictures.
+    ratio: Residual over noise, about 1 for a fit that is right; NaN where the noise is not known. Above `SUSPICIOUS`
+        a minimum is wrong, or the scene lacks something: then intervals mean little.
+    left_out: Number of points that were left out, as another one was taken for them.
+    at_end: Names of parameters that are at the end of the search.
     """
 
     names: tuple[str, ...]
@@ -77,6 +96,10 @@ class Estimate(NamedTuple):
     residuals: Floats
     scene: Scene
     delay: Delay | None = None
+    noise: float = math.nan
+    ratio: float = math.nan
+    left_out: int = 0
+    at_end: tuple[str, ...] = ()
 
     @property
     def root_mean_square(self) -> float:
@@ -85,15 +108,30 @@ class Estimate(NamedTuple):
 
     def report(self) -> str:
         """Text with the estimates, one line each, and the parameters that the data do not determine."""
-        lines = [f"residuals: {1e3 * self.root_mean_square:.3g} mm root mean square"]
+        lines = [f"residuals: {1e3 * self.root_mean_square:.3g} mm root mean square{self._of_noise()}"]
+        if self.left_out:
+            lines.append(f"{self.left_out} points were left out: they are far from where the robot can have been.")
         rows = zip(self.names, self.values, self.lower, self.upper, strict=True)
         lines += [f"{name} = {value:.5g}   [{lower:.5g}, {upper:.5g}]" for name, value, lower, upper in rows]
         if self.delay is not None:
             lines.append("delay = {:.4f} s   [{:.4f}, {:.4f}]".format(*self.delay))
+        lines += [f"{name} is at the end of the search: begin with another first guess." for name in self.at_end]
         for group in self.untold:
             what = f"{group[0]} from the data" if len(group) == 1 else f"{' and '.join(group)} apart by these data"
             lines.append(f"Cannot tell {what}: measure something else, or fix {'it' if len(group) == 1 else 'one'}.")
         return "\n".join(lines)
+
+    @property
+    def is_doubted(self) -> bool:
+        """Whether the residual is well above the noise of the track."""
+        return self.ratio > SUSPICIOUS
+
+    def _of_noise(self) -> str:
+        """What the residuals are beside the noise of the track."""
+        if not math.isfinite(self.ratio):
+            return ""
+        told = f", {self.ratio:.2f} times the noise of the track"
+        return told if not self.is_doubted else f"{told}: a wrong minimum, or the scene lacks something"
 
 
 def identify(
@@ -118,20 +156,42 @@ def identify(
         raise ValueError(f"confidence must be between 0 and 1, not {shown(confidence)}.")
     if largest_delay is not None:
         require_within("largest_delay", largest_delay, SHORTEST_DELAY, LONGEST_DELAY)
-    residuals = Residuals(scene, tuple(parameters), measurement, largest_delay is not None)
+    precise = replace(scene.numerics, newton_tolerance=min(scene.numerics.newton_tolerance, TOLERANCE))
+    residuals_of = partial(
+        Residuals, replace(scene, numerics=precise), tuple(parameters), delayed=largest_delay is not None
+    )
+    residuals = residuals_of(measurement)
     start = np.zeros(len(parameters) + residuals.delayed)
     bound = np.full(len(start), math.log(LARGEST_FACTOR))
     try:
         residuals.scenes(start)
     except ValueError as impossible:
         raise ValueError(f"A first guess needs room for small changes: {impossible}") from impossible
+    late, robot, period = largest_delay or 0.0, scene.robot, scene.actuator.period
+    require_clocks(measurement, period, late)
+    rests = [at_rest(each, measurement.nodes) for each in residuals.scenes(start)]
+    are_known = all(np.array_equal(rest, rests[0]) for rest in rests)  # no length is fitted
+    if are_known:
+        require_places(measurement, float(2.0 * np.hypot(*robot.nodes().T).max()))
+    first = residuals.trajectory(start)  # refuses times and commands that do not fit, which steps below may not
+    if are_known:
+        require_rest(measurement, rests[0], first[0], robot.limb_length, late)
     if largest_delay is not None:
         start[-1], bound[-1] = residuals.likely_delay(largest_delay), largest_delay
-    residuals.trajectory(start)  # refuses times and commands that do not fit, which steps below may not
-    fit = least_squares(residuals, start, residuals.jacobian, (-bound, bound), xtol=1e-6, ftol=1e-8)
-    if largest_delay is not None and abs(fit.x[-1]) > NEAR_END * largest_delay:
-        raise ValueError(f"The best delay is {fit.x[-1]:.4g} s, at the end of what was tried: allow a larger one.")
-    return estimate_of(fit, residuals, confidence)
+    found = search(residuals_of, measurement, period, start, bound, robot.limb_length, late)
+    if largest_delay is not None and abs(best := float(found.fit.x[-1])) > NEAR_END * largest_delay:
+        raise ValueError(f"The best delay is {best:.4g} s, at the end of what was tried: allow a larger one.")
+    estimate = estimate_of(found, confidence)
+    if (off := estimate.root_mean_square) > 0.5 * robot.limb_length:
+        raise ValueError(
+            f"The best fit is {1e3 * off:.3g} mm off in the root mean square, more than half a limb: are these the "
+            "track, the commands and the scene of one swim, in metres and seconds?"
+        )
+    at_end = ends_of_search(residuals.names, found.fit.x, bound)
+    return estimate._replace(
+        scene=with_parameters(scene, residuals.names, estimate.values.tolist()), noise=found.noise, ratio=found.ratio,
+        left_out=found.left_out, at_end=at_end,
+    )  # fmt: skip
 
 
 class Residuals:
@@ -196,9 +256,30 @@ class Residuals:
         here, *changed = self._simulate(*fitted)
         return np.stack([(here - other)[self.seen] / DIFFERENCE for other in changed], axis=1)
 
+    def at(self, rows: Floats) -> tuple[Floats, Floats]:
+        """Residuals of several rows, shape (n, n_seen), and their derivatives, (n, n_seen, p); infinite and zero where
+        a simulation is impossible. All are simulated side by side."""
+        scenes, delays, possible = list[Scene](), list[Floats](), np.zeros(len(rows), bool)
+        for k, row in enumerate(rows):
+            with suppress(ValueError):
+                scenes += self.scenes(row)
+                delays.append(self._delays(row))
+                possible[k] = True
+        values = np.full((len(rows), self.seen.sum()), np.inf)
+        slopes = np.zeros((*values.shape, rows.shape[1]))
+        if possible.any():
+            found = trajectories(scenes, self.measurement, np.concatenate(delays))
+            found = found.reshape(-1, len(self._changes), *self.seen.shape)
+            here = found[:, 0, self.seen]
+            values[possible] = here - self.measurement.positions[self.seen]
+            slopes[possible] = np.moveaxis(here[:, None] - found[:, 1:, self.seen], 1, 2) / DIFFERENCE
+        return np.where(np.isfinite(values), values, np.inf), slopes
 
-def estimate_of(fit: OptimizeResult, residuals: Residuals, confidence: float) -> Estimate:
-    """Estimates with confidence intervals, from a least-squares fit of the residuals."""
+
+def estimate_of(found: Found, confidence: float) -> Estimate:
+    """Estimates with confidence intervals, from the end of a search."""
+    fit, residuals = found.fit, found.residuals
+    assert isinstance(residuals, Residuals)
     names, guess, p = residuals.names, residuals.guess, len(residuals.names)
     freedom = residuals.seen.sum() - len(fit.x)
     times = residuals.measurement.time[np.nonzero(residuals.seen)[0]]

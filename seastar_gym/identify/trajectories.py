@@ -147,6 +147,11 @@ def _motions(
     return [Motion(begin, np.array(times), x[:, k], v[:, k], bool(gave_up)) for k, gave_up in failed]
 
 
+def at_rest(scene: Scene, nodes: Sequence[int]) -> Floats:
+    """Positions of nodes of a scene's robot before the first command [m], shape (n_nodes_seen, 2)."""
+    return np.asarray(_tracked(Simulator(scene, 1, threads=1), nodes)[0][0])
+
+
 def _tracked(simulator: Simulator, nodes: Sequence[int]) -> tuple[Floats, Floats]:
     """Present positions [m] and velocities [m/s] of nodes, shape (n_robots, n_nodes_seen, 2)."""
     chosen = list(nodes)

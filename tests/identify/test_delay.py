@@ -8,7 +8,7 @@ import pytest
 from seastar_gym import Body, Numerics, Scene, Seastar, SmaWires
 from seastar_gym.identify import Measurement, identify, synthetic, trajectory, with_parameters
 from seastar_gym.identify.measurement import ORIENTATION, pointer
-from seastar_gym.identify.trajectories import batch_of_trajectories
+from seastar_gym.identify.trajectories import at_rest, batch_of_trajectories
 from seastar_gym.simulator import Simulator
 
 SCENE = Scene(Seastar(nodes_per_limb=4), numerics=Numerics("implicit-midpoint", 0.02, newton_tolerance=1e-6))
@@ -45,7 +45,9 @@ def test_the_interval_of_the_delay_holds_it_as_often_as_it_says():
 
 def test_a_delay_that_nothing_shows_cannot_be_told():
     still = late(0)
-    still = replace(still, positions=np.zeros_like(still.positions), commands=0.0 * still.commands)
+    rest = np.broadcast_to(at_rest(SCENE, still.nodes), still.positions.shape)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(rest.shape)
+    still = replace(still, positions=rest + noise, commands=0.0 * still.commands)
     untold = identify(SCENE, ["actuator.peak_angle"], still, largest_delay=0.1).untold
     assert {name for group in untold for name in group} == {"actuator.peak_angle", "the delay"}
 

@@ -39,7 +39,8 @@ from seastar_gym.identify import covariance as module
 from seastar_gym.identify.command import TRUTH, main
 from seastar_gym.identify.covariance import uncertainty_of
 from seastar_gym.identify.fit import Residuals, estimate_of
-from seastar_gym.identify.trajectories import batch_of_trajectories, trajectories
+from seastar_gym.identify.search import Found
+from seastar_gym.identify.trajectories import at_rest, batch_of_trajectories, trajectories
 from seastar_gym.scene.per_robot import numbers_of
 from seastar_gym.scene.scene_file import load_scene
 
@@ -124,7 +125,8 @@ def test_parameters_that_act_as_a_product_cannot_be_told_apart(measurement):
 
 def test_a_parameter_that_nothing_shows_cannot_be_told():
     still = synthetic(SCENE, {}, n_strokes=1)
-    still = Measurement(still.time, np.zeros_like(still.positions) + 1e-9, still.nodes, 0.0 * still.commands)
+    rest = np.broadcast_to(at_rest(SCENE, still.nodes), still.positions.shape)
+    still = Measurement(still.time, rest + 1e-9, still.nodes, 0.0 * still.commands)
     assert identify(SCENE, ["fluid.drag_coefficient"], still).untold == (("fluid.drag_coefficient",),)
 
 
@@ -224,12 +226,11 @@ def test_intervals_are_students_and_what_is_not_told_is_named(golden):
     jacobian[:2] = np.diag([1.0 / 0.4, 1.0 / 0.6]) @ turn
     shape = (3, 1, 2)
     data = Measurement(np.arange(3.0), np.zeros(shape), (0,), np.zeros((1, 5)))
-    simulated = SimpleNamespace(
-        names=("a", "b"), guess=np.array([2.0, 3.0]), seen=np.ones(shape, bool), measurement=data,
-        trajectory=lambda x: np.full(shape, 0.5), scenes=lambda x: [SCENE, None],
-    )  # fmt: skip
+    simulated = Residuals(SCENE, ("fluid.drag_coefficient", "actuator.peak_angle"), data)
+    vars(simulated).update(names=("a", "b"), guess=np.array([2.0, 3.0]), trajectory=lambda x: np.full(shape, 0.5),
+                           scenes=lambda x: [SCENE, None])  # fmt: skip
     fit = SimpleNamespace(jac=jacobian, fun=residuals, x=np.array([0.1, -0.2]))
-    found = estimate_of(fit, simulated, 0.9)
+    found = estimate_of(Found(fit, simulated, 1e-3, 1e-5), 0.9)
     covariance = uncertainty_of(jacobian, residuals, np.repeat(data.time, 2)).covariance
     half = student.ppf(0.95, 4) * np.sqrt(np.diag(covariance))
     np.testing.assert_allclose(found.values, [2.0 * math.exp(0.1), 3.0 * math.exp(-0.2)])
