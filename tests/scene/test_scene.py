@@ -10,7 +10,6 @@ import pytest
 from oracle import Star
 from seastar_gym import (
     Contact,
-    GridCurrent,
     Limb,
     Numerics,
     Scene,
@@ -64,14 +63,6 @@ def test_a_fidelity_chooses_the_resolution_that_a_robot_does_not_name(fidelity):
     assert held.at(fidelity).robot == held.robot  # nodes are counted on a mesh
 
 
-def test_a_resolution_that_nobody_named_is_not_lost():
-    robot = Seastar(discretisation="chapter")
-    assert robot.nodes_per_limb == 10 and robot.named_resolution == ("chapter", None)
-    assert dataclasses.replace(robot, discretisation="continuum") == Seastar()
-    for same in (dataclasses.replace(Seastar(), limb_length=0.1), copy.deepcopy(Seastar()), Scene().of_robot(0).robot):
-        assert same == Seastar(nodes_per_limb=12) and same.named_resolution == (None, None)
-
-
 @pytest.mark.parametrize("n_limbs", range(1, 13))
 def test_nodes_are_the_oracles(n_limbs):
     for nodes_per_limb in (2, 3, 7, 10):
@@ -81,20 +72,6 @@ def test_nodes_are_the_oracles(n_limbs):
         assert robot.n_nodes == star.n_nodes == 1 + n_limbs * (nodes_per_limb - 1)
         robot.nodes()[:] = 7.0
         assert robot.nodes().max() < 0.2
-
-
-def test_fidelities_go_from_fast_to_exact():
-    presets = {name: Numerics.preset(name) for name in FIDELITIES}
-    assert presets["chapter"] == Numerics("implicit-euler", 3e-3)
-    assert presets["balanced"].scheme == presets["accurate"].scheme == presets["reference"].scheme
-    steps = [presets[name].step for name in FIDELITIES[:4]]
-    assert steps == sorted(steps, reverse=True)
-    for name in FIDELITIES:
-        scene = Scene.preset(name)
-        assert scene.is_chapters and scene.numerics == presets[name]
-        assert scene.robot.discretisation == ("chapter" if name == "chapter" else "continuum")
-    nodes = [Scene.preset(name).robot.nodes_per_limb for name in FIDELITIES[:4]]
-    assert nodes == sorted(nodes)
 
 
 # How parts are shown
@@ -111,12 +88,6 @@ SCENES = (
 def test_scenes_and_numerics_are_shown_as_the_short_call_that_makes_them(part):
     assert eval(repr(part)) == part and len(repr(part)) < 250
     assert "=" not in repr(type(part)())
-
-
-def test_a_long_current_is_cut_where_a_scene_is_shown():
-    grid = GridCurrent.from_function(lambda x, y: (y, x), (0.0, 1.0), (0.0, 1.0), 0.01)
-    for text in (repr(Scene(fluid=Water(current=grid))), Scene(fluid=Water(current=grid))._repr_html_()):
-        assert "GridCurrent" in text and len(text) < 2000
 
 
 def test_notebooks_show_every_part_of_a_scene_with_its_units(golden):
