@@ -63,6 +63,14 @@ def test_a_fidelity_chooses_the_resolution_that_a_robot_does_not_name(fidelity):
     assert held.at(fidelity).robot == held.robot  # nodes are counted on a mesh
 
 
+def test_a_resolution_that_nobody_named_is_not_lost():
+    robot = Seastar(discretisation="chapter")
+    assert robot.nodes_per_limb == 10 and robot.named_resolution == ("chapter", None)
+    assert dataclasses.replace(robot, discretisation="continuum") == Seastar()
+    for same in (dataclasses.replace(Seastar(), limb_length=0.1), copy.deepcopy(Seastar()), Scene().of_robot(0).robot):
+        assert same == Seastar(nodes_per_limb=12) and same.named_resolution == (None, None)
+
+
 @pytest.mark.parametrize("n_limbs", range(1, 13))
 def test_nodes_are_the_oracles(n_limbs):
     for nodes_per_limb in (2, 3, 7, 10):
