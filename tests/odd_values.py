@@ -12,9 +12,15 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from fuzz.sentences import INNER, LONGEST
 from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, SmaPulse, Uniform, Water
 
+LONGEST = 1000
+INNER = (
+    "Traceback", "object is not", "unsupported operand", "could not convert", "ufunc", "setting an array", "ambiguous",
+    "inhomogeneous", "has no attribute", "unexpected keyword", "too large to convert", "not supported between",
+    "invalid literal", "cannot be interpreted",
+)  # fmt: skip
+"""Words of libraries within, which no sentence of ours has."""
 ROOT = Path(__file__).parents[1]
 HUGE = 10**400
 """An integer that no float can hold."""

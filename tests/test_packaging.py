@@ -30,7 +30,6 @@ DISTRIBUTION_OF = {"cupy": "cupy-cuda13x", "PIL": "pillow", "pygame": "pygame-ce
 ONLY_WITH_CUDA = re.compile(r"(nvidia|cuda|triton)\b")
 
 hatch_build = runpy.run_path(str(ROOT / "hatch_build.py"))
-quick_start_commands = runpy.run_path(str(ROOT / ".ci" / "quick_start.py"))["quick_start_commands"]
 
 
 def requirements(*extras: str) -> list[Requirement]:
@@ -160,16 +159,6 @@ def test_lowest_versions_are_those_of_the_declared_ranges():
     for requirement in requirements():
         (bound,) = (Version(s.version) for s in requirement.specifier if s.operator == ">=")
         assert lowest[canonicalize_name(requirement.name)] == bound
-
-
-def test_readme_has_two_quick_starts_that_do_their_own_set_up():
-    commands = quick_start_commands((ROOT / "README.md").read_text(encoding="utf-8"))
-    assert set(commands) == {"train", "test"}
-    for command in commands.values():
-        assert command.startswith("python3 -m venv .venv && .venv/bin/pip install ")
-        assert "-c constraints.txt" in command
-    assert commands["train"].endswith(" .venv/bin/python train.py")
-    assert " && .venv/bin/pytest" in commands["test"]
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ import doctest
 import importlib
 import json
 import re
-import shlex
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -14,10 +13,9 @@ import gymnasium as gym
 import pytest
 from stable_baselines3 import PPO
 
-import documented
 import seastar_gym
-from seastar_gym import Certificate, Numerics, Scene
-from seastar_gym.accuracy import command, endurance, measure
+from seastar_gym import Numerics, Scene
+from seastar_gym.accuracy import endurance, measure
 from seastar_gym.envs import paths
 from seastar_gym.evaluation import many
 
@@ -25,7 +23,6 @@ ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 FENCED = re.compile(r"^```(\S*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\]\((?!\w+:)([^)#\s]*)(#[^)\s]+)?\)")
-CERTIFY = re.compile(r"(?:-m seastar_gym\.certify|seastar certify)((?: [\w./-]+)+)")
 LONGEST = 3  # steps of an episode
 
 
@@ -38,14 +35,6 @@ def blocks(page: Path) -> list[str]:
 
 RUN = [page for page in PAGES if blocks(page)]
 NOTEBOOK = ROOT / "examples" / "first_hour.ipynb"
-
-
-def one_setting(monkeypatch, nodes, short, numerics):
-    """Let certificates be of one setting, against a short step [s], with swims of 40 strokes: seconds."""
-    monkeypatch.setattr(measure, "NODES", (nodes,))
-    monkeypatch.setattr(measure, "SHORT", Numerics("implicit-midpoint", short, 1e-8))
-    monkeypatch.setattr(measure, "NUMERICS", (numerics,))
-    monkeypatch.setattr(endurance, "LONG", 40)
 
 
 @pytest.fixture
@@ -65,7 +54,10 @@ def short_form(monkeypatch, tmp_path):
     monkeypatch.setattr(gym, "make", make_short)
     monkeypatch.setattr(PPO, "learn", learn_shortly)
     monkeypatch.setitem(many.swim_many.__kwdefaults__, "max_strokes", LONGEST)
-    one_setting(monkeypatch, 12, 1e-3, Numerics("implicit-midpoint", 5e-3, 1e-6))
+    monkeypatch.setattr(measure, "NODES", (12,))
+    monkeypatch.setattr(measure, "SHORT", Numerics("implicit-midpoint", 1e-3, 1e-8))
+    monkeypatch.setattr(measure, "NUMERICS", (Numerics("implicit-midpoint", 5e-3, 1e-6),))
+    monkeypatch.setattr(endurance, "LONG", 40)
     monkeypatch.setattr(measure, "MANY_NODES", 17)
     monkeypatch.setattr(paths, "PATHS", dict(paths.PATHS))
     monkeypatch.chdir(tmp_path)
@@ -116,67 +108,6 @@ def test_examples_in_docstrings_give_what_they_say(file):
     assert tried and not failed
 
 
-CERTIFYING = sorted({match[1] for page in PAGES for match in CERTIFY.finditer(page.read_text(encoding="utf-8"))})
-
-
-@pytest.fixture
-def scenes_of_pages(tmp_path, monkeypatch):
-    """A folder with the scene of own_robot.md and the fitted one of the worked example."""
-    monkeypatch.chdir(tmp_path)
-    Path("my_scene.py").write_text(blocks(ROOT / "docs" / "own_robot.md")[0], encoding="utf-8")
-    fitted = json.loads((ROOT / "docs" / "worked_example" / "results.json").read_text(encoding="utf-8"))["fit"]["scene"]
-    Path("fitted.json").write_text(json.dumps(fitted), encoding="utf-8")
-
-
-IN_SHORT = "--error 0.01"
-"""The robot of the guide has a setting below one per cent; one that is tried alone tells."""
-
-
-@pytest.mark.usefixtures("scenes_of_pages")
-@pytest.mark.parametrize(
-    "line, in_short",
-    [*((line, True) for line in CERTIFYING if IN_SHORT in line),
-     *(pytest.param(line, False, marks=pytest.mark.slow) for line in CERTIFYING)],
-)  # fmt: skip
-def test_lines_that_certify_find_a_setting_as_pages_say(line, in_short, monkeypatch):
-    """Of two sequences per class."""
-    if in_short:
-        one_setting(monkeypatch, 19, 5e-4, Numerics("implicit-midpoint", 1e-3, 1e-7))
-    assert command.main([*shlex.split(line), "--samples", "2"]) == 0
-    assert in_short or any(each.is_energy_stable for each in Certificate.load("certificate.json").settings)
-
-
-PUBLIC_ELSEWHERE = (
-    "seastar_gym.der.",
-    "seastar_gym.simd.",
-    "seastar_gym.envs.seastar_swim",
-    "seastar_gym.envs.tasks.envs",
-)
-"""Kernels, which equations.md tells, and the environments, whose contracts environments.md has."""
-
-
-def test_what_pages_import_is_documented():
-    known = {(module, name) for module, names in documented.NAMES.findall(documented.PAGE.read_text("utf-8"))
-             for name in names.split()}  # fmt: skip
-    found = [
-        (node.module, alias.name)
-        for page in RUN
-        for block in blocks(page)
-        for node in ast.walk(ast.parse(block))
-        if isinstance(node, ast.ImportFrom) and str(node.module).startswith(("seastar_gym", "agents"))
-        for alias in node.names
-    ]
-    assert len(found) > 20
-    private = [
-        f"{module}.{name}" for module, name in found
-        if (module, name) not in known and name not in seastar_gym.__all__
-        and not module.startswith(PUBLIC_ELSEWHERE)
-        and name not in documented.documented()
-        and not any(known_module == f"{module}.{name}" for known_module, _ in known)
-    ]  # fmt: skip
-    assert not private
-
-
 def test_no_block_hides_from_the_tests():
     """Python stands in blocks that say so; what they hold is counted, so that none is lost by a new spelling."""
     known = {"python", "bash", "bibtex", "c", "dockerfile", "markdown", "{toctree}"}
@@ -213,11 +144,3 @@ def test_pages_and_files_that_code_and_pages_name_are_there():
     code = re.findall(r"`((?:seastar_gym|tests|der|model)/[\w/]+\.py)`", extending)
     assert len(code) > 8
     assert [name for name in code if not any((base / name).is_file() for base in (ROOT, ROOT / "seastar_gym"))] == []
-
-
-def test_every_page_is_named_once_in_the_contents():
-    """A page that is not named comes in under "More"."""
-    contents = re.findall(r"```\{toctree\}\n(.*?)```", (ROOT / "docs" / "index.md").read_text("utf-8"), re.DOTALL)
-    named = [line for part in contents for line in part.splitlines() if line and not line.startswith(":")]
-    assert len(named) == len(set(named)) > 20
-    assert all((ROOT / "docs" / f"{name}.md").is_file() for name in named)

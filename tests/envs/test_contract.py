@@ -13,7 +13,6 @@ from gymnasium.envs.registration import EnvSpec
 import seastar_gym
 from refusals import assert_refused
 from seastar_gym import (
-    TASKS,
     Contact,
     FailBlind,
     HeadingTargets,
@@ -40,7 +39,6 @@ from seastar_gym.envs.paths import PATHS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv, name_of
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.serial import from_dict
 
 TYPES = {"float": float, "int": int, "bool": bool, "str": str}
 CHALLENGED = (Miswired, Prey, Station, FailBlind, ObstTrap, Prizes, SimToReal)
@@ -218,25 +216,6 @@ def test_what_a_camera_sees_of_a_task_is_that_of_the_table():
     assert wires == [at.actuators.start, at.actuators.stop - 1] and [*velocity, *turn, *age] == [10, 11, 12, 13]
     assert at.further == slice(10, 14) and ways == [at.waypoints.start, at.waypoints.stop - 1]
     assert env.observation_space.shape == (at.size,)
-
-
-def test_ids_are_declared_as_recorded():
-    limits = {id: spec.max_episode_steps for id, spec in gym.registry.items() if id.startswith("SeastarSwim")}
-    assert limits == {
-        "SeastarSwim-v0": 400, "SeastarSwimContinuous-v0": 400, "SeastarSwimTimed-v0": 400,
-        "SeastarSwimTimedModerate-v0": 1000, "SeastarSwimTimedHard-v0": 2000, "SeastarSwimHeading-v0": 600,
-        "SeastarSwimSimToReal-v0": 1500,
-    }  # fmt: skip
-    timed = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
-    assert timed == seastar_gym.TIMED
-    assert gym.spec("SeastarSwimContinuous-v0").kwargs == {"actions": "continuous"}
-    heading = gym.spec("SeastarSwimHeading-v0").kwargs
-    assert heading["decision_period"] == 0.5 and heading["actions"] == "pairs"
-    assert from_dict(heading["headings"], HeadingTargets) == HeadingTargets()
-    for id, (task, actions, period, limit, threshold) in TASKS.items():
-        spec = gym.spec(id)
-        assert spec.max_episode_steps == round(limit / period) and spec.reward_threshold == threshold
-        assert spec.kwargs == {"task": task, "actions": actions, "decision_period": period}
 
 
 def test_a_scene_of_a_file_has_its_own_numerics_or_those_of_the_fidelity(tmp_path):

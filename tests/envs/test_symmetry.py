@@ -4,7 +4,6 @@ import dataclasses
 import math
 from dataclasses import replace
 
-import gymnasium as gym
 import numpy as np
 import pytest
 from hypothesis import given
@@ -26,11 +25,9 @@ from seastar_gym import (
     Seastar,
     ShearCurrent,
     Sight,
-    Simulator,
     SmaLimb,
     SmaPulse,
     SmaWires,
-    State,
     ThermalSma,
     Uniform,
     UniformCurrent,
@@ -40,7 +37,6 @@ from seastar_gym import (
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table, to_commands
 from seastar_gym.envs.layout import Layout
-from seastar_gym.envs.masks import action_masks
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import (
     Symmetry,
@@ -49,7 +45,6 @@ from seastar_gym.envs.symmetry import (
     symmetry_in,
 )
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.actuators.actuator import mirrored
 from symmetries import elements_of, matrix, reduced_swim, symmetry_for, turns_and_axis
 
 N_LIMBS = (3, 4, 5, 7, 8)
@@ -159,18 +154,6 @@ def test_reduced_waypoints_lie_in_sector_zero_and_carried_robots_are_not_told_ap
         np.testing.assert_allclose(symmetry_for(group).reduce(carried)[0], reduced, atol=1e-12)
 
 
-def test_one_observation_is_a_batch_without_an_axis_and_element_zero_changes_no_bit_of_a_copy():
-    observations = observations_of(5, dtype=np.float32)
-    same = symmetry_for(5).carry(observations, np.zeros(len(observations), int))
-    np.testing.assert_array_equal(same, observations)
-    assert not np.shares_memory(same, observations)
-    batch, elements = symmetry_for(5).reduce(observations)
-    for one, reduced, element in zip(observations, batch, elements, strict=True):
-        alone, its_element = symmetry_for(5).reduce(one)
-        np.testing.assert_array_equal(alone, reduced)
-        assert its_element == element and its_element.shape == ()
-
-
 # Boundaries
 
 
@@ -217,13 +200,6 @@ def test_action_maps_say_what_the_command_map_says_and_are_a_group_action(mode, 
         for second in range(2 * n_limbs):
             at_once = carry(actions, symmetry.compose(second, first, n_limbs))
             np.testing.assert_array_equal(carry(carry(actions, first), second), at_once)
-    straight = np.array([0.0, 1.0, 0.0, 0.0, -1.0])  # {2+, 5-} swims along limb 1, which a mirror at it keeps
-    mirror_at_limb_1 = 2 * 5 - 1
-    np.testing.assert_array_equal(symmetry.transform_commands(straight, mirror_at_limb_1), straight)
-    turn_limb_2_onto_limb_1 = 2
-    np.testing.assert_array_equal(
-        symmetry.transform_commands(straight, turn_limb_2_onto_limb_1), [1.0, 0.0, 0.0, -1.0, 0.0]
-    )
 
 
 @pytest.mark.parametrize("group", [5, *(symmetry.symmetry_of(scene) for scene, *_ in LESSER.values())], ids=str)
@@ -233,28 +209,6 @@ def test_restored_actions_are_those_before_the_reduction(mode, group):
     elements = np.random.default_rng(3).choice(elements_of(group), 100)
     reduced = symmetry_for(group, mode=mode).carry_actions(actions, elements)
     np.testing.assert_array_equal(symmetry_for(group, mode=mode).restore(reduced, elements), actions)
-
-
-# Wrappers
-
-SQUARE_ROBOT = Scene(robot=Seastar(n_limbs=4, nodes_per_limb=4), numerics=Numerics.preset("fast"))
-SETTINGS = {"path": "random", "random_heading": True, "scene": SQUARE_ROBOT}
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_the_wrapper_does_what_the_functions_do(mode):
-    plain, wrapped = (gym.make("SeastarSwim-v0", actions=mode, **SETTINGS) for _ in range(2))
-    wrapped = SymmetryReduction(wrapped)
-    observation, info = plain.reset(seed=3)
-    reduced, its_info = wrapped.reset(seed=3)
-    for action in random_actions(mode, 4, 6):
-        expected, element = symmetry_for(4).reduce(observation)
-        np.testing.assert_array_equal(reduced, expected)
-        assert wrapped.observation_space.contains(reduced)
-        observation, *outcome, info = plain.step(symmetry_for(4, mode=mode).restore(action, element))
-        reduced, *its_outcome, its_info = wrapped.step(action)
-        assert its_outcome == outcome
-        np.testing.assert_array_equal(its_info["hub_position"], info["hub_position"])
 
 
 # Which scenes are symmetric
@@ -316,11 +270,11 @@ def test_every_field_of_a_scene_but_its_numerics_is_tried():
     assert tried == names - {"numerics"}
 
 
+SLOW = ("rectangle", "swirl")
+
+
 def pairs_for(scene, n):
     return random_actions("pairs", scene.robot.n_limbs, n)
-
-
-slow = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
@@ -329,10 +283,9 @@ slow = pytest.mark.slow
         *(pytest.param(scene, None, None, id=name) for name, scene in SYMMETRIC.items()),
         pytest.param(SYMMETRIC["five limbs"], DRAWS, None, id="draws"),
         *(pytest.param(SYMMETRIC["five limbs in time"], None, options, id=name) for name, options in OPTIONS.items()),
-        *(pytest.param(LESSER[name][0], None, None, id=name) for name in ("all bent", "one longer")),
         *(
-            pytest.param(LESSER[name][0], None, None, id=name, marks=pytest.mark.slow)
-            for name in ("rectangle", "swirl")
+            pytest.param(LESSER[name][0], None, None, id=name, marks=[pytest.mark.slow] * (name in SLOW))
+            for name in ("all bent", "one longer", *SLOW)
         ),
     ],
 )
@@ -386,74 +339,6 @@ def test_actuators_that_remember_say_what_a_mirror_does_and_every_robot_of_a_bat
         VectorSymmetryReduction(SeastarSwimVectorEnv(3, scene=one_bent))
     alike = Seastar(4, 4, limb_length=np.array([0.1, 0.11, 0.12]))
     VectorSymmetryReduction(SeastarSwimVectorEnv(3, scene=Scene(alike)))
-
-
-# Actuators with a memory
-
-REMEMBERING = {
-    "wires": SmaWires(),
-    "refractory wires": SmaWires(refractory=True),
-    "thermal": ThermalSma(),
-    "hot": ThermalSma(largest_temperature=60.0),
-    "limited": Limited(SmaPulse(), 0.5, 2.0),
-}
-
-
-@pytest.mark.parametrize("name", REMEMBERING)
-def test_a_carried_robot_swims_the_carried_way(name):
-    """State, commands and observations are carried; after a decision, both are the same again."""
-    scene = Scene(Seastar(5, 4), actuator=REMEMBERING[name], numerics=FAST)
-    mirror, rng = symmetry.memory_mirror(scene.actuator), np.random.default_rng(0)
-    assert len(mirror) == {"limited": 1, "thermal": 4, "hot": 4}.get(name, 2)
-    simulator, other = Simulator(scene, 10), Simulator(scene, 10)
-    elements = np.arange(10)
-    for _ in range(3):  # from rest to a state that no symmetry has
-        simulator.advance(0.2, np.repeat(rng.uniform(-1, 1, (1, 5)), 10, axis=0))
-    for duration in (0.2, 0.5):
-        state = simulator.get_state()
-        other.set_state(carried_state(state, scene))
-        commands = np.repeat(rng.uniform(-1, 1, (1, 5)), 10, axis=0)
-        np.testing.assert_array_equal(other.refractory_wires(), carried_wires(simulator.refractory_wires(), elements))
-        report = simulator.advance(duration, commands)
-        its_report = other.advance(duration, symmetry.transform_commands(commands, elements))
-        np.testing.assert_allclose(its_report.heating_time, report.heating_time, rtol=0.0, atol=1e-9)
-        expected, found = carried_state(simulator.get_state(), scene), other.get_state()
-        np.testing.assert_allclose(found.positions, expected.positions, rtol=0.0, atol=1e-9)
-        np.testing.assert_allclose(found.actuators, expected.actuators, rtol=0.0, atol=1e-9)
-        seen = np.concatenate([np.zeros((10, 182)), simulator.observe_actuators(), np.ones((10, 4))], axis=1)
-        carried = symmetry_for(5, mirror).carry(seen, elements)[:, 182:-4]
-        np.testing.assert_allclose(carried, other.observe_actuators(), rtol=0.0, atol=1e-9)
-
-
-def carried_state(state, scene):
-    """States of the robots carried by all elements in turn."""
-    n_limbs, elements = scene.robot.n_limbs, np.arange(2 * scene.robot.n_limbs)
-    order = symmetry.limb_order(n_limbs)
-
-    def carried(vectors):
-        turned = np.stack([one @ matrix(element, n_limbs).T for element, one in zip(elements, vectors, strict=True)])
-        of_limbs = turned[:, 1:].reshape(len(elements), n_limbs, -1, 2)
-        moved = np.stack([one[order[element]] for element, one in zip(elements, of_limbs, strict=True)])
-        return np.concatenate([turned[:, :1], moved.reshape(len(elements), -1, 2)], axis=1)
-
-    actuators = np.stack([one[order[element]] for element, one in zip(elements, state.actuators, strict=True)])
-    actuators[1::2] = mirrored(scene.actuator, actuators[1::2])
-    return State(carried(state.positions), carried(state.velocities), state.time, actuators)
-
-
-def carried_wires(wires, elements):
-    order = symmetry.limb_order(wires.shape[1])
-    moved = np.stack([one[order[element]] for element, one in zip(elements, wires, strict=True)])
-    moved[1::2] = moved[1::2, :, ::-1]
-    return moved
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_masks_are_carried_with_the_actions(mode):
-    """A mask of the carried robot is true for the carried actions of which that of the robot is true."""
-    refractory, elements = np.random.default_rng(2).random((10, 5, 2)) < 0.3, np.arange(10)
-    masks = symmetry_for(5, mode=mode).carry_masks(action_masks(mode, refractory), elements)
-    np.testing.assert_array_equal(masks, action_masks(mode, carried_wires(refractory, elements)))
 
 
 @pytest.mark.parametrize("mode", MODES)

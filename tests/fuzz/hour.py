@@ -44,7 +44,6 @@ EVERY = 2
 OF_SWIMS: dict[str, Callable[[int], None]] = {
     "odd arguments": lambda seed: odd.check_odd_arguments(Random(seed)),
     "environment": swims.check_environment,
-    **{f"preset {name}": lambda seed, name=name: swims.check_preset(name, seed) for name in swims.PRESETS},
 }
 """Promises of the chapter's robot, once in a block."""
 

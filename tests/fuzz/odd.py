@@ -6,13 +6,11 @@ from functools import partial
 from random import Random
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 
 import seastar_gym
 from documented import complete
-from fuzz.sentences import assert_one_sentence
-from odd_values import ODD
+from odd_values import ODD, REFUSED, TAKEN, outcome
 from seastar_gym import (
     AlongLimb,
     Body,
@@ -90,16 +88,11 @@ PARTS: Calls = {name: (make, complete(make, given)) for name, (make, given) in M
 """What is made, and arguments with which it can be."""
 
 
-def assert_taken_or_refused(make: Callable[[], Any], where: str) -> bool:
-    """Whether it was refused, in one sentence; anything else that goes wrong is an error of its own."""
-    try:
-        made = make()
-    except (ValueError, gym.error.Error) as refusal:
-        assert_one_sentence(refusal, where)
-        return True
-    if isinstance(made, gym.Env | gym.vector.VectorEnv):
-        made.close()
-    return False
+def is_refused(call: Callable[..., Any], arguments: dict[str, Any], where: str) -> bool:
+    """Whether a call is refused, in one sentence; anything else that goes wrong is an error of its own."""
+    found = outcome(call, arguments)
+    assert found in (TAKEN, REFUSED), f"{where}: {found}"
+    return found == REFUSED
 
 
 # --- what has a state, and must lose nothing by a refusal -------------------------------------------------------------
@@ -138,7 +131,7 @@ def check_odd_call(name: str, argument: str, value: Callable[[], Any]) -> None:
     before = SIMULATOR.get_state()
     call, arguments = SIMULATOR_CALLS[name]
     where = f"Simulator.{name}({argument}={value()!r})"
-    if assert_taken_or_refused(lambda: call(**{**arguments, argument: value()}), where):
+    if is_refused(call, {**arguments, argument: value()}, where):
         for one, other in zip(SIMULATOR.get_state(), before, strict=True):
             np.testing.assert_array_equal(one, other, err_msg=where)
         return
@@ -168,7 +161,7 @@ def check_odd_env_call(name: str, argument: str, value: Callable[[], Any]) -> No
     """Call an environment that has begun with one odd argument; it can be used afterwards."""
     env = ENV if name.startswith("SeastarSwimEnv") else VECTOR_ENV
     call, arguments = ENV_CALLS[name]
-    assert_taken_or_refused(lambda: call(**{**arguments, argument: value()}), f"{name}({argument}={value()!r})")
+    is_refused(call, {**arguments, argument: value()}, f"{name}({argument}={value()!r})")
     env.reset(seed=0)
     env.step(env.action_space.sample())
 
@@ -181,5 +174,4 @@ def check_odd_arguments(rng: Random, count: int = 50) -> None:
         places = rng.sample(sorted(arguments), min(len(arguments), rng.randint(1, 3)))
         given = {place: rng.choice(VALUES) for place in places}
         where = f"{name}({', '.join(f'{place}={value()!r}' for place, value in given.items())})"
-        odd = {place: value() for place, value in given.items()}
-        assert_taken_or_refused(lambda make=make, all_=arguments | odd: make(**all_), where)
+        is_refused(make, arguments | {place: value() for place, value in given.items()}, where)

@@ -125,23 +125,6 @@ def test_limbs_begin_where_and_as_they_are_attached_or_at_the_rim_in_their_direc
     np.testing.assert_allclose(roots, [(0.03, 0.0), (0.0, 0.015), (-0.03, 0.0), (0.0, -0.015)], atol=1e-15)
 
 
-TURNED = tuple(Attachment(0.02 * math.cos(a), 0.02 * math.sin(a), a) for a in 0.1 + np.arange(5) * 0.4 * math.pi)
-SYMMETRIC = [
-    (5, Body(radius=0.02)), (6, Body(outline=HEXAGON)), (5, Body(radius=0.02, drag_coefficient=0.5)),
-]  # fmt: skip
-UNSYMMETRIC = [
-    (5, Body(outline=HEXAGON)), (4, Body.rectangle(0.06, 0.03)), (4, Body.rectangle(0.06, 0.03, attachments=CORNERS)),
-    (5, Body(radius=0.02, centre_of_mass=(1e-3, 0.0))), (5, Body(radius=0.02, drag_along=0.5)),
-    (5, Body(radius=0.02, attachments=TURNED)),
-]  # fmt: skip
-
-
-def test_a_disc_with_a_star_is_symmetric_and_others_are_not():
-    assert all(Seastar(n_limbs, body=body).is_symmetric for n_limbs, body in SYMMETRIC)
-    assert not any(Seastar(n_limbs, body=body).is_symmetric for n_limbs, body in UNSYMMETRIC)
-    assert Seastar(body=UNSYMMETRIC[-1][1]).point_group().axis == pytest.approx(0.1)
-
-
 def test_a_joint_is_a_spring_in_a_row_with_the_clamp():
     stiff, joint = Scene(), Scene(Seastar(limbs=(Limb(joint_stiffness=2e-5), *(Limb(),) * 4)))
     K, with_joint = (make_rods(scene).bending for scene in (stiff, joint))

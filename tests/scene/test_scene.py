@@ -10,7 +10,6 @@ import pytest
 from oracle import Star
 from seastar_gym import (
     Contact,
-    GridCurrent,
     Limb,
     Numerics,
     Scene,
@@ -83,20 +82,6 @@ def test_nodes_are_the_oracles(n_limbs):
         assert robot.nodes().max() < 0.2
 
 
-def test_fidelities_go_from_fast_to_exact():
-    presets = {name: Numerics.preset(name) for name in FIDELITIES}
-    assert presets["chapter"] == Numerics("implicit-euler", 3e-3)
-    assert presets["balanced"].scheme == presets["accurate"].scheme == presets["reference"].scheme
-    steps = [presets[name].step for name in FIDELITIES[:4]]
-    assert steps == sorted(steps, reverse=True)
-    for name in FIDELITIES:
-        scene = Scene.preset(name)
-        assert scene.is_chapters and scene.numerics == presets[name]
-        assert scene.robot.discretisation == ("chapter" if name == "chapter" else "continuum")
-    nodes = [Scene.preset(name).robot.nodes_per_limb for name in FIDELITIES[:4]]
-    assert nodes == sorted(nodes)
-
-
 # How parts are shown
 
 SCENES = (
@@ -111,12 +96,6 @@ SCENES = (
 def test_scenes_and_numerics_are_shown_as_the_short_call_that_makes_them(part):
     assert eval(repr(part)) == part and len(repr(part)) < 250
     assert "=" not in repr(type(part)())
-
-
-def test_a_long_current_is_cut_where_a_scene_is_shown():
-    grid = GridCurrent.from_function(lambda x, y: (y, x), (0.0, 1.0), (0.0, 1.0), 0.01)
-    for text in (repr(Scene(fluid=Water(current=grid))), Scene(fluid=Water(current=grid))._repr_html_()):
-        assert "GridCurrent" in text and len(text) < 2000
 
 
 def test_notebooks_show_every_part_of_a_scene_with_its_units(golden):

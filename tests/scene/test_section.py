@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import oracle
-from exact.solutions import fitted_frequency, let_pass, pause
+from exact.solutions import let_pass, pause
 from seastar_gym import (
     Contact,
     Disc,
@@ -186,33 +186,10 @@ CLAMP = (0, 1)
 """Held nodes: the limb is then clamped in the middle of its root edge, see tests/exact/test_exact.py."""
 
 
-ACROSS = {"drag_coefficient": 1.3, "tangential_drag_coefficient": 0.2, "added_mass_coefficient": 0.8}
-"""Coefficients of the fluid where flow across a limb has drag and mass of its own."""
-
-
-@pytest.mark.parametrize("name", DIFFERENT)
-def test_rest_shape_and_coefficients_are_those_of_the_oracle(name):
-    """Those across tapered limbs are of half an edge, by the radius in its middle: for every node of its inner edge,
-    then of its outer one."""
-    robot, star = robot_and_star(name)
-    rods = make_rods(Scene(robot, actuator=SmaPulse(0.0)))
-    np.testing.assert_allclose(robot.nodes(), star.rest, atol=1e-15)
-    np.testing.assert_allclose(rods.mass, star.masses, rtol=1e-13)
-    np.testing.assert_allclose(rods.drag, star.drag, rtol=1e-13)
-    robot, star = robot_and_star(name, **ACROSS)
-    rods = make_rods(Scene(robot, Water(**ACROSS), SmaPulse(0.0)))
-    for found, of_edges in ((rods.cross_drag, star.cross_drag), (rods.added_mass, star.added_mass)):
-        expected = np.zeros((star.n_nodes, 2))
-        for (tail, head), of_edge in zip(star.edges, of_edges, strict=True):
-            expected[head, 0] = of_edge
-            if tail > 0:
-                expected[tail, 1] = of_edge
-        np.testing.assert_allclose(found.reshape(-1, 2), expected, rtol=1e-13)
-
-
 @pytest.mark.parametrize("name", DIFFERENT)
 def test_a_robot_of_any_shape_rests_without_energy(name):
     robot, star = robot_and_star(name)
+    np.testing.assert_allclose(robot.nodes(), star.rest, atol=1e-15)
     assert oracle.elastic_energy(star, star.rest, np.zeros(star.n_limbs)) < 1e-25
     simulator = Simulator(Scene(robot, actuator=SmaPulse(0.0), numerics=Numerics(step=0.1)))
     simulator.stroke(np.zeros((1, robot.n_limbs)))
@@ -231,25 +208,6 @@ def test_limbs_with_nothing_of_their_own_are_the_robots_to_the_last_bit():
     evenly = tuple(Limb(2 * np.pi * j / 5, 0.1, 1.6e-3, (1e6, 1e6)) for j in range(5))
     for one, other in zip(numbers(plain), numbers(make_rods(Scene(Seastar(limbs=evenly)))), strict=True):
         np.testing.assert_allclose(np.asarray(one, float), np.asarray(other, float), rtol=1e-15)
-
-
-# --- closed forms ----------------------------------------------------------------------------------------------------
-
-
-def test_a_straight_limb_with_natural_curvature_relaxes_to_an_arc():
-    curvature, robot = 8.0, Seastar(1, 21, limbs=(Limb(natural_curvature=8.0),))
-    scene = Scene(robot, actuator=pause(8.0), numerics=Numerics(step=0.5, newton_tolerance=1e-12), held_nodes=CLAMP)
-    simulator = Simulator(scene)
-    straight = Seastar(1, 21).nodes()
-    simulator.set_state((straight[None], np.zeros((1, 21, 2)), np.zeros(1)))
-    let_pass(simulator)
-    found = simulator.positions[0]
-    # The circle through the middles of the edges has the curvature's radius, to second order in the edges.
-    middles = 0.5 * (found[1:] + found[:-1])
-    centre = np.array([middles[0, 0], 1.0 / curvature])
-    np.testing.assert_allclose(np.linalg.norm(middles - centre, axis=1), 1.0 / curvature, rtol=2e-4)
-    turn = np.diff(np.unwrap(np.arctan2(*np.diff(found, axis=0).T[::-1])))
-    np.testing.assert_allclose(turn, curvature * 0.1 / 20, rtol=1e-6)
 
 
 @pytest.mark.parametrize("n_limbs", [1, 2])
@@ -275,52 +233,10 @@ def test_tapered_cantilevers_bend_as_cones_do(n_limbs):
     assert abs(errors[0]) < 2e-3 and abs(errors[1]) < abs(errors[0]) / 4 and abs(errors[2]) < abs(errors[1]) / 4
 
 
-IN_LINE = [Seastar(2, 21), Seastar(2, 21, hub_hinge="turning", discretisation="chapter")]
-
-
-@pytest.mark.parametrize("robot", IN_LINE, ids=["rigid hub", "hub hinge"])
-def test_two_limbs_in_line_ring_as_a_plain_free_rod(robot):
-    """Lowest frequency of a free beam of length 2 L: 4.7300^2/(2 pi (2 L)^2) sqrt(EI/(rho A))."""
-    expected = 4.73004**2 / (2 * np.pi * 0.2**2) * np.sqrt(1e6 * (1.6e-3) ** 2 / 4.0 / 1000.0)
-    scene = Scene(robot, None, pause(4.0 / expected), Numerics("implicit-midpoint", 1 / (200 * expected)))
-    simulator = Simulator(scene)
-    q = simulator.positions
-    q[0, :, 1] = 1e-5 * np.cos(np.pi * q[0, :, 0] / 0.2)
-    simulator.set_state((q, np.zeros_like(q), np.zeros(1)))
-    mass, signal, times = make_rods(scene).mass, [], []
-    shape = np.cos(np.pi * robot.nodes()[:, 0] / 0.2) * mass
-    shape -= mass * shape.sum() / mass.sum()
-    for time in simulator.stroke_in_parts(np.zeros((1, 2)), 100):
-        times.append(time)
-        signal.append(shape @ simulator.positions[0, :, 1])
-    assert fitted_frequency(np.array(times), np.array(signal), expected) == pytest.approx(expected, rel=3e-3)
-
-
-def test_one_limb_swings_as_a_pendulum_about_its_held_hub():
-    """A stiff limb under dead loads in vacuum, small angle: the period of a rigid body on a pin."""
-    robot = Seastar(1, 6, youngs_modulus=1e9)
-    rods = make_rods(Scene(robot, actuator=SmaPulse(0.0)))
-    mass, edge_mass = rods.mass, rods.edge_mass.sum()
-    loads = tuple((node, 9.81 * float(mass[node]), 0.0) for node in range(6))  # gravity along +x, the limb hangs
-    x = robot.nodes()[:, 0]
-    inertia = np.sum(mass * x**2) - edge_mass * robot.edge_length**2
-    period = 2 * np.pi * np.sqrt(inertia / (9.81 * np.sum(mass * x)))
-    numerics = Numerics("implicit-midpoint", period / 400, newton_tolerance=1e-10)
-    simulator = Simulator(Scene(robot, None, pause(0.25 * period), numerics, held_nodes=(0,), loads=loads))
-    angle = 0.01
-    q = robot.nodes() @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    simulator.set_state((q[None], np.zeros((1, 6, 2)), np.zeros(1)))
-    let_pass(simulator)
-    assert abs(simulator.positions[0, -1, 1]) < 2e-3 * angle * 0.1  # a quarter period later it hangs straight
-
-
 def test_a_gap_wider_than_pi_is_never_the_smallest_opening_angle():
     robot, _ = robot_and_star("a gap wider than pi")
     report = Simulator(Scene(robot, actuator=SmaPulse(0.1), numerics=Numerics(step=0.01))).stroke(np.zeros((1, 3)))
     assert report.smallest_opening_angle[0] == pytest.approx(1.0)
-
-
-# --- the environment -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("n_limbs", [1, 2, 4, 9, 12])
@@ -332,13 +248,3 @@ def test_the_environment_takes_robots_of_any_number_of_limbs(n_limbs):
     observation, reward, *_ = env.step(np.zeros(n_limbs, int) + 2)
     assert np.isfinite(observation).all() and np.isfinite(reward) and env.render().std() > 1.0
     env.close()
-
-
-def test_robots_whose_limbs_taper_alike_are_symmetric_and_those_whose_limbs_differ_are_not():
-    assert Seastar(limbs=(Limb(radius=(2e-3, 1e-3)),) * 5).is_symmetric and Seastar(4).is_symmetric
-    for limbs in (
-        (Limb(length=0.08), Limb(length=0.09), *(Limb(),) * 3),
-        (Limb(natural_curvature=1.0), *(Limb(),) * 4),
-        tuple(Limb(direction=j) for j in (0.0, 1.0, 2.0, 3.5, 4.0)),
-    ):
-        assert not Seastar(limbs=limbs).is_symmetric

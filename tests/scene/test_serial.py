@@ -6,7 +6,6 @@ import inspect
 import json
 import math
 from dataclasses import dataclass, field
-from random import Random
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from hypothesis import strategies as st
 
 import seastar_gym
 from every_part import ACTUATORS, CURVE, EACH, PARTS, WAVES
-from fuzz.scenes import COMPILED, EVERYTHING, SWIMMER, draw_scene, drawn
 from refusals import assert_refused
 from seastar_gym import (
     Contact,
@@ -37,7 +35,6 @@ from seastar_gym import (
     register_part,
 )
 from seastar_gym.envs.tasks.envs import CHALLENGES
-from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.actuators.pulse import HeatingAndCooling
 from seastar_gym.scene.per_robot import numbers_of
 from seastar_gym.scene.serial import KINDS, VERSION, from_dict, to_dict
@@ -78,24 +75,6 @@ def test_every_part_of_the_package_is_registered_and_in_the_tables():
     seen = {kind for scene in scenes for kind in KINDS if f'"kind": "{kind}"' in json.dumps(scene.to_dict())}
     own = {name: kind.__module__ for name, kind in KINDS.items() if kind.__module__.startswith("seastar_gym")}
     assert {name for name, module in own.items() if not module.startswith("seastar_gym.envs")} == seen
-
-
-@drawn(60, [*COMPILED, EVERYTHING, SWIMMER])
-def test_any_scene_comes_back_from_json(terms, seed):
-    scene = draw_scene(Random(seed), terms, 3)
-    assert again(scene) == scene
-    assert repr(again(scene)) == repr(again(again(scene)))
-    for index in range(scene.n_robots or 1):
-        for ours, theirs in zip(make_rods(scene, index), make_rods(again(scene), index), strict=True):
-            assert_same_bits(ours, theirs)
-
-
-def assert_same_bits(one, other):
-    if isinstance(one, tuple):
-        for ours, theirs in zip(one, other, strict=True):
-            assert_same_bits(ours, theirs)
-    else:
-        assert type(one) is type(other) and np.asarray(one).tobytes() == np.asarray(other).tobytes()
 
 
 OF_ENVIRONMENTS = [
@@ -219,17 +198,13 @@ def test_what_is_no_scene_is_refused(refused):
     [
         ("robot", {"n_arms": 5}, ("Scene.robot says 'n_arms', which no Seastar has",)),
         ("robot", {"density": math.nan}, ("Scene.robot.density must be a finite number", "nan")),
-        ("robot", {"n_limbs": 5.0}, ("n_limbs must be a whole number",)),
         ("robot", {"density": {"kind": []}}, ("Scene.robot.density is of the kind []",)),
         ("robot", {"density": {"kind": "os.system", "items": ["true"]}}, ("'os.system'", "not known")),
-        ("robot", {"density": {"kind": "per robot", "items": []}}, ("density",)),
         ("robot", {"density": {"kind": "per robot", "items": [[1.0]]}}, ("density",)),
         ("robot", {"density": {"kind": "mapping", "items": [3]}}, ("Scene.robot.density is no dict",)),
         ("robot", {"density": {"kind": "mapping", "items": [[{"kind": "mapping", "items": []}, 1]]}}, ("no dict",)),
-        ("robot", {"density": (1.0, 2.0)}, ("Scene.robot.density", "(1.0, 2.0)")),
         ("robot", {"limbs": [{"kind": "SmaPulse"}]}, ("limbs must be a tuple of Limb",)),
         ("fluid", {"current": {**PLAIN["fluid"]["current"], "velocities": [[["1", "2"]] * 2] * 2}}, ("velocities",)),
-        ("fluid", {"current": {**PLAIN["fluid"]["current"], "corner": "ab"}}, ("corner",)),
         ("actuator", {"actuator": PLAIN["actuator"]}, ("Limited follows an actuator without memory",)),
     ],
 )  # fmt: skip

@@ -7,13 +7,12 @@ import pytest
 
 from seastar_gym import Numerics, Scene
 from seastar_gym.accuracy import Certificate, timed_certificate
-from seastar_gym.accuracy.chapter import FOLDER, file_of
 from seastar_gym.accuracy.commands import CLASSES
 from seastar_gym.accuracy.measure import Errors, path_lengths, swim
 from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene.numerics import PRESETS, Resolution
 from studies import accuracy as study
-from studies.accuracy import MILLI, PERIODS, Plan, Row, gaits, pentagon, random_gaits, random_sequences, settings
+from studies.accuracy import MILLI, PERIODS, Plan, Row, gaits, pentagon, random_gaits, random_sequences
 from studies.command import main
 
 KINDS = ("path", "straight", "gait", "slow", "heading", "end")
@@ -84,19 +83,6 @@ def test_a_promise_is_the_worst_of_all_that_are_no_coarser_and_sums_space_and_ti
     assert rows[1].promise("path") == pytest.approx(0.011) and rows[1].promise("slow") == pytest.approx(1.5 * 0.011)
 
 
-def test_fronts_keep_what_no_other_setting_of_the_mesh_beats():
-    steps = ((1, 0.1, 9e3), (2, 0.2, 8e3), (3, 0.05, 7e3), (4, 0.05, 6e3), (5, np.inf, 9e4))
-    rows = [row(step=s, time=e, space=0.0, speed=v) for s, e, v in steps]
-    others = [row(nodes=19, step=7, space=0.4, speed=1e3)]
-    assert [each.resolution.numerics.step for each in study.fronts([*others, *rows])] == [1, 3, 7]
-
-
-def test_presets_and_the_chapters_steps_are_among_the_settings():
-    measured = settings(Plan())
-    chapter = {Resolution("chapter", 10, Numerics("implicit-euler", 20 * MILLI, 1e-6))}
-    assert {*PRESETS.values()} | chapter <= set(measured) and len(measured) == len(set(measured))
-
-
 def test_random_and_repeated_commands_in_time_are_bounded_apart():
     space, in_time = np.array([0.01, 0.03, 0.02, 0.5, 0.4, 0.1]), np.array([0.02, 0.01, 0.01, 0.1, 0.3, 0.1])
     found = study.timed_setting(PRESETS["fast"], space, in_time)
@@ -144,10 +130,6 @@ def test_certificates_in_time_are_of_the_whole_study_and_dearer_presets_err_less
         for kind in ("random", "repeated"):
             found = [getattr(each, column)[kind] for each in stored.settings[:4]]
             assert found == sorted(found, reverse=True), (column, kind)
-
-
-def test_the_times_between_decisions_that_ship_are_those_of_the_study():
-    assert {*FOLDER.glob("wires_*")} == {*map(file_of, PERIODS)}
 
 
 def test_a_path_that_goes_nowhere_counts_as_a_slow_one():

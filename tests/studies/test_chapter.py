@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene, Seastar, Simulator
-from seastar_gym.gaits import STRAIGHT, pentagon_gait
+from seastar_gym import Numerics, Seastar
+from seastar_gym.gaits import STRAIGHT
 from studies import chapter as study
 from studies import stability
 from studies.chapter import SETTINGS, Setting
@@ -26,19 +26,6 @@ def values(rows, quantity):
     return np.asarray(found)
 
 
-def test_a_swim_is_that_of_the_simulator_at_its_times():
-    swim, simulator = (
-        study.swim(COARSE, np.tile(STRAIGHT, (2, 1, 1)), 10),
-        Simulator(Scene(COARSE.robot, numerics=COARSE.numerics)),
-    )
-    np.testing.assert_allclose(swim.time, np.linspace(0.0, 2.0, 21), atol=1e-12)
-    np.testing.assert_array_equal(swim.positions[0, 0], COARSE.robot.nodes())
-    for stroke in (1, 2):
-        simulator.stroke(STRAIGHT[None])
-        np.testing.assert_array_equal(swim.hub()[swim.at_strokes()[stroke]], simulator.hub_position()[0])
-    assert swim.actuated(1.1).tolist() == [False, True, False, False, True] and not swim.actuated(1.0).any()
-
-
 def test_the_straight_swim_goes_forward_long_after_the_heating_and_then_far_back():
     """The chapter states: forward during the actuating phase, slightly backward while cooling. The swim differs."""
     rows = study.straight_statements([study.swim(each, np.tile(STRAIGHT, (10, 1, 1)), 100) for each in CONVERGED])
@@ -47,18 +34,6 @@ def test_the_straight_swim_goes_forward_long_after_the_heating_and_then_far_back
     np.testing.assert_allclose(moves[:, 0], [3.50, 11.11, 10.89, 0.44], atol=0.03)  # with the chapter's ten nodes
     np.testing.assert_allclose(moves[:, 1], [2.87, 11.09, 10.67, 0.44], atol=0.03)  # in the continuum
     assert values(rows, "largest |y|").max() < 1e-6
-
-
-def test_a_pentagon_closes_and_its_rests_are_almost_rests():
-    swim = study.swim(COARSE, pentagon_gait()[:, None], 10)
-    rows, hub = study.pentagon_statements([swim]), 1e3 * swim.hub()
-    (side,) = values(rows, "mean side")
-    assert side == pytest.approx(np.hypot(*hub[swim.at(50.0)]), rel=1e-3)
-    assert values(rows, "longest minus shortest side") < 1e-3 * side
-    assert values(rows, "end to start") == pytest.approx(np.hypot(*hub[-1]))
-    coast = np.hypot(*(hub[swim.at(50.0)] - hub[swim.at(45.0)]))
-    assert values(rows, "hub coasts back in the rest") == pytest.approx(coast, rel=1e-3)
-    assert 0.0 < values(rows, "hub's speed after the rest") < values(rows, "fastest node after the rest") < 10.0
 
 
 def test_pairs_go_along_their_bisectors_1_4_farthest_and_1_2_least():

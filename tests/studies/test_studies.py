@@ -107,17 +107,6 @@ def test_several_processes_fill_one_file(tmp_path):
     assert json.loads((tmp_path / "toy.json").read_text())["runs"] == {"0": "mine", "1": "theirs", "2": "theirs"}
 
 
-def test_kept_numbers_come_back_with_a_line_for_every_list(tmp_path):
-    found = Results({}, tmp_path / "folder" / "kept.json")
-    found.update(name="a [list] of\nlines", numbers=[1, 2.5, None], rows=[[1, "two"], []], inner={"x": [0.1]})
-    found.save()
-    text = (tmp_path / "folder" / "kept.json").read_text(encoding="utf-8")
-    assert json.loads(text) == found and ' "numbers": [1, 2.5, null],\n' in text and '\n  [1, "two"],\n' in text
-    found["speed"] = float("nan")
-    with pytest.raises(ValueError, match="not JSON compliant"):
-        found.save()
-
-
 @pytest.mark.parametrize("name", [name for name, study in STUDIES.items() if study.run])
 def test_a_help_names_the_command_and_where_it_writes(name, capsys):
     assert STUDIES[name].name == name

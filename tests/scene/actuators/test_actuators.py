@@ -43,13 +43,6 @@ def test_a_measured_curve_is_linear_between_its_samples_and_as_large_as_its_scal
     np.testing.assert_allclose(each.delta_psi([[0.2, 0.6]]), [[[0.3, 0.6], [-0.5, -1.0]]])
 
 
-def test_time_steps_end_at_every_sample():
-    curve = MeasuredCurve((0.0, 0.013, 0.5, 0.8), (0.0, 0.3, 0.2, 0.0))
-    simulator = Simulator(Scene(actuator=curve, numerics=NUMERICS))
-    times = [*simulator.stroke_in_parts(np.ones((1, 5)), 1000)]
-    assert set(curve.times[1:]) <= set(np.round(times, 12)) and simulator.time[0] == pytest.approx(0.8)
-
-
 @pytest.mark.parametrize("head", ["", "phase,angle\n"])
 def test_curves_are_read_from_csv(tmp_path, head):
     """Of angles, or of curvatures, which bend a limb by their change times its length."""
@@ -115,12 +108,6 @@ def test_a_limb_that_only_has_a_stop_follows_its_curve_up_to_it():
 
 
 # --- weak limbs ------------------------------------------------------------------------------------------------------
-
-
-def test_a_weak_limb_turns_by_its_share_and_a_failed_one_not_at_all():
-    weak = swim(Scene(numerics=NUMERICS, limb_strengths=(1.0, 0.5, 0.0, 1.0, 1.0)))
-    less = swim(Scene(numerics=NUMERICS), COMMANDS * [1.0, 0.5, 0.0, 1.0, 1.0])
-    assert weak.positions.tobytes() == less.positions.tobytes()
 
 
 def test_every_robot_may_have_weak_limbs_of_its_own():

@@ -1,6 +1,5 @@
-"""Every actuator keeps the same promises, by itself and in a simulator."""
+"""Every actuator keeps the same promises by itself; tests/simulator/test_bits.py has it swim."""
 
-import pickle
 from itertools import pairwise
 
 import numpy as np
@@ -9,11 +8,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from every_part import ACTUATORS
-from seastar_gym import Limited, Numerics, Scene, Simulator, SmaLimb, SmaPulse, SmaWires, ThermalSma
+from seastar_gym import Limited, Scene, SmaLimb, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.scene.actuators.actuator import complete, mirrored
-from strokes import assert_same, ternary
 
-NUMERICS = Numerics("implicit-midpoint", 0.01)
 SINGLE = {name: actuator for name, actuator in ACTUATORS.items() if Scene(actuator=actuator).n_robots is None} | {
     "wires": SmaWires(),
     "refractory wires": SmaWires(refractory=True),
@@ -91,25 +88,3 @@ def test_every_robot_turns_as_its_own_actuators_do(name):
             recalled = each.recall(seen)
             if recalled is not None:
                 np.testing.assert_allclose(each.observe(recalled), seen, rtol=1e-12, atol=1e-15)
-
-
-@pytest.mark.parametrize("name", REMEMBERING)
-def test_what_is_remembered_goes_on_to_the_same_bits_in_parts_copies_and_any_company_and_ends_with_a_reset(name):
-    scene, commands = Scene(actuator=SINGLE[name], numerics=NUMERICS), ternary(3, 7)
-    whole, parts, alone = Simulator(scene, 7), Simulator(scene, 7), Simulator(scene, 1)
-    for command in commands[:2]:
-        assert not whole.stroke(command).status.any()
-        seen = [parts.actuators.copy() for _ in parts.stroke_in_parts(command, 7)]
-        assert np.ptp(seen, axis=0).any(axis=-1)[command != 0.0].all()
-        alone.stroke(command[3:4])
-    assert_same(parts, whole)
-    assert whole.actuators[3].tobytes() == alone.actuators[0].tobytes()
-    again, copied = Simulator(scene, 7), pickle.loads(pickle.dumps(whole))
-    again.set_state(whole.get_state())
-    for simulator in (whole, again, copied):
-        simulator.stroke(commands[2])
-    assert_same(again, whole)
-    assert_same(copied, whole)
-    whole.reset(np.arange(7) == 0)
-    assert (whole.actuators[0] == complete(SINGLE[name]).rest).all()
-    assert (whole.actuators[1:] == again.actuators[1:]).all()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import oracle
-from seastar_gym import AlongLimb, Limited, Scene, Seastar, SmaLimb, SmaPulse, SmaWires, ThermalSma
+from seastar_gym import AlongLimb, Scene, Seastar, SmaLimb, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.scene.actuators.actuator import check_actuator
 from seastar_gym.scene.actuators.pulse import pulse
 from seastar_gym.scene.actuators.sma_limb import MEASURED
@@ -69,15 +69,6 @@ def test_a_deaf_limb_ignores_commands_until_both_wires_are_cold():
     np.testing.assert_allclose(refractory.seconds_heated(np.array([0.0, 1.0]), commands, states), [0.0, 1e-3, 0.1])
     turned, _ = refractory.respond(np.array([0.0, 0.009]), commands, states)
     np.testing.assert_allclose(turned[1] / PEAK, [0.2 - 0.01, -0.01 + 0.008 / 0.9, -0.09], atol=SMALL)
-
-
-def test_heating_is_counted_in_seconds():
-    t = np.array([0.02, 0.05, 0.5])
-    commands, none = np.array([1.0, -0.5, 0.0]), np.zeros((3, 0))
-    np.testing.assert_allclose(SmaPulse().seconds_heated(t, commands, none), [0.08, 0.04, 0.0])
-    np.testing.assert_allclose(WIRES.seconds_heated(t - 0.02, commands, np.zeros((3, 4))), [0.1, 0.05, 0.0])
-    np.testing.assert_allclose(Limited(SmaPulse(), 0.1).seconds_heated(t, commands, none), [0.08, 0.04, 0.0])
-    assert Limited(SmaPulse(heating_power=3.0)).heating_power == 3.0
 
 
 def test_all_wires_have_the_same_power_that_of_the_wire_in_the_docstring():
@@ -159,24 +150,6 @@ def test_a_small_loop_within_the_large_one_closes_and_stays_inside_where_nothing
     assert T[still].min() == pytest.approx(21.5 + 0.5 * (56.0 - 21.5), abs=0.05)
 
 
-def test_a_full_command_comes_near_the_pulse_in_the_first_stroke_and_in_later_ones():
-    actuator, t = ThermalSma(), np.linspace(0.0, 1.0, 501)
-    state, pulsed = actuator.rest, SmaPulse().delta_psi(t)
-    for stroke in range(3):
-        turned, state = actuator.respond(t, np.ones(()), state)
-        off = (turned - pulsed) / actuator.peak_angle
-        assert stroke == 1 or (np.sqrt(np.mean(off**2)) < 0.07 and np.abs(off).max() < 0.17)
-    assert actuator.delta_psi([[0.0, 0.1]]).shape == (1, 2)
-
-
-def test_the_other_wire_turns_the_other_way_while_the_first_is_still_warm():
-    actuator, t = ThermalSma(), np.array([0.0, 0.1])
-    _, state = actuator.respond(np.array([0.0, 0.1, 1.0]), np.ones(()), actuator.rest)
-    turned, after = actuator.respond(t, np.full((), -1.0), state)
-    assert turned[0] == pytest.approx(actuator.peak_angle * state[2]) and state[2] > 0.05
-    assert turned[1] == pytest.approx(actuator.peak_angle * (after[2] - after[3])) and turned[1] < -0.3
-
-
 # --- a largest temperature -------------------------------------------------------------------------------------------
 
 LIMIT = 75.0
@@ -204,15 +177,6 @@ def test_heating_ends_exactly_where_the_limit_is_reached():
     np.testing.assert_array_equal(SAFE.refractory_wires(np.stack([state, at_limit])), [[False, False], [True, False]])
     _, after = SAFE.respond(np.array([0.0, time + 0.03]), np.ones(()), state)
     assert after[0] == pytest.approx(20.0 + (LIMIT - 20.0) * np.exp(-0.03 / 0.42), rel=1e-12)
-
-
-def test_a_limit_that_is_never_reached_changes_no_bit():
-    t, commands = np.linspace(0.0, 1.0, 51), np.array([1.0, 0.3, -1.0, 0.0])
-    for limit in (100.0, 240.0, 1000.0):
-        one, other = ThermalSma(), ThermalSma(largest_temperature=limit)
-        rest = np.tile(one.rest, (4, 1))
-        for seen, wanted in zip(other.respond(t, commands, rest), one.respond(t, commands, rest), strict=True):
-            np.testing.assert_array_equal(seen, wanted)
 
 
 # The limb with measured curves: its heat, its delay, its presets, and what it makes of the chapter's commands.
