@@ -146,6 +146,10 @@ class Star:
         """Natural angle of the hinges within the limbs [rad]."""
         return np.repeat(self.natural_turns, self.nodes_per_limb - 2)
 
+    def turned(self, delta_psi: ArrayLike) -> tuple["Star", Array]:
+        """(star, rotations of its limbs at the hub) whose actuators turn its limbs by delta_psi [rad]."""
+        return self, np.asarray(delta_psi)
+
     def node(self, limb: int, i: int) -> int:
         """Row of node {limb, i}, limb counted from 0; i = 0 is the hub."""
         return 0 if i == 0 else limb * (self.nodes_per_limb - 1) + i
@@ -747,8 +751,8 @@ def step(
     for *row, diagonal in TABLEAUS[scheme] if damping == 0.0 else [[0.5 * (1.0 + damping)]]:
         q_hat = q + h * sum(a * v_j for a, v_j in zip(row, velocities, strict=True))
         v_hat = v + h * sum(a * a_j for a, a_j in zip(row, accelerations, strict=True))
-        delta_psi = np.asarray(command) * pulse(t + (sum(row) + diagonal) * h, **pulse_shape)
-        q_new, v_new = stage(star, q_hat, v_hat, diagonal * h, delta_psi)
+        now = star.turned(np.asarray(command) * pulse(t + (sum(row) + diagonal) * h, **pulse_shape))
+        q_new, v_new = stage(now[0], q_hat, v_hat, diagonal * h, now[1])
         velocities.append(v_new)
         accelerations.append((v_new - v_hat) / (diagonal * h))
     if scheme == "implicit-midpoint":
