@@ -1,8 +1,7 @@
 """Every term of a stage, alone and with others, in plain Python: potential, slopes and Hessian are a dense oracle's.
 
 The oracle is shown to have the derivatives of its energies in tests/test_oracle.py; here, the kernels have those of
-theirs, know nothing of where a robot lies, and do without a term that a scene does not name. Rows of other rooms:
-test_body.py, test_contact.py.
+theirs. Rows of other rooms: test_body.py, test_contact.py.
 """
 
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""Coefficients of rods are the chapter's; those of the continuum: tests/simulator/test_oracle_steps.py."""
+"""Coefficients of rods are the chapter's; those of the continuum: tests/der/test_terms.py."""
 
 import math
 

@@ -18,9 +18,6 @@ from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from simulator.test_conservation import rattled
 from strokes import finished, ternary
 
-SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
-ADAPTED = Numerics("implicit-midpoint", 0.02, path_tolerance=0.02)
-
 
 def powers(smallest: float, largest: float) -> st.SearchStrategy[float]:
     """Powers of ten from 10^smallest to 10^largest."""
@@ -60,7 +57,7 @@ HAIRS = Scene(
 @example(HAIRS, 1.0, 24)
 @given(scenes(), st.sampled_from([0.01, 1.0, 30.0]), st.integers(0, 1000))
 def test_no_step_that_has_not_converged_is_accepted(scene, speed, seed):
-    """The oracle's Newton step from where a time step ended is about the tolerance long, see test_simulator.py."""
+    """The oracle's Newton step from where a time step ended is about the tolerance long."""
     simulator, robot, fluid = rattled(Simulator(scene, 2), speed, 0.1, seed=seed), scene.robot, scene.fluid
     kind = Continuum if robot.discretisation == "continuum" else Star
     star = kind(
