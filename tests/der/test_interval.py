@@ -20,6 +20,8 @@ from seastar_gym.der.stepping.report import (
 from seastar_gym.der.stepping.scales import Limits
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import SIZE, memory_row
+from seastar_gym.der.stepping.steps import Step, end_guarded_step
+from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
@@ -138,3 +140,36 @@ def test_adapted_steps_grow_to_where_their_errors_let_them_and_are_not_refused_t
     found = cover(monkeypatch, error, adaptive=True)
     settled = np.array([step.size for step in found.tried if step.start > 0.5])
     assert found.arrived.all() and np.all((settled > 0.4 * largest) & (settled <= largest))
+
+
+@pytest.mark.parametrize(
+    "halvings, cut, turns_back",
+    [(0, 0.01, True), (7, 0.01, True), (8, 0.01, False), (11, 0.01, False), (12, 1.0, False)],
+)
+def test_the_guard_is_milder_after_eight_halvings_and_after_twelve(monkeypatch, halvings, cut, turns_back):
+    asked = {}
+
+    def hold(rods, work, scheme, q, v, h, frame, robots, allowed, largest_cut):
+        asked.update(cut=lanes(largest_cut)[0], held=robots.robots)
+        return Mask(NOBODY), Mask(EVERYONE)
+
+    def poles(rods, work, q, robots):
+        asked.update(turnable=robots.robots)
+        return Mask(NOBODY)
+
+    space = end_guarded_step.plain.__globals__
+    for name, fake in {"hold_to_energy": hold, "through_poles": poles, "end_step": lambda *_: None}.items():
+        monkeypatch.setitem(space, name, fake)
+    q, v = rows(ROBOT.nodes()), np.zeros((2 * ROBOT.n_nodes, N_LANES))
+    work, report = make_work(RODS, 1), np.zeros((len(REPORT_ROWS), N_LANES))
+    still, limits = Actuation(*np.zeros((2, 5, N_LANES))), Limits(np.array([1e-9]), 20, MOST, False, np.array([LIMIT]))
+    step = Step(Lanes(0.0), Lanes(1.0), Lanes(0.01), Lanes(20.0 * (1 + halvings)), Mask(NOBODY))
+    masks = Mask(EVERYONE), Mask(FIRST)
+    end_guarded_step.plain(
+        RODS, work, MIDPOINT, still, q, v, np.zeros((2 * ROBOT.n_nodes + 3, N_LANES)), step, None, *masks,
+        limits, report,
+    )  # fmt: skip
+    assert asked["cut"] == cut
+    np.testing.assert_array_equal(asked["held"], FIRST)
+    np.testing.assert_array_equal(asked["turnable"], FIRST & turns_back)
+    np.testing.assert_array_equal(report[REPORT_ROWS.index("energy_cuts")], 1.0)
