@@ -31,6 +31,9 @@ class Bent(ContinuumShaped):
         """The robot once its limbs are bent by other angles [rad], shape (n_limbs,)."""
         return replace(self, delta_psi=tuple(np.asarray(delta_psi).tolist()))
 
+    def turned(self, delta_psi: ArrayLike) -> tuple["Bent", Array]:
+        return self.at(delta_psi), np.zeros(self.n_limbs)
+
     @cached_property
     def shares(self) -> Array:
         """Turn of a limb's clamp and hinges per rotation: hat functions times the profile, at many points."""

@@ -146,6 +146,10 @@ class Star:
         """Natural angle of the hinges within the limbs [rad]."""
         return np.repeat(self.natural_turns, self.nodes_per_limb - 2)
 
+    def turned(self, delta_psi: ArrayLike) -> tuple["Star", Array]:
+        """(star, rotations of its limbs at the hub) whose actuators turn its limbs by delta_psi [rad]."""
+        return self, np.asarray(delta_psi)
+
     def node(self, limb: int, i: int) -> int:
         """Row of node {limb, i}, limb counted from 0; i = 0 is the hub."""
         return 0 if i == 0 else limb * (self.nodes_per_limb - 1) + i
@@ -681,25 +685,12 @@ def descent(hessian: Array, gradient: Array) -> Array:
     raise RuntimeError("no diagonal shift makes the Hessian of the incremental potential positive definite")
 
 
-def backtracked(star: Star, q: Array, update: Array, slope: float, *stage_data: Any) -> float:
-    """Largest fraction 1, 1/2, 1/4.. of the update along which Phi falls by 1e-4 of what its slope [J] promises.
-
-    The slack is what rounding can do to the comparison of two values of Phi; it only counts next to the minimum.
-    """
-    phi = incremental_potential(star, q, *stage_data)
-    slack = 1e-14 * phi + 1e-12 * star.EI / star.limb_length
-    for fraction in 0.5 ** np.arange(60):
-        if incremental_potential(star, q + fraction * update, *stage_data) <= phi + 1e-4 * fraction * slope + slack:
-            return float(fraction)
-    raise RuntimeError("no fraction of the Newton update lowers the incremental potential")
-
-
 def stage(
-    star: Star, q_hat: Array, v_hat: Array, gamma: float, delta_psi: ArrayLike, max_iterations: int = 500
+    star: Star, q_hat: Array, v_hat: Array, gamma: float, delta_psi: ArrayLike, max_iterations: int = 50
 ) -> tuple[Array, Array]:
     """Positions [m] and velocities [m/s] of one implicit stage: the minimum of Phi, from the guess (13.10).
 
-    Newton with backtracking on Phi, until a full update moves no node by more than 1e-12 limb lengths.
+    Newton's method, until an update moves no node by more than 1e-12 limb lengths.
     """
     q = frozen = q_hat + gamma * v_hat
     data = q_hat, v_hat, gamma, delta_psi, frozen
@@ -709,9 +700,8 @@ def stage(
         update = np.zeros_like(q)
         free = star.free.reshape(-1, 2)
         update[free] = descent(hessian[np.ix_(star.free, star.free)], gradient[free]).ravel()
-        fraction = backtracked(star, q, update, float(np.sum(gradient * update)), *data)
-        q = q + fraction * update
-        if fraction == 1.0 and np.max(np.abs(update)) <= 1e-12 * star.limb_length:
+        q = q + update
+        if np.max(np.abs(update)) <= 1e-12 * star.limb_length:
             return q, (q - q_hat) / gamma
     raise RuntimeError(f"the stage with gamma = {gamma} s did not converge in {max_iterations} Newton iterations")
 
@@ -761,23 +751,13 @@ def step(
     for *row, diagonal in TABLEAUS[scheme] if damping == 0.0 else [[0.5 * (1.0 + damping)]]:
         q_hat = q + h * sum(a * v_j for a, v_j in zip(row, velocities, strict=True))
         v_hat = v + h * sum(a * a_j for a, a_j in zip(row, accelerations, strict=True))
-        delta_psi = np.asarray(command) * pulse(t + (sum(row) + diagonal) * h, **pulse_shape)
-        q_new, v_new = stage(star, q_hat, v_hat, diagonal * h, delta_psi)
+        now = star.turned(np.asarray(command) * pulse(t + (sum(row) + diagonal) * h, **pulse_shape))
+        q_new, v_new = stage(now[0], q_hat, v_hat, diagonal * h, now[1])
         velocities.append(v_new)
         accelerations.append((v_new - v_hat) / (diagonal * h))
     if scheme == "implicit-midpoint":
         return q + (q_new - q) / diagonal, v + (v_new - v) / diagonal
     return q_new, v_new
-
-
-def stroke_steps(h: float, heating_time: float = 0.1, cooling_time: float = 0.9) -> list[tuple[float, float]]:
-    """Start and length [s] of the steps of one stroke; the last step before a corner of Fig. 13.5b is shortened."""
-    steps = []
-    for start, duration in ((0.0, heating_time), (heating_time, cooling_time)):
-        count = int(np.ceil(duration / h - 1e-9))
-        for k in range(count):
-            steps.append((start + k * h, duration - k * h if k == count - 1 else h))
-    return steps
 
 
 @dataclass(frozen=True)

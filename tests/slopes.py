@@ -11,8 +11,6 @@ from seastar_gym.simd.numpy_lanes import Lanes, Mask
 
 NO_RODS, NO_WORK = (bundle(*[None] * len(bundle._fields)) for bundle in (Rods, Work))
 """Bundles of scenes that name nothing."""
-NOTHING = (Lanes(0.0), (Lanes(0.0), Lanes(0.0)), (Lanes(0.0), Lanes(0.0), Lanes(0.0)))
-"""Energy, force and Hessian of a node on which nothing acts."""
 
 
 def slope(f: Callable[[Any], Any], x: Any, step: float) -> np.ndarray:
@@ -45,12 +43,6 @@ def plain(result: Any) -> Any:
     if isinstance(result, tuple):
         return tuple(map(plain, result))
     return result.numbers if isinstance(result, Lanes) else result.robots if isinstance(result, Mask) else result
-
-
-def symmetric(block: Any) -> np.ndarray:
-    """A block (xx, xy, yy) as a matrix, shape (2, 2, ...)."""
-    xx, xy, yy = plain(block)
-    return np.array([[xx, xy], [xy, yy]])
 
 
 def rows(nodes: np.ndarray) -> np.ndarray:

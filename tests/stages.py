@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import oracle
-from along_oracle import Bent
 from continuum_oracle import Continuum
 from hubs import robot_with
 from oracle import Star
@@ -51,10 +50,7 @@ def turn_limbs(rods: Rods, work: Work, delta_psi: np.ndarray) -> None:
 
 
 class RandomStages:
-    """One random stage per lane, moderate: limbs bent by some degrees, edges strained by some per mille.
-
-    A star `Bent` is the robot at rest, whose limbs are then bent by their rotations.
-    """
+    """One random stage per lane, moderate: limbs bent by some degrees, edges strained by some per mille."""
 
     def __init__(self, star: Star, gamma: float, bend=0.15, stretch=2e-3, speed=0.1, seed=0):
         rng = np.random.default_rng(seed)
@@ -67,9 +63,7 @@ class RandomStages:
 
     def star_of(self, lane: int) -> tuple[Star, np.ndarray]:
         """(star, rotations of its limbs at the hub [rad])."""
-        if isinstance(self.star, Bent):
-            return self.star.at(self.delta_psi[lane]), 0.0 * self.delta_psi[lane]
-        return self.star, self.delta_psi[lane]
+        return self.star.turned(self.delta_psi[lane])
 
     def data(self, lane: int):
         return self.q_hat[lane], self.v_hat[lane], self.gamma, self.star_of(lane)[1], self.frozen[lane]
@@ -149,15 +143,13 @@ def unknowns(rods: Rods, rows: np.ndarray) -> np.ndarray:
     return np.append(rows[:n, 0], rows[n, 0] / rods.body.scale[0])
 
 
-def begun_on_body(
-    rods: Rods, directions: np.ndarray, stage: SimpleNamespace, ahead: bool, n_stages: int = 1
-) -> tuple[Work, Stage]:
+def begun_on_body(rods: Rods, directions: np.ndarray, stage: SimpleNamespace, ahead: bool) -> tuple[Work, Stage]:
     """(work, stage) of kernels where the first guess of a stage is frozen, and the iterate is at its u.
 
     stage: u, u_hat, v_hat and first, unknowns; gamma [s]; delta_psi, rotations of limbs [rad]. directions: Of limbs at
         rest [rad].
     """
-    work, gamma = make_work(rods, n_stages), Lanes(stage.gamma)
+    work, gamma = make_work(rods, 1), Lanes(stage.gamma)
     q_hat, v_hat = unknown_rows(rods, stage.u_hat), unknown_rows(rods, stage.v_hat)
     move_roots.plain(rods, q_hat, v_hat)
     begun = Stage(q_hat, v_hat, gamma, 1.0 / gamma, ahead)

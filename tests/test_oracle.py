@@ -9,13 +9,11 @@ import pytest
 
 import oracle
 from continuum_oracle import Continuum, ContinuumShaped
-from exact.solutions import published_swim
 from oracle import Array, Star
 from slopes import rotated
 from unlike import DIFFERENT, robot_and_star
 
 HUBS = ("opening", "turning")
-STRAIGHT = (0.0, 1.0, 0.0, 0.0, -1.0)
 LIMBS = [1, 2, 3, 5, 12]
 SOFT = {"youngs_modulus": 1.0, "rod_radius": 1.0}
 """So that stretching does not hide bending."""
@@ -61,15 +59,7 @@ def with_all_terms(star: type[Star] = Continuum, **shape) -> Star:
     )  # fmt: skip
 
 
-# Topology, masses and rest
-
-
-def test_chapter_robot_has_46_nodes_45_edges_and_45_hinges():
-    star = Star()
-    assert (star.n_nodes, len(star.edges), len(star.hinges)) == (46, 45, 45)
-    assert np.linalg.norm(star.rest[star.node(3, 9)]) == pytest.approx(0.1)
-    assert star.masses.sum() == pytest.approx(5 * 0.1 * np.pi * 1.6e-3**2 * 1000.0)
-    assert star.masses[0] == pytest.approx(2.5 * star.masses[1])
+# Rest
 
 
 @pytest.mark.parametrize(
@@ -83,24 +73,6 @@ def test_a_robot_of_any_shape_rests_without_energy_and_without_force(star):
     still = np.zeros(star.n_limbs)
     assert oracle.elastic_energy(star, star.rest, still) < 1e-25
     assert np.abs(oracle.elastic_gradient(star, star.rest, still)).max() < (1e-12 if star.n_hub_hinges else 1e-11)
-
-
-def test_one_bent_hinge_stores_the_energy_of_its_curvature():
-    star = Star(n_limbs=3, nodes_per_limb=3)
-    q = star.rest.copy()
-    q[2] = q[1] + rotated(q[2:3] - q[1], 0.4)[0]
-    kappa = 2.0 * np.tan(0.2) / 0.05
-    assert oracle.elastic_energy(star, q, np.zeros(3)) == pytest.approx(0.5 * star.EI * kappa**2 * 0.05)
-
-
-def test_a_curved_limb_rests_on_the_arc_that_leaves_the_hub_along_its_direction():
-    star = unlike_limbs(3, 6)
-    for limb, (direction, turn_of_edge) in enumerate(zip(star.directions, star.natural_turns, strict=True)):
-        radius = star.edge_lengths[star.edge(limb, 0)] / (2.0 * np.sin(0.5 * turn_of_edge))
-        centre = radius * np.array([-np.sin(direction), np.cos(direction)])
-        nodes = star.rest[[star.node(limb, i) for i in range(6)]]
-        np.testing.assert_allclose(np.linalg.norm(nodes - centre, axis=1), abs(radius), rtol=1e-13)
-        assert radius == pytest.approx(1.0 / star.curvatures[limb], rel=1e-3)
 
 
 @pytest.mark.parametrize("star", [*(Star(nodes_per_limb=2, hub_hinge=h) for h in HUBS), Continuum(nodes_per_limb=2)])
@@ -118,16 +90,6 @@ def test_the_hub_stores_the_sum_of_its_stiffnesses_less_the_length_of_their_resu
     assert oracle.clamp_slopes(star, star.rest, turns)[0] == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_limb_alone_is_held_by_nothing_and_two_by_one_spring_after_the_other():
-    for n_limbs, expected in ((1, 0.0), (2, 0.5)):
-        star, size = Continuum(n_limbs, 2), 1e-4
-        q = star.rest.copy()
-        q[1] = rotated(q[1:2], size)[0]
-        K = 2.4 * star.EI / star.edge_length
-        found = oracle.elastic_energy(star, q, np.zeros(n_limbs))
-        assert found == pytest.approx(0.5 * expected * K * size**2, rel=1e-6, abs=1e-25)
-
-
 # Integrals along an edge
 
 
@@ -142,12 +104,6 @@ def test_uniform_limbs_have_the_mass_and_the_added_mass_of_linear_finite_element
     found = oracle.mass_matrix(star, star.rest)
     np.testing.assert_allclose(found[0::2, 0::2], along, rtol=1e-13, atol=1e-18)
     np.testing.assert_allclose(found[1::2, 1::2], across, rtol=1e-13, atol=1e-18)
-
-
-def test_drag_of_a_straight_limb_moved_sideways_is_that_of_a_cylinder():
-    star = Star()
-    force = oracle.drag_force(star, np.tile([0.0, 0.2], (46, 1))).sum(axis=0)
-    np.testing.assert_allclose(force, [0.0, -0.5 * 1000.0 * 1.0 * 3.2e-3 * 0.5 * 0.2**2])
 
 
 @pytest.mark.parametrize("tangential", [None, 0.2])
@@ -218,75 +174,3 @@ def test_incremental_potential_has_the_residual_as_gradient_and_its_jacobian_as_
     hessian = oracle.incremental_hessian(star, q, q_hat, gamma, delta_psi, frozen)
     assert_derivative(lambda x: oracle.incremental_potential(star, x, *data), gradient, q)
     assert_derivative(lambda x: oracle.incremental_gradient(star, x, *data), hessian, q)
-
-
-# Stages, conservation, symmetry
-
-
-@pytest.mark.parametrize(
-    "star",
-    [make(5, 4, drag_coefficient=0.0) for make in (Star, Continuum, unlike_limbs)],
-    ids=["chapter", "alike", "unlike"],
-)
-@pytest.mark.parametrize("scheme", oracle.TABLEAUS)
-def test_momentum_and_angular_momentum_without_fluid(scheme, star):
-    q, v = star.rest, random_velocities(star, 0.02)
-
-    def momenta(q: Array, v: Array) -> tuple[Array, float]:
-        p = (oracle.inertia_matrix(star) @ v.ravel()).reshape(-1, 2)
-        return p.sum(axis=0), float(q[:, 0] @ p[:, 1] - q[:, 1] @ p[:, 0])
-
-    before, spin = momenta(q, v)
-    for k in range(3):
-        q, v = oracle.step(star, q, v, 0.01 * k, 0.01, (0, 1, 0, 0, -1), scheme)
-    after, spin_after = momenta(q, v)
-    np.testing.assert_allclose(after, before, rtol=0.0, atol=1e-13 * np.abs(star.masses[:, None] * v).sum())
-    if scheme == "implicit-midpoint":
-        assert spin_after == pytest.approx(spin, rel=1e-9 if type(star) is Star else 1e-8)
-
-
-# Time
-
-
-@pytest.mark.parametrize("make", [Star, Continuum])
-@pytest.mark.parametrize(
-    ("scheme", "order"),
-    [("implicit-euler", 1), ("sdirk2", 2), ("sdirk3", 3), ("implicit-midpoint", 2)],
-)
-def test_a_scheme_converges_with_the_order_it_claims(make, scheme, order):
-    star = make(n_limbs=3, nodes_per_limb=3, youngs_modulus=1e4)
-
-    def end(n_steps: int) -> Array:
-        q, v, h = star.rest, np.tile([0.05, 0.02], (star.n_nodes, 1)), 0.08 / n_steps
-        for k in range(n_steps):
-            q, v = oracle.step(star, q, v, k * h, h, (0.2, -0.2, 0.1), scheme)
-        return q
-
-    coarse, middle, fine = end(20), end(40), end(80)
-    measured = np.log2(np.linalg.norm(coarse - middle) / np.linalg.norm(middle - fine))
-    assert measured == pytest.approx(order, abs=0.2)
-
-
-@pytest.mark.parametrize("h", [0.003, 0.01, 0.02, 0.03, 0.25])
-def test_steps_cover_the_stroke_and_end_on_the_corners_of_the_ramp_of_figure_13_5b(h):
-    starts, lengths = np.array(oracle.stroke_steps(h)).T
-    ends = starts + lengths
-    np.testing.assert_allclose(starts, [0.0, *ends[:-1]], rtol=0.0, atol=1e-14)
-    assert ends[-1] == pytest.approx(1.0, abs=1e-14) and np.min(np.abs(ends - 0.1)) < 1e-14
-    assert lengths.min() > 0.0 and lengths.max() <= h * (1.0 + 1e-9)
-    times = [0.0, 0.05, 0.1, 0.55, 1.0, 1.05]
-    np.testing.assert_allclose([oracle.pulse(t) / np.pi for t in times], [0.0, 0.1, 0.2, 0.1, 0.0, 0.1], atol=1e-12)
-
-
-# An independent code's figure
-
-
-def test_first_stroke_agrees_with_two_published_codes_and_stays_on_the_axis():
-    star = Star(hub_hinge="turning")
-    q, v, hub = star.rest, np.zeros_like(star.rest), {}
-    for t, h in oracle.stroke_steps(0.01):
-        q, v = oracle.step(star, q, v, t, h, STRAIGHT, "implicit-euler")
-        hub[round(t + h, 2)] = q[0]
-    for t, *figures in np.transpose(published_swim())[:10]:
-        np.testing.assert_allclose(hub[round(t, 2)][0], figures, rtol=4e-7)
-    assert max(abs(y) for _, y in hub.values()) < 1e-14

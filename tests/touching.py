@@ -19,22 +19,20 @@ from slopes import rotated, rows
 GAMMA = 2e-4
 
 
-def touching_limbs(
-    ahead: bool = False, apart: int = 0, gamma: float = GAMMA, discretisation: Discretisation = "continuum"
-) -> SimpleNamespace:
-    """Limbs 1 and 2 of five lie along each other, but for those of the first `apart` robots, which are at rest."""
+def touching_limbs(discretisation: Discretisation = "continuum") -> SimpleNamespace:
+    """Limbs 1 and 2 of five lie along each other."""
     robot, star = Seastar(5, 4, discretisation=discretisation), Star(5, 4)
     rods = make_rods(Scene(robot, actuator=SmaPulse(0.1), contact=Contact()))
     q_0, rng = np.tile(star.rest, (N_LANES, 1, 1)), np.random.default_rng(0)
     q = q_0.copy()
     for limb, turn in ((0, 0.62), (1, -0.62)):
         own = slice(3 * limb + 1, 3 * limb + 4)
-        q[apart:, own] = rotated(q[apart:, own], turn)
+        q[:, own] = rotated(q[:, own], turn)
     q += 2e-4 * rng.standard_normal(q.shape)
     work = make_work(rods, 1)
     work.q[:], work.q_hat[:], work.v_hat[:] = rows(q), rows(q - 1e-4), 0.1 * rng.standard_normal(work.q.shape)
     still = np.zeros((5, N_LANES))
     set_natural_hub_angles.plain(rods, work, Actuation(still, still), Lanes(1.0))
-    stage = Stage(work.q_hat, work.v_hat, Lanes(gamma), Lanes(1.0 / gamma), ahead)
+    stage = Stage(work.q_hat, work.v_hat, Lanes(GAMMA), Lanes(1.0 / GAMMA), False)
     freeze_contact.plain(rods, work, stage, rows(q_0))
     return SimpleNamespace(rods=rods, work=work, stage=stage, q_0=rows(q_0))

@@ -7,14 +7,12 @@ import oracle
 from along_oracle import Bent
 from seastar_gym import AlongLimb, Limb, Scene, Seastar, SmaPulse, Stiffening
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.guard import allowed_energy
-from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.terms.along import add_moved_energy, hyperbolic_tangent, stiffening
 from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes
-from slopes import plain, rows
+from slopes import plain
 
 PEAK, RATIO, CURVATURES = 1.1, 2.5, (4.0, 0.0, -3.0)
 PROFILE = (1.0, 3.0, 0.5)
@@ -73,13 +71,6 @@ def test_hinges_turn_by_the_hat_functions_of_the_profile(profile, nodes):
     np.testing.assert_allclose(found, star.shares, rtol=0.0, atol=1e-9)
 
 
-def test_a_profile_at_the_root_turns_the_limb_at_the_hub():
-    for points in (10, 100, 1000):
-        at_clamp, *within = AlongLimb(profile=(1.0, *(0.0,) * points)).hinge_shares(5)
-        assert 1.0 - at_clamp == pytest.approx(sum(within), abs=1e-12)
-        assert sum(within) == pytest.approx(4.0 / (3.0 * points), rel=1e-9)
-
-
 # Energy
 
 
@@ -96,20 +87,3 @@ def test_what_moving_natural_curvature_stores_is_the_energy_of_the_hinges_left_b
     )  # fmt: skip
     np.testing.assert_allclose(moved, expected, rtol=1e-9)
     np.testing.assert_allclose(work.EI_kappa_bar, memory(END).EI_kappa_bar, rtol=1e-14)
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_the_guard_allows_the_energy_that_stiffening_and_bending_put_in(scheme):
-    tableau, v = SCHEMES[scheme], 0.1 * RNG.standard_normal(SHAPE.shape)
-    work, frame = make_work(RODS, tableau.n_stages), (Lanes(0.0), Lanes(0.0))
-    turns, start, end = actuation(BEGIN, END), Lanes(0.25), Lanes(0.75)
-    found = plain(allowed_energy.plain(RODS, work, tableau, turns, start, end, rows(SHAPE), rows(v), frame))[0]
-    at_start, at_end = (
-        oracle.elastic_energy(STAR.at(BEGIN + share * (END - BEGIN)), SHAPE, np.zeros(3)) for share in (0.25, 0.75)
-    )
-    kinetic = oracle.kinetic_energy(STAR.at(END), v)
-    if tableau.dissipative:
-        assert found == pytest.approx(at_end + kinetic, rel=1e-10)
-    else:
-        assert found > max(at_start, at_end) + kinetic
-    np.testing.assert_allclose(work.EI_kappa_bar, memory(BEGIN + 0.75 * (END - BEGIN)).EI_kappa_bar, rtol=1e-14)

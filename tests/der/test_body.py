@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bodied_oracle import Apart, Rigid, Touching, crossed, turned
+from bodied_oracle import Apart, Rigid, Touching, turned
 from currents import CURRENTS, velocity
 from fuzz.frames import mirrored_body, swapped
 from seastar_gym import Attachment, Body, Contact, Numerics, Scene, Seastar, SmaPulse, Water
@@ -18,8 +18,7 @@ from seastar_gym.der.contact.coupled import solve_coupled
 from seastar_gym.der.contact.crossing import without_new_crossings
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import Rods, make_work
-from seastar_gym.der.stepping.momentum import correct_momentum
-from seastar_gym.der.stepping.newton import minimise, move_along
+from seastar_gym.der.stepping.newton import move_along
 from seastar_gym.der.stepping.report import REPORT_ROWS
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import OF_BODY, Stage, memory_row
@@ -235,60 +234,7 @@ def test_a_step_ends_where_the_oracle_has_its_minimum(name, scheme, share):
     assert np.abs(off).max() < 1e-6 * np.abs(end - start.u).max()
 
 
-@pytest.mark.parametrize("scheme", list(SCHEMES))
-def test_in_vacuum_a_step_leaves_the_oracle_s_minimum_by_a_move_of_the_whole_robot_that_keeps_its_momentum(scheme):
-    """As far as the first guess is off. Schemes of several stages are tried at their first one."""
-    _, rods, oracle = make(UNEVEN, None)
-    tableau, h = SCHEMES[scheme], 0.01
-    start = random_stage(oracle, h * tableau.a[0], seed=1)
-    start.v_hat *= 0.1
-    start.u_hat, start.first = start.u, start.u + start.gamma * start.v_hat
-    u = settled(rods, oracle, tableau, start, h)
-    phi = phi_of(oracle, start, np.zeros(N_LIMBS))
-    off = np.linalg.solve(hessian(lambda many: [phi(x) for x in many], u, 1e-5), gradient(phi, u, 1e-6))
-    move, way = np.append(np.tile(off[:2], len(u) // 2), 0.0), np.abs(u - start.u).max()
-    assert np.abs(off[:2]).max() > 1e-6 * way
-    np.testing.assert_allclose(off, move, rtol=0.0, atol=1e-7 * way)
-    rates = (u - start.u) / start.gamma
-    end = start.u + h * rates if scheme == "implicit-midpoint" else u
-    end_rates = start.v_hat + (rates - start.v_hat) * (end - start.u)[-1] / (u - start.u)[-1]
-    masses = rods.mass[: len(u) // 2]
-    change = masses @ (end_rates - start.v_hat)[:-1].reshape(-1, 2)
-    for state, rate, sign in ((end, end_rates, 1.0), (start.u, start.v_hat, -1.0)):  # what a body's turning adds
-        change += sign * rate[-1] * crossed(turned(state[-1], oracle.moment))
-    assert np.abs(change).max() < 1e-12 * masses.sum() * np.abs(rates).max()
-
-
-def settled(rods: Rods, oracle: Rigid, tableau, start: SimpleNamespace, h: float) -> np.ndarray:
-    """Where the first stage of a step ends, by the kernels."""
-    still = SimpleNamespace(**{**vars(start), "u": start.first, "delta_psi": np.zeros(N_LIMBS)})
-    work, stage = begun_on_body(rods, oracle.directions, still, not tableau.stiffly_accurate, tableau.n_stages)
-    minimise.plain(rods, work, stage, EVERYONE, Lanes(1e-13), Lanes(60.0))
-    correct_momentum.plain(rods, work, tableau, 0, stage, stage.q_hat, stage.v_hat, Lanes(h), EVERYONE)
-    return unknowns(rods, work.q)
-
-
 # Contact
-
-
-@pytest.mark.parametrize("kind", ["side", "corner"])
-@pytest.mark.parametrize("name", BODIES)
-def test_forces_neither_push_nor_turn_robot_and_body_together(name, kind):
-    """What limbs feel is what the body gets, in the hub's force and in the residual of its angle."""
-    _, rods, oracle = make(BODIES[name], contact=True)
-    stage = random_stage(oracle, 2e-3, 3, kind)
-    stage.first = stage.u
-    work, kernel_stage = begun_on_body(rods, oracle.directions, stage, oracle.ahead)
-    begin_body.plain(rods, work)
-    energy = add_contact.plain(rods, work, kernel_stage, None, Lanes(0.0))
-    n = 2 * oracle.star.n_nodes - 2 * N_LIMBS
-    force, q = (rows[:n, 0].reshape(-1, 2) for rows in (work.contact.force, work.q))
-    assert plain(energy)[0] > 0.0 and not work.contact.force[n + 2 :].any() and n_listed.plain(work) > 0
-    size = np.abs(force).max()
-    np.testing.assert_allclose(force.sum(axis=0), 0.0, atol=1e-12 * size)
-    torque, arms = -work.body.system[3, 0], q - q[0]
-    assert torque == pytest.approx(-(arms[:, 0] * force[:, 1] - arms[:, 1] * force[:, 0]).sum(), abs=1e-9 * size)
-    assert (name == "disc") == (abs(torque) < 1e-9 * size)
 
 
 def forces(body: Body, began: np.ndarray, guessed: np.ndarray, angle: float = 0.0) -> np.ndarray:

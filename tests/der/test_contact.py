@@ -7,7 +7,7 @@ import oracle
 from hubs import HUBS
 from oracle import Star
 from seastar_gym import Contact, Scene, Seastar, SmaPulse
-from seastar_gym.der.contact.broad_phase import freeze_contact, share_of_edge
+from seastar_gym.der.contact.broad_phase import freeze_contact
 from seastar_gym.der.contact.contact import (
     SLOT_ROWS,
     STIFFNESS,
@@ -15,16 +15,14 @@ from seastar_gym.der.contact.contact import (
     add_contact_energy,
     members,
     n_listed,
-    not_touching,
 )
 from seastar_gym.der.contact.coupled import (
     add_contact_product,
-    dot,
     solve_again_coupled,
     solve_coupled,
     solver_iterations,
 )
-from seastar_gym.der.contact.crossing import deepest_overlap, edges_cross, on_their_sides, without_new_crossings
+from seastar_gym.der.contact.crossing import edges_cross, on_their_sides, without_new_crossings
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import make_work
@@ -127,17 +125,6 @@ def energy(touching) -> np.ndarray:
     return plain(add_contact.plain(touching.rods, touching.work, touching.stage, None, Lanes(0.0)))
 
 
-def test_forces_neither_push_nor_turn_the_robot():
-    touching = touching_limbs()
-    energy(touching)
-    force, q = (x.T.reshape(N_LANES, -1, 2) for x in (touching.work.contact.force, touching.work.q))
-    size = np.abs(force).max()
-    np.testing.assert_allclose(force.sum(axis=1), 0.0, atol=1e-12 * size)
-    spin = q[..., 0] * force[..., 1] - q[..., 1] * force[..., 0]
-    assert np.all(np.abs(spin.sum(axis=1)) <= 1e-12 * np.abs(spin).sum(axis=1))
-    assert np.abs(force[:, 7:]).max() == 0.0  # nodes of the limbs that touch nobody
-
-
 def listed_stiffness(touching, q) -> np.ndarray:
     """Stiffness of all listed pairs of every node at positions q [N/m], shape (n_nodes, N_LANES)."""
     rods, work = touching.rods, touching.work
@@ -160,18 +147,6 @@ def test_a_node_counts_once_wherever_along_a_limb_it_stands(shift):
     found = listed_stiffness(touching, q)
     whole = touching.rods.contact.stiffness
     np.testing.assert_allclose(found[5:7], np.broadcast_to(whole[5:7, None], (2, N_LANES)), rtol=1e-9)
-
-
-def test_edges_of_a_hinge_share_a_node_and_a_limb_ends_beyond_its_ends():
-    rods = touching_limbs().rods
-
-    def share(edge, s):
-        return max(0.0, float(plain(share_of_edge.plain(rods, edge, Lanes(s)))))
-
-    for s in np.linspace(-0.5, 0.5, 21):
-        assert share(0, 1.0 + s) + share(1, s) == pytest.approx(1.0)
-    assert [share(2, 1.0), share(2, 1.125), share(2, 1.25)] == pytest.approx([1.0, 0.5, 0.0])
-    assert [share(0, 0.0), share(0, -0.125), share(0, -0.25)] == pytest.approx([1.0, 0.5, 0.0])
 
 
 def test_limbs_that_press_each_other_store_the_same_where_a_stage_asks_and_where_a_state_ends():
@@ -253,21 +228,6 @@ def test_edges_cross_where_the_lines_through_them_meet_within_both():
             assert seen[lane] == np.all((shares > 0.0) & (shares < 1.0))
 
 
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_the_deepest_overlap_is_the_depth_over_the_distance_at_which_limbs_touch(side):
-    """The tip of limb 2, or 5, lies beside the middle of limb 1, to which all lanes press it differently deep."""
-    asked = np.linspace(-0.5, 0.99, N_LANES)
-    q = np.tile(REST, (N_LANES, 1, 1))
-    q[:, 6 if side > 0.0 else 15] = np.stack([np.full(N_LANES, 0.05), side * 2.0 * ROBOT.rod_radius * (1.0 - asked)], 1)
-    work = make_work(RODS, 1)
-    work.q[:] = work.q_hat[:] = rows(q)
-    stage = Stage(work.q_hat, work.v_hat, Lanes(1e-3), Lanes(1e3), False)
-    freeze_contact.plain(RODS, work, stage, rows(q))
-    add_contact.plain(RODS, work, stage, None, Lanes(0.0))
-    seen = plain(deepest_overlap.plain(RODS, work, rows(q)))
-    np.testing.assert_allclose(seen, np.maximum(asked, 0.0), atol=1e-12)
-
-
 # The Newton step where limbs touch solves the star's matrix plus that of contact.
 
 
@@ -297,41 +257,6 @@ def test_the_step_solves_the_star_and_contact_together_and_derivatives_do_to_rou
         np.testing.assert_allclose(found - star, moved, rtol=0.0, atol=close * np.abs(moved).max())
     assert not work.contact.missed.any()
     np.testing.assert_array_equal(plain(solver_iterations.plain(work)), iterations)
-
-
-def test_robots_that_do_not_touch_or_are_not_asked_keep_the_stars_step_to_the_last_bit():
-    """Whoever touches beside them."""
-    asked = np.arange(N_LANES) != N_LANES - 1
-    touching = touching_limbs(apart=1)
-    star, x, alone, together = steps(touching, Mask(asked))
-    assert not touching.work.contact.force[:, 0].any()
-    np.testing.assert_array_equal(plain(not_touching.plain(touching.work, EVERYONE)), np.arange(N_LANES) == 0)
-    kept = [0, N_LANES - 1]
-    np.testing.assert_array_equal(x[:, kept], star[:, kept])
-    np.testing.assert_array_equal(together[kept], alone[kept])
-    assert np.all(together[1:-1] != alone[1:-1])
-
-
-def test_few_iterations_solve_it_as_exactly_as_a_step_of_5_ms_allows(monkeypatch):
-    """To 1e-10 of the decrement: about what rounding leaves where edges are that much stiffer than inertia.
-
-    Of convex matrices, since at such a step those of these robots are not positive definite.
-    """
-    touching, left, product_of = touching_limbs(gamma=5e-3), [], dot.plain
-    rods, work = touching.rods, touching.work
-    _, alone, _ = factorise.plain(rods, work, touching.stage, EVERYONE)
-
-    def noted(rods, a, b):
-        product = product_of(rods, a, b)
-        if a is work.contact.r:
-            left.append(plain(product))
-        return product
-
-    monkeypatch.setitem(solve_coupled.plain.__globals__, "dot", noted)
-    decrement = plain(solve_coupled.plain(rods, work, EVERYONE, alone))
-    assert not work.contact.missed.any() and len(left) < 20
-    assert np.any(left[-2] > 1e-10 * decrement)
-    assert 1e-11 < (left[-1] / decrement).max() < 1e-10
 
 
 def test_whoever_does_not_arrive_in_200_iterations_is_missed(monkeypatch):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from seastar_gym.der.terms.current import GRID, LINEAR, VORTEX, Current, current_velocity
+from seastar_gym.der.terms.current import GRID, VORTEX, Current, current_velocity
 from seastar_gym.simd.numpy_lanes import Lanes
 from slopes import plain
 
@@ -22,12 +22,6 @@ def grid(function, n_x: int = 9, n_y: int = 7, spacing: float = 0.125) -> Curren
 
 def bilinear(x, y):
     return 0.1 + 0.3 * x - 0.5 * y + 2.0 * x * y, 0.2 * x + 0.05 * y
-
-
-def test_a_linear_current_is_its_velocity_at_the_origin_and_its_gradient():
-    slopes = np.array([[0.3, -0.5], [0.2, -0.3]])
-    found = current_at(Current(LINEAR, np.array([0.1, -0.2, *slopes.ravel()])), PLACES)
-    np.testing.assert_allclose(found, np.array([[0.1], [-0.2]]) + slopes @ PLACES, rtol=0.0, atol=1e-15)
 
 
 def test_a_vortex_has_its_circulation_far_from_its_core_and_turns_rigidly_within():

@@ -71,11 +71,6 @@ def test_tangent_is_that_of_an_angle_a_few_units_in_the_last_place_away_up_to_th
     assert np.max(np.abs(error_in_angle)) < 4.0 * np.spacing(1.5)
 
 
-def test_tangent_is_odd():
-    x = np.linspace(0.0, 1.5, 1001)
-    np.testing.assert_array_equal(tangents(-x), -tangents(x))
-
-
 @pytest.mark.parametrize("turns", [0.0, 1e-9, 0.3, 3.1, 3.2, -7.0, 100.0, -1e4])
 def test_rotations_are_those_of_any_angle(turns):
     c, s = plain(rotation.plain(Lanes(np.array([turns]))))

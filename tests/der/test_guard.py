@@ -33,7 +33,7 @@ from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from slopes import nodes, plain, rotated, rows
+from slopes import NO_RODS, nodes, plain, rotated, rows
 from stages import EVERYONE, robot_and_star, turn_limbs
 
 STAR = Continuum()
@@ -300,3 +300,6 @@ def test_a_step_may_gain_energy_where_what_newton_knows_does_not_rule_it_out(loa
     found = plain(may_gain.plain(rods, work, stage, phi, EVERYONE))
     np.testing.assert_array_equal(found, above)
     assert not plain(may_gain.plain(rods, work, stage, phi, ~EVERYONE)).any()
+    for named in ("current", "added_mass", "body"):  # of which it knows nothing: any step may
+        others = NO_RODS._replace(**{named: object()})
+        assert may_gain.plain(others, work, stage, phi, EVERYONE) is EVERYONE

@@ -1,6 +1,6 @@
 """How an interval is covered, told by steps whose outcome the test decides: halvings, doublings, fallback, failure."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,28 +8,24 @@ import pytest
 
 from seastar_gym import Scene, Seastar
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.interval import cover_interval, note_hub_angles
+from seastar_gym.der.stepping.interval import cover_interval
 from seastar_gym.der.stepping.report import (
-    BACKTRACKS,
     COVERED,
     HALVINGS,
     NEWTON_ITERATIONS,
-    REGULARISED,
     REJECTIONS,
     REPORT_ROWS,
-    SMALLEST_HUB_T,
-    SOLVER_ITERATIONS,
     STEPS,
 )
 from seastar_gym.der.stepping.scales import Limits
 from seastar_gym.der.stepping.schemes import SCHEMES
-from seastar_gym.der.stepping.stages import LAST_STEP, SIZE, memory_row
-from seastar_gym.der.stepping.steps import Step, end_guarded_step, solve_stages, try_step
+from seastar_gym.der.stepping.stages import SIZE, memory_row
+from seastar_gym.der.stepping.steps import Step, end_guarded_step
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from slopes import plain, rotated, rows
+from slopes import plain, rows
 
 ROBOT = Seastar(5, 3)
 RODS = make_rods(Scene(ROBOT))
@@ -89,70 +85,49 @@ def cover(monkeypatch, outcomes, adaptive=False, last_size=0.0, iterations=0.0, 
     arrived = lanes(cover_interval.plain(*args, Mask(alive), limits, report))
     return SimpleNamespace(
         tried=script.tried, accepted=script.accepted, arrived=arrived, report=report,
-        sizes=[step.size for step in script.tried], halvings=[round(step.most / 20.0) - 1 for step in script.tried],
         size=a[memory_row.plain(RODS, MIDPOINT, SIZE)],
     )  # fmt: skip
 
 
-EIGHTH, SIXTEENTH, SHORTEST = 2.0**-3, 2.0**-4, 2.0**-12
 STORIES = {
-    "no trouble": ("a", {}, [1.0]),
-    "stuck: halves its step and covers the rest in small ones": ("ssa", {}, [1.0, 0.5] + 4 * [0.25]),
-    "stuck at the shortest step: fails": ("s", {}, [0.5**k for k in range(13)]),
-    "adapted: begins with an eighth and doubles on the grid of its own size": ("+", {}, [EIGHTH, EIGHTH, 0.25, 0.5]),
-    "adapted: goes on with the last step's length": ("a", {"last_size": 0.5}, [0.5, 0.5]),
-    "adapted: an error that is too large halves it": ("ra", {"last_size": 0.5}, [0.5] + 4 * [0.25]),
-    "adapted: doubles four accepted steps after a halving": (
-        "s+", {"last_size": SIXTEENTH}, [SIXTEENTH] + 4 * [SIXTEENTH / 2] + [SIXTEENTH],
-    ),
-    "adapted: the next doubling waits twice as long": (
-        "ss+", {"last_size": EIGHTH}, [EIGHTH, SIXTEENTH] + 4 * [SIXTEENTH / 2] + 8 * [SIXTEENTH] + [EIGHTH],
-    ),
-    "adapted: and so after the next halving": (
-        "s++++s+", {"last_size": SIXTEENTH},
-        [SIXTEENTH] + 4 * [SIXTEENTH / 2] + [SIXTEENTH] + 8 * [SIXTEENTH / 2] + [SIXTEENTH],
-    ),
-    "adapted: no doubling leads back from the fallback": (
-        "ssss+", {"last_size": 1.0}, [1.0, 0.5, 0.25, EIGHTH] + 16 * [SIXTEENTH],
-    ),
-    "adapted: stuck at the shortest step, it tries again": (
-        "ss" + 100 * "a", {"last_size": SHORTEST}, 4 * [SHORTEST],
-    ),
+    "no trouble": ("a", {}),
+    "stuck: halves its step and covers the rest in small ones": ("ssa", {}),
+    "stuck at the shortest step: fails": ("s", {}),
+    "stuck and its iterations spent: fails at once": ("s", {"iterations": MOST}),
+    "its iterations spent, but not stuck: goes on": ("a", {"iterations": MOST}),
+    "failed before: left alone": ("s", {"alive": ~FIRST}),
+    "adapted: begins with an eighth and doubles on the grid of its own size": ("+", {"adaptive": True}),
+    **{f"adapted: {what}": (outcomes, {"adaptive": True, "last_size": 2.0**-k}) for what, outcomes, k in (
+        ("goes on with the last step's length", "a", 1),
+        ("an error that is too large halves it", "ra", 1),
+        ("doubles four accepted steps after a halving, and waits twice as long for the next", "ss+", 3),
+        ("and so after the next halving", "s++++s+", 4),
+        ("no doubling leads back from the fallback", "ssss+", 0),
+        ("stuck at the shortest step, it tries again", "ss+", 12),
+    )},
 }  # fmt: skip
-"""Outcomes of robot 0's steps, and the sizes of the first ones that it takes, as shares of the interval."""
+"""Outcomes of robot 0's steps, and options."""
 
 
-@pytest.mark.parametrize("name", STORIES)
-def test_steps_are_halved_and_doubled(monkeypatch, name):
+def told(found: SimpleNamespace) -> Iterator[str]:
+    """The first steps of robot 0, and what is counted and kept of it and of its neighbour."""
+    for step, good in [*zip(found.tried, found.accepted, strict=True)][:60]:
+        how = f"{' retrying' * bool(step.retrying)}{' fallback' * step.fallback}{'' if good else ' in vain'}"
+        yield f"at {step.start:.9g} {step.size:.9g}, {step.most:g} iterations{how}"
+    rows = HALVINGS, REJECTIONS, STEPS, COVERED
+    for k in (0, 1):
+        counted = " ".join(f"{number:.9g}" for number in found.report[rows, k])
+        yield f"arrived: {found.arrived[k]}, counted: {counted}, next {found.size[k]:.9g}"
+
+
+def test_steps_are_halved_and_doubled(monkeypatch, golden):
     """Every halving of a robot that is stuck gives it more iterations, and after four of them it goes on with the
-    fallback; those of an error that is too large do not count. Other robots take their own steps."""
-    outcomes, options, sizes = STORIES[name]
-    found = cover(monkeypatch, outcomes, adaptive="adapted" in name, **options)
-    assert found.sizes[: len(sizes)] == sizes
-    assert len(found.sizes) == len(sizes) or "adapted" in name
-    starts = np.cumsum([0.0, *(size * good for size, good in zip(found.sizes, found.accepted, strict=True))])[:-1]
-    np.testing.assert_array_equal([step.start for step in found.tried], starts)
-    halvings, n_stuck = found.halvings, outcomes.count("s") if len(outcomes) > 1 else 13 * (outcomes == "s")
-    assert [step.most for step in found.tried[:n_stuck]] == [20.0 * (1 + k) for k in range(n_stuck)]
-    assert [step.fallback for step in found.tried] == [k >= 4 for k in halvings]
-    assert [step.retrying for step in found.tried] == [k > 0 for k in halvings]
-    np.testing.assert_array_equal(found.report[HALVINGS], n_stuck * FIRST)
-    np.testing.assert_array_equal(found.report[REJECTIONS], outcomes.count("r") * FIRST)
-    np.testing.assert_array_equal(found.arrived, EVERYONE if outcomes != "s" else ~FIRST)
-    assert found.report[STEPS, 0] == sum(found.accepted)
-    np.testing.assert_allclose(found.report[COVERED], DURATION * (found.arrived | ~FIRST))
-    if "adapted" in name:  # the next interval goes on with these
-        assert found.size[0] >= found.sizes[-1] and np.all(found.size[1:] == options.get("last_size", EIGHTH))
-
-
-@pytest.mark.parametrize("outcomes, arrives", [("s", False), ("a", True)])
-def test_a_robot_whose_iterations_are_spent_fails_when_it_is_stuck_and_not_before(monkeypatch, outcomes, arrives):
-    """And one that has failed before is left alone."""
-    found = cover(monkeypatch, outcomes, iterations=MOST)
-    assert len(found.tried) == 1 and found.arrived[0] == arrives
-    found = cover(monkeypatch, outcomes, alive=~FIRST)
-    assert not found.tried and not found.report[STEPS, 0]
-    np.testing.assert_array_equal(found.arrived, ~FIRST)
+    fallback; those of an error that is too large do not count. Other robots take their own steps. The file shows it."""
+    found = {name: cover(monkeypatch, outcomes, **options) for name, (outcomes, options) in STORIES.items()}
+    for each in found.values():
+        ways = [step.size * good for step, good in zip(each.tried, each.accepted, strict=True)]
+        assert [step.start for step in each.tried] == np.cumsum([0.0, *ways])[: len(ways)].tolist()
+    golden("steps.txt", "\n".join(line for name, each in found.items() for line in ("", name, *told(each))))
 
 
 @pytest.mark.parametrize("largest", 2.0 ** np.linspace(-4.9, -3.1, 8))
@@ -165,66 +140,6 @@ def test_adapted_steps_grow_to_where_their_errors_let_them_and_are_not_refused_t
     found = cover(monkeypatch, error, adaptive=True)
     settled = np.array([step.size for step in found.tried if step.start > 0.5])
     assert found.arrived.all() and np.all((settled > 0.4 * largest) & (settled <= largest))
-
-
-# One step
-
-
-def step_of(h=0.01, size=1.0, limit=20.0, retrying=NOBODY) -> Step:
-    return Step(Lanes(0.0), Lanes(size), Lanes(h), Lanes(limit), Mask(retrying))
-
-
-SILENT = np.zeros((2, 0, N_LANES))
-"""Memory of the effort that nobody asks for."""
-
-
-def stroke_limits(adaptive=False, most=MOST) -> Limits:
-    return Limits(np.array([1e-9]), 20, most, adaptive, np.array([LIMIT]))
-
-
-@pytest.mark.parametrize("iterations_before, limit, most", [(0.0, 20.0, 20.0), (990.0, 20.0, 10.0), (1000.0, 9.0, 0.0)])
-def test_newton_has_what_the_step_and_the_stroke_leave_it_and_is_counted(monkeypatch, iterations_before, limit, most):
-    asked, counts = [], (7.0, 2.0, 3.0)
-
-    def minimise(rods, work, stage, robots, tolerance, limit):
-        asked.append((robots.robots.copy(), lanes(limit)[0], work.q[:].copy()))
-        return robots, Lanes(0.0), *map(Lanes, counts)
-
-    monkeypatch.setitem(solve_stages.plain.__globals__, "minimise", minimise)
-    q, v = rows(ROBOT.nodes()), np.full((2 * ROBOT.n_nodes, N_LANES), 0.3)
-    work, report = make_work(RODS, 1), np.zeros((len(REPORT_ROWS), N_LANES))
-    report[NEWTON_ITERATIONS], report[SOLVER_ITERATIONS] = 0.75 * iterations_before, 0.25 * iterations_before
-    a, still = np.zeros((2 * ROBOT.n_nodes + 3, N_LANES)), Actuation(*np.zeros((2, 5, N_LANES)))
-    step = step_of(limit=limit, retrying=FIRST)
-    args = RODS, work, MIDPOINT, still, q, v, a, step, Mask(EVERYONE), stroke_limits(), report
-    good, guarded, _ = solve_stages.plain(*args)
-    ((robots, limit_asked, start),) = asked
-    assert limit_asked == most and np.all(robots == (most > 0.0)) and np.all(lanes(good) == robots)
-    assert lanes(guarded).all()  # regularised or shortened
-    counted = report[[NEWTON_ITERATIONS, REGULARISED, BACKTRACKS], 0]
-    np.testing.assert_array_equal(counted, [0.75 * iterations_before + 7.0, 2.0, 3.0])
-    # In still water a robot that tries again starts where it stands, the others where their velocity leads them.
-    np.testing.assert_allclose(start - q, 0.005 * v * ~FIRST, rtol=1e-9, atol=1e-15)
-
-
-@pytest.mark.parametrize("size, error, accepted", [(1.0, 0.9, True), (1.0, 1.1, False), (2.0**-12, 1.1, True)])
-def test_a_step_is_accepted_whose_error_is_small_or_that_is_the_shortest(monkeypatch, size, error, accepted):
-    """Its length is then kept for the next."""
-    h, stuck = 0.01, FIRST
-    fakes = {
-        "solve_stages": lambda *_: (Mask(~stuck), Mask(NOBODY), None), "end_step": lambda *args: ended.append(args[-1]),
-        "step_error": lambda *args: Lanes(error * LIMIT * h),
-    }  # fmt: skip
-    for name, fake in fakes.items():
-        monkeypatch.setitem(try_step.plain.__globals__, name, fake)
-    a, ended = np.full((2 * ROBOT.n_nodes + 3, N_LANES), 9.0), []
-    args = RODS, None, MIDPOINT, None, None, None, a, step_of(h, size), Mask(EVERYONE), stroke_limits(True), None
-    good, taken, error_rate = map(lanes, try_step.plain(*args))
-    np.testing.assert_array_equal(good, ~stuck)
-    np.testing.assert_array_equal(taken, ~stuck & accepted)
-    np.testing.assert_array_equal(ended[0].robots, taken)
-    np.testing.assert_allclose(error_rate, error * LIMIT)
-    np.testing.assert_array_equal(a[memory_row.plain(RODS, MIDPOINT, LAST_STEP)], np.where(taken, h, 9.0))
 
 
 @pytest.mark.parametrize(
@@ -247,31 +162,14 @@ def test_the_guard_is_milder_after_eight_halvings_and_after_twelve(monkeypatch, 
         monkeypatch.setitem(space, name, fake)
     q, v = rows(ROBOT.nodes()), np.zeros((2 * ROBOT.n_nodes, N_LANES))
     work, report = make_work(RODS, 1), np.zeros((len(REPORT_ROWS), N_LANES))
-    still, step = Actuation(*np.zeros((2, 5, N_LANES))), step_of(limit=20.0 * (1 + halvings))
+    still, limits = Actuation(*np.zeros((2, 5, N_LANES))), Limits(np.array([1e-9]), 20, MOST, False, np.array([LIMIT]))
+    step = Step(Lanes(0.0), Lanes(1.0), Lanes(0.01), Lanes(20.0 * (1 + halvings)), Mask(NOBODY))
     masks = Mask(EVERYONE), Mask(FIRST)
     end_guarded_step.plain(
         RODS, work, MIDPOINT, still, q, v, np.zeros((2 * ROBOT.n_nodes + 3, N_LANES)), step, None, *masks,
-        stroke_limits(), report,
+        limits, report,
     )  # fmt: skip
     assert asked["cut"] == cut
     np.testing.assert_array_equal(asked["held"], FIRST)
     np.testing.assert_array_equal(asked["turnable"], FIRST & turns_back)
     np.testing.assert_array_equal(report[REPORT_ROWS.index("energy_cuts")], 1.0)
-
-
-# Hub angles
-
-
-@pytest.mark.parametrize("limb", range(5))
-def test_the_smallest_hub_angle_may_be_any_gaps_but_wide_ones_do_not_count(limb):
-    """Limb j turned towards the next; a gap of more than pi may close as it likes."""
-    nodes = ROBOT.nodes()
-    nodes[2 * limb + 1 : 2 * limb + 3] = rotated(nodes[2 * limb + 1 : 2 * limb + 3], 0.5)
-    for wide in (None, limb):
-        angle = RODS.hub.angle.copy()
-        if wide is not None:
-            angle[wide] = -0.1
-        rods, report = RODS._replace(hub=RODS.hub._replace(angle=angle)), np.full((len(REPORT_ROWS), N_LANES), np.inf)
-        note_hub_angles.plain(rods, rows(nodes), Mask(EVERYONE), report)
-        gap = 0.4 * np.pi - (0.5 if wide is None else 0.0)
-        np.testing.assert_allclose(report[SMALLEST_HUB_T], np.tan(gap / 2.0), rtol=1e-12)

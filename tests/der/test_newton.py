@@ -7,20 +7,18 @@ import pytest
 
 import oracle
 from continuum_oracle import Continuum
-from hubs import TEN
 from oracle import Star
 from seastar_gym import Contact, Scene, Seastar, SmaPulse, Water
 from seastar_gym.der.contact.contact import SLOT_ROWS
 from seastar_gym.der.rods import Rods, make_work
 from seastar_gym.der.stepping.newton import minimise
-from seastar_gym.der.stepping.scales import MOST_CURVED, PREDICTABLE_STRAIN, SLENDER
-from seastar_gym.der.stepping.skip_last import CURVATURE, EASY, FORESEEABLE_T, LATE, can_skip, quadratic_length
+from seastar_gym.der.stepping.scales import MOST_CURVED
+from seastar_gym.der.stepping.skip_last import CURVATURE
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
 from slopes import nodes, plain
 from stages import EVERYONE, RandomStages, robot_and_star, rods_of
-from touching import touching_limbs
 
 ROBOT, STAR = robot_and_star(5, 4)
 RODS = rods_of(ROBOT)
@@ -88,53 +86,6 @@ def test_robots_end_as_near_to_the_minimum_as_asked_though_a_step_is_left_out(ra
     loose, tight = (minimised(tolerance=x, rods=rods, star=star, speed=0.01, **size) for x in (tolerance, 1e-14))
     assert np.all(loose.iterations < tight.iterations + (tolerance < 1e-6))
     assert np.linalg.norm(loose.q - tight.q, axis=2).max() < tolerance
-
-
-TEN_RODS, EDGE = make_rods(Scene(TEN)), TEN.limb_length / 9
-ENERGY = PREDICTABLE_STRAIN * TEN.youngs_modulus * np.pi * TEN.rod_radius**2 * 5 * TEN.limb_length
-"""Joule: the strain energy up to which steps are predictable."""
-
-
-def foreseen(iterations=1.0, setbacks=0.0, phi=0.0, move=0.99e-5, t=1.0):
-    """Whether the next step is left out, of one robot in all lanes, the last hub hinge of which has this t."""
-    work = make_work(TEN_RODS, 1)
-    work.hub_t[:], work.hub_t[-1] = 0.5, t
-    mask = plain(can_skip.plain(TEN_RODS, work, *map(Lanes, (iterations, setbacks, phi, move, 1e-10))))
-    assert mask.all() == mask.any()
-    return bool(mask.all())
-
-
-@pytest.mark.parametrize(
-    "inside, outside",
-    [
-        ({}, {"move": 1.01e-5}),  # the step left out would be larger than the tolerance
-        ({"iterations": EASY - 1.0}, {"iterations": EASY, "move": 1.01e-5 / np.sqrt(LATE)}),  # convergence is worse
-        ({"iterations": EASY, "move": 0.99e-5 / np.sqrt(LATE)}, {"iterations": EASY + 1.0, "move": 1e-9}),  # or none
-        ({"setbacks": 0.0}, {"setbacks": 1.0}),  # the potential is not convex on the way
-        ({"phi": 0.99 * ENERGY}, {"phi": 1.01 * ENERGY}),  # the step may create energy
-        ({"t": 0.99 * FORESEEABLE_T}, {"t": FORESEEABLE_T}),  # a hinge is near its pole
-        ({}, {"move": np.nan}),
-        ({}, {"phi": np.nan}),
-    ],
-)
-def test_a_step_is_left_out_up_to_every_threshold_and_not_beyond(inside, outside):
-    assert foreseen(**inside) and not foreseen(**outside)
-
-
-def test_limbs_that_touch_are_not_predictable():
-    touching = touching_limbs(apart=3)
-    touching.work.contact.touching[0] = np.arange(N_LANES) >= 3
-    mask = plain(can_skip.plain(touching.rods, touching.work, *map(Lanes, (1.0, 0.0, 0.0, 1e-9, 1.0))))
-    np.testing.assert_array_equal(mask, np.arange(N_LANES) < 3)
-
-
-@pytest.mark.parametrize("radius, share", [(1e-5, 1.0), (1e-3, (EDGE / 1e-3) ** 2 / SLENDER)])
-@pytest.mark.parametrize("gamma", [1e-9, 0.1])
-def test_the_foreseeable_length_is_a_fraction_of_an_edge_that_falls_as_it_is_stiffer_than_inertia(gamma, radius, share):
-    rods = make_rods(Scene(Seastar(nodes_per_limb=10, rod_radius=radius)))
-    rate = share * TEN.youngs_modulus / TEN.density / EDGE**2
-    found = float(np.max(plain(quadratic_length.plain(rods, SimpleNamespace(gamma=Lanes(gamma))))))
-    assert found == pytest.approx(EDGE / (CURVATURE + rate * gamma**2))
 
 
 # Scales of a robot and sizes of its memory

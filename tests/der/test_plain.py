@@ -39,52 +39,39 @@ COMPILED = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compi
 
 SCRIPT = """
 import sys, numpy, test_plain
-numpy.savez(sys.argv[1], **test_plain.ends())
-"""
-ON_BODIES = """
-import test_plain
-test_plain.swim_on_bodies()
+bodies = test_plain.ends(test_plain.on_bodies())
+assert all(numpy.isfinite(each).all() for each in bodies.values())
+numpy.savez(sys.argv[1], **test_plain.ends(test_plain.scenes()))
 """
 MEETING = SmaPulse(0.62, 0.06, 0.02)
-BLOWS = {"implicit-euler": 20.0, "contact": 1.0, "no contact": 1.0}
-"""Velocities of some robots when a stroke begins [m/s], 0.3 in other scenes: steps are halved, limbs meet."""
+WATER = Water(950.0, 1.3, 0.1, Vortex(0.02, 0.1, -0.05, 0.06), 0.8)
 
 
 # Whole strokes
 
 
 def scenes():
-    """Few nodes and a short stroke: every scheme, adapted steps, a fluid with all terms, limbs that meet."""
-    pulse = SmaPulse(0.6, 0.02, 0.02)
-    for scheme, nodes in (("implicit-euler", 4), ("sdirk2", 3), ("sdirk3", 3), ("implicit-midpoint", 3)):
-        yield scheme, Scene(Seastar(nodes_per_limb=nodes), actuator=pulse, numerics=Numerics(scheme, 0.02))
+    """Name, scene, and velocities of some robots at the start [m/s], by which steps are halved and limbs meet.
+
+    Few nodes and a short stroke: every scheme, adapted steps, a fluid with all terms, limbs that meet.
+    """
+    pulse, midpoint = SmaPulse(0.6, 0.02, 0.02), Numerics("implicit-midpoint", 0.01)
+    for scheme, nodes, blow in (
+        ("implicit-euler", 4, 20.0), ("sdirk2", 3, 0.3), ("sdirk3", 3, 0.3), ("implicit-midpoint", 3, 0.3)
+    ):  # fmt: skip
+        yield scheme, Scene(Seastar(nodes_per_limb=nodes), actuator=pulse, numerics=Numerics(scheme, 0.02)), blow
     adapted = Numerics("implicit-midpoint", 0.02, path_tolerance=0.02)
-    yield "adapted", Scene(Seastar(nodes_per_limb=3), actuator=pulse, numerics=adapted)
-    water = Water(950.0, 1.3, 0.1, Vortex(0.02, 0.1, -0.05, 0.06), 0.8)
+    yield "adapted", Scene(Seastar(nodes_per_limb=3), actuator=pulse, numerics=adapted), 0.3
     robot = Seastar(nodes_per_limb=3, relaxation_time=4e-3)
-    yield "fluid", Scene(robot, water, pulse, Numerics("implicit-midpoint", 0.01), loads=((4, 1e-3, -2e-3),))
+    yield "fluid", Scene(robot, WATER, pulse, midpoint, loads=((4, 1e-3, -2e-3),)), 0.3
     bent = Seastar(nodes_per_limb=4, along=AlongLimb(0.7, (1.0, 2.0, 0.5)), stiffening=Stiffening(2.0))
-    yield "bent along", Scene(bent, None, pulse, Numerics("implicit-midpoint", 0.01))
+    yield "bent along", Scene(bent, None, pulse, midpoint), 0.3
     for name, contact in (("contact", Contact()), ("no contact", None)):
-        yield name, Scene(Seastar(nodes_per_limb=4), None, MEETING, Numerics(step=0.02), contact=contact)
+        yield name, Scene(Seastar(nodes_per_limb=4), None, MEETING, Numerics(step=0.02), contact=contact), 1.0
 
 
-def ends() -> dict[str, np.ndarray]:
-    """Where the nodes are after a stroke; some robots begin with blows that need convex matrices and halved steps."""
-    found = {}
-    for name, scene in scenes():
-        n_robots, blow = N_LANES + (name == "implicit-euler"), BLOWS.get(name, 0.3)  # two threads once
-        simulator, rng = Simulator(scene, n_robots, threads=2), np.random.default_rng(0)
-        simulator.v[:, :, -2:] = blow * rng.standard_normal(simulator.v[:, :, -2:].shape)
-        report = simulator.stroke(rng.integers(-1, 2, (n_robots, 5)).astype(float))
-        counts = np.array([report.steps, report.halvings, report.energy_cuts])
-        found[name], found[f"{name} counts"] = simulator.positions, counts
-    return found
-
-
-def swim_on_bodies() -> None:
-    """A stroke of robots with a body and all other terms, some of which begin with blows."""
-    water = Water(950.0, 1.3, 0.1, Vortex(0.02, 0.1, -0.05, 0.06), 0.8)
+def on_bodies():
+    """Robots with a body and all other terms, whose machine code takes minutes to compile."""
     outline = ((0.02, -0.01), (0.01, 0.02), (-0.02, 0.01), (-0.01, -0.02))
     for scheme, contact, body, blow in (
         ("implicit-euler", Contact(), Body(radius=0.02), 10.0),
@@ -92,33 +79,34 @@ def swim_on_bodies() -> None:
         ("sdirk2", None, Body(outline=outline, mass=0.01), 20.0),
     ):
         robot = Seastar(3, 3, relaxation_time=4e-3, body=body, along=AlongLimb(0.7), stiffening=Stiffening(2.0))
-        numerics, loads = Numerics(scheme, 0.02), ((4, 1e-3, -2e-3),)
-        scene = Scene(robot, water, MEETING, numerics, contact=contact, gravity=(1.0, -9.81), loads=loads)
-        simulator, rng = Simulator(scene, N_LANES), np.random.default_rng(0)
-        simulator.v[:, : 2 * robot.n_nodes, -2:] = blow * rng.standard_normal((1, 2 * robot.n_nodes, 2))
-        report = simulator.stroke(rng.integers(-1, 2, (N_LANES, 3)).astype(float))
-        assert report.halvings.any() and np.isfinite(simulator.positions).all()
+        pull = {"gravity": (1.0, -9.81), "loads": ((4, 1e-3, -2e-3),)}
+        yield scheme, Scene(robot, WATER, MEETING, Numerics(scheme, 0.02), contact=contact, **pull), blow
 
 
-def errors_in_plain_python(script: str, *arguments: str) -> str:
-    """What a script complains of where nothing is compiled; reading or writing beyond rows raises there."""
-    path = os.pathsep.join(map(str, (ROOT, ROOT / "tests", ROOT / "tests" / "der")))
-    answer = subprocess.run(
-        [sys.executable, "-W", "error", "-c", script, *arguments],
-        cwd=ROOT, env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": path},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    return answer.stderr if answer.returncode else ""
-
-
-def test_strokes_on_bodies_stay_within_their_rows():
-    assert errors_in_plain_python(ON_BODIES) == ""
+def ends(scenes) -> dict[str, np.ndarray]:
+    """Where the nodes are after a stroke; some robots begin with blows that need convex matrices and halved steps."""
+    found = {}
+    for name, scene, blow in scenes:
+        n_robots, rows = N_LANES + (name == "implicit-euler"), 2 * scene.robot.n_nodes  # two threads once
+        simulator, rng = Simulator(scene, n_robots, threads=2), np.random.default_rng(0)
+        simulator.v[:, :rows, -2:] = blow * rng.standard_normal(simulator.v[:, :rows, -2:].shape)
+        report = simulator.stroke(rng.integers(-1, 2, (n_robots, scene.robot.n_limbs)).astype(float))
+        counts = np.array([report.steps, report.halvings, report.energy_cuts])
+        found[name], found[f"{name} counts"] = simulator.positions, counts
+    return found
 
 
 @COMPILED
-def test_strokes_in_plain_python_are_those_of_the_machine_code(tmp_path):
-    assert errors_in_plain_python(SCRIPT, str(tmp_path / "plain.npz")) == ""
-    expected = ends()
+def test_strokes_in_plain_python_stay_within_their_rows_and_are_those_of_the_machine_code(tmp_path):
+    """Reading or writing beyond rows raises where nothing is compiled."""
+    path = os.pathsep.join(map(str, (ROOT, ROOT / "tests", ROOT / "tests" / "der")))
+    answer = subprocess.run(
+        [sys.executable, "-W", "error", "-c", SCRIPT, str(tmp_path / "plain.npz")],
+        cwd=ROOT, env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": path},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert answer.returncode == 0, answer.stderr
+    expected = ends(scenes())
     with np.load(tmp_path / "plain.npz") as found:
         assert set(found) == set(expected)
         for name in expected:

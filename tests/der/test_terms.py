@@ -1,8 +1,7 @@
 """Every term of a stage, alone and with others, in plain Python: potential, slopes and Hessian are a dense oracle's.
 
 The oracle is shown to have the derivatives of its energies in tests/test_oracle.py; here, the kernels have those of
-theirs, know nothing of where a robot lies, and do without a term that a scene does not name. Rows of other rooms:
-test_body.py, test_contact.py.
+theirs. Rows of other rooms: test_body.py, test_contact.py.
 """
 
 from typing import Any, NamedTuple
@@ -18,30 +17,19 @@ from hubs import HUBS, robot_with
 from oracle import Star
 from seastar_gym import AlongLimb, Body, Limb, Scene, Seastar, SmaPulse, Stiffening, Water
 from seastar_gym.der.body.body import place_roots
-from seastar_gym.der.contact.contact import add_contact, add_contact_energy, contact_force, not_touching
-from seastar_gym.der.contact.coupled import solve_coupled, solver_iterations
-from seastar_gym.der.contact.crossing import without_new_crossings
 from seastar_gym.der.energy import elastic_energy, energies, fill_moments
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
-from seastar_gym.der.motion import relative
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.guard import add_held_energy, may_gain
-from seastar_gym.der.terms.added_mass import add_fluid_energy, add_fluid_inertia, subtract_edge_fluid_inertia
-from seastar_gym.der.terms.along import add_moved_energy
 from seastar_gym.der.terms.clamp import orientation
-from seastar_gym.der.terms.damping import damped_energy, damped_stiffness, damped_stress
-from seastar_gym.der.terms.drag import add_cross_flow
-from seastar_gym.der.terms.fluid import add_work_of_current
 from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
-from seastar_gym.der.terms.inertia import kinetic_energy, subtract_edge_inertia
-from seastar_gym.der.terms.load import load_power, nodal_load
+from seastar_gym.der.terms.inertia import kinetic_energy
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
 from seastar_gym.simd.plain import plain_kernels
-from slopes import NO_RODS, NO_WORK, gradient, plain, rotated, rows
-from stages import EVERYONE, RandomStages, robot_and_star, rods_of
+from slopes import gradient, plain, rows
+from stages import RandomStages, robot_and_star, rods_of
 from unlike import DIFFERENT
 from unlike import robot_and_star as unlike_limbs
 
@@ -192,37 +180,6 @@ def test_a_robot_that_rests_stays(name):
         assert np.abs(found.phi).max() < 1e-25 and found.largest.max() < 1e-13
 
 
-CARRIED = [name for name, (_, star) in TERMS.items() if star.current is None and not star.loads]
-
-
-@pytest.mark.parametrize("name", CARRIED)
-def test_where_a_robot_lies_and_how_it_is_turned_changes_no_potential_and_turns_its_step(name):
-    (scene, star), angle, place = TERMS[name], 1.3, [0.2, -0.5]
-    stages, turned = (RandomStages(star, 1e-2, bend=0.1) for _ in range(2))
-    for places in ("q", "frozen", "q_hat"):
-        setattr(turned, places, rotated(getattr(stages, places), angle) + place)
-    turned.v_hat = rotated(stages.v_hat, angle)
-    there, here = turned.run(make_rods(scene)), stages.run(make_rods(scene))
-    np.testing.assert_allclose(there.phi, here.phi, rtol=1e-9)
-    size = np.abs(here.direction).max()
-    np.testing.assert_allclose(there.direction, rotated(here.direction, angle), rtol=0.0, atol=1e-8 * size)
-
-
-@EVERY_HUB
-def test_a_mirrored_robot_has_the_mirrored_step(hub):
-    """Limbs 2 and 5, 3 and 4 change places, and turn the other way."""
-    rods, star = rods_of(robot_and_star(5, 4, hub)[0]), robot_and_star(5, 4, hub)[1]
-    limbs, (stages, mirrored) = [0, 4, 3, 2, 1], (RandomStages(star, 1e-2, bend=0.1) for _ in range(2))
-    order = np.concatenate([[0], *(3 * limb + np.arange(1, 4) for limb in limbs)])
-    for each in ("q", "frozen", "q_hat", "v_hat"):
-        setattr(mirrored, each, getattr(stages, each)[:, order] * [1.0, -1.0])
-    mirrored.delta_psi = -stages.delta_psi[:, limbs]
-    there, here = mirrored.run(rods), stages.run(rods)
-    np.testing.assert_allclose(there.phi, here.phi, rtol=1e-10)
-    size = np.abs(here.direction).max()
-    np.testing.assert_allclose(there.direction, here.direction[:, order] * [1.0, -1.0], rtol=0.0, atol=1e-8 * size)
-
-
 @EVERY_TERM
 def test_a_regularised_matrix_is_positive_definite_however_wild_robots_are(name):
     """It is the sum of the convex parts, of the robots that are asked about alone; damping has none of its own."""
@@ -235,21 +192,6 @@ def test_a_regularised_matrix_is_positive_definite_however_wild_robots_are(name)
         for lane in range(N_LANES):
             if found.pivot[lane] > 0.0:
                 stages.assert_step(found, lane, stages.hessian(lane, convex=asked[lane]), 1e-8)
-
-
-@EVERY_HUB
-def test_newton_direction_of_wildly_bent_robots_is_as_good_as_their_matrix_allows(hub):
-    """Limbs turned by more than a quarter from where a rigid hub would have them, too."""
-    robot, star = robot_and_star(5, 4, hub)
-    stages = RandomStages(star, 1e-3, bend=0.8, stretch=0.1, speed=1.0, seed=1)
-    found = stages.run(rods_of(robot))
-    for lane in range(N_LANES):
-        hessian = stages.hessian(lane)
-        direction = np.linalg.solve(hessian, stages.gradient(lane).ravel()).reshape(-1, 2)
-        error = np.abs(found.direction[lane] - direction).max() / np.abs(direction).max()
-        assert error < 1e-14 * np.linalg.cond(hessian)
-    turns = [oracle.clamp_turns(star, *pose) for pose in zip(stages.q, stages.delta_psi, strict=True)]
-    assert hub != "rigid" or np.abs(turns).max() > np.pi / 2.0
 
 
 @EVERY_HUB
@@ -277,64 +219,8 @@ def test_a_matrix_that_is_not_a_number_does_not_pass_for_positive_definite():
         assert np.all(found.pivot[others] > 0.0) and np.isfinite(found.direction[others]).all()
 
 
-def test_every_robot_may_have_coefficients_of_its_own():
-    shared, (stiffness, weight) = (
-        make_rods(Scene(Seastar(nodes_per_limb=4))),
-        np.linspace(1.0, 3.0, 2 * N_LANES).reshape(2, -1),
-    )
-
-    def scaled(part, **scales):
-        return part._replace(**{field: getattr(part, field)[:, None] * scale for field, scale in scales.items()})
-
-    own = scaled(shared, mass=weight, edge_mass=weight)._replace(
-        stretching=scaled(shared.stretching, EA=stiffness, EA_over_l=stiffness, l_over_EA=1.0 / stiffness),
-        bending=scaled(shared.bending, EI_over_dl=stiffness, dl_over_EI=1.0 / stiffness),
-    )
-    stages = RandomStages(Continuum(nodes_per_limb=4), 0.01)
-    found = stages.run(own)
-    for lane in range(N_LANES):
-        stages.star = Continuum(nodes_per_limb=4, youngs_modulus=1e6 * stiffness[lane], density=1000.0 * weight[lane])
-        stages.assert_step(found, lane, stages.hessian(lane), 1e-11)
-
-
-# What a scene does not name
-
-
-UNTOUCHED = object()
-ABSENT = {
-    "inertia of edges": (subtract_edge_inertia, (NO_RODS, None, 1, None, None, UNTOUCHED)),
-    "added mass": (add_fluid_inertia, (NO_WORK, 1, None, None, None, UNTOUCHED)),
-    "added mass of edges": (subtract_edge_fluid_inertia, (NO_RODS, None, None, 1, None, None, UNTOUCHED)),
-    "energy of added mass": (add_fluid_energy, (NO_RODS, NO_WORK, None, None, UNTOUCHED)),
-    "work of a current": (add_work_of_current, (NO_RODS, NO_WORK, None, None, None, UNTOUCHED)),
-    "drag across": (add_cross_flow, (NO_RODS, None, 1, None, None, None, None, UNTOUCHED)),
-    "damped stress": (damped_stress, (NO_RODS, None, 0, None, UNTOUCHED, None)),
-    "damped energy": (damped_energy, (NO_RODS, None, 0, None, None, None, None, UNTOUCHED)),
-    "damped stiffness": (damped_stiffness, (NO_RODS, None, UNTOUCHED)),
-    "actuators along": (add_moved_energy, (NO_RODS, None, None, None, None, UNTOUCHED)),
-    "contact": (add_contact, (NO_RODS, NO_WORK, None, None, UNTOUCHED)),
-    "energy of contact": (add_contact_energy, (NO_RODS, NO_WORK, None, UNTOUCHED)),
-    "energy that contact holds": (add_held_energy, (NO_RODS, None, None, None, UNTOUCHED)),
-    "limbs that touch": (not_touching, (NO_WORK, UNTOUCHED)),
-    "limbs that cross": (without_new_crossings, (NO_RODS, None, None, None, UNTOUCHED)),
-    "coupled steps": (solve_coupled, (None, NO_WORK, None, UNTOUCHED)),
-}
-
-
-@pytest.mark.parametrize("name", ABSENT)
-def test_a_term_that_is_not_there_changes_no_bit(name):
-    kernel, args = ABSENT[name]
-    assert kernel.plain(*args) is UNTOUCHED
-
-
-def test_forces_and_flows_that_are_not_there_are_zero_and_a_hub_without_any_preference_has_an_orientation():
-    x, y = Lanes(3.0), Lanes(1.0)
-    assert plain(contact_force.plain(NO_WORK, 1)) == plain(nodal_load.plain(NO_RODS, 2)) == (0.0, 0.0)
-    assert plain(load_power.plain(NO_RODS, 2, x, y)) == plain(solver_iterations.plain(NO_WORK)) == 0.0
-    assert relative.plain(NO_WORK, 1, x, y) == (x, y)
+def test_a_hub_without_any_preference_has_an_orientation():
     assert [float(plain(one)) for one in orientation.plain(Lanes(0.0), Lanes(0.0))] == [1.0, 0.0]
-    for named in ("current", "added_mass", "body"):  # any step may gain energy
-        assert may_gain.plain(NO_RODS._replace(**{named: object()}), None, None, None, EVERYONE) is EVERYONE
 
 
 # Actuators
@@ -372,19 +258,3 @@ def test_the_moment_that_resists_an_actuator_is_the_slope_of_the_energy_in_its_r
 
     fill_moments.plain(rods, work, actuation(turns), q, moments)
     np.testing.assert_allclose(moments[:, 0], gradient(energy, turns, 1e-3), rtol=1e-6)
-
-
-@EVERY_HUB
-def test_what_is_natural_follows_the_limbs_linearly_in_time(hub):
-    """And at both ends of an interval the other end does not matter."""
-    rods = make_rods(Scene(robot_with(hub, nodes_per_limb=4), actuator=SmaPulse(0.3)))
-    begin, end = np.random.default_rng(0).uniform(-0.3, 0.3, (2, 5, N_LANES))
-
-    def natural(begin, end, fraction):
-        work = make_work(rods, 1)
-        set_natural_hub_angles.plain(rods, work, Actuation(begin, end), Lanes(fraction))
-        return work.hub_EI_kappa_bar if rods.clamp is None else work.hub_direction
-
-    at = begin + 0.3 * (end - begin)
-    np.testing.assert_allclose(natural(begin, end, 0.3), natural(at, at, 0.0), rtol=1e-12)
-    np.testing.assert_array_equal(natural(begin, end, 0.0), natural(begin, 0.0 * end, 0.0))

@@ -182,31 +182,6 @@ def test_derivatives_go_on_from_a_state():
     np.testing.assert_allclose(rest.by["commands"].hub, whole.by["commands"].hub[1:, :, 1:], rtol=0.0, atol=1e-12)
 
 
-@pytest.mark.slow
-def test_derivatives_jump_where_limbs_begin_to_touch():
-    """Swims are continuous there, but differences across such a place, 1e-4 of a radius away, are no derivatives."""
-    scene, name, commands = TERMS["contact"][0], "robot.rod_radius", TOUCHING
-
-    def at_share(share):
-        number = at(scene, name) * (1.0 + share)
-        found = differentiate(with_numbers(scene, {name: number}), commands, [name])
-        return found.swim.velocities, number * found.by[name].velocities
-
-    (low, below), (high, above) = ((share, at_share(share)) for share in (-2e-4, 2e-4))
-    jump = np.abs(above[1] - below[1]).max()
-    assert jump > 0.5 * np.abs(below[1]).max()
-    while high - low > 1e-12:
-        middle = 0.5 * (low + high)
-        found = at_share(middle)
-        if np.abs(found[1] - below[1]).max() > 0.5 * jump:
-            high, above = middle, found
-        else:
-            low, below = middle, found
-    assert np.abs(above[1] - below[1]).max() > 0.9 * jump
-    assert np.abs(above[0] - below[0]).max() < 1e-9 * np.abs(below[0]).max()
-    assert 9e-5 < low < 1e-4
-
-
 # Refusals
 
 

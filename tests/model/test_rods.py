@@ -1,27 +1,14 @@
-"""Coefficients of rods are the chapter's; those of the continuum: tests/simulator/test_oracle_steps.py."""
+"""Coefficients of rods are the chapter's; those of the continuum: tests/der/test_terms.py."""
 
 import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from oracle import Star
 from seastar_gym import Limb, Numerics, Scene, Seastar, SmaPulse, Water
 from seastar_gym.model.rods import make_limits, make_rods
 from seastar_gym.scene.numerics import ADAPTATION, MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP
-
-
-@given(
-    n_limbs=st.integers(3, 12), nodes_per_limb=st.integers(2, 40), limb_length=st.floats(0.01, 1.0),
-    rod_radius=st.floats(1e-4, 1e-2), density=st.floats(100.0, 1e4),
-)  # fmt: skip
-def test_total_mass_is_that_of_the_limbs(n_limbs, nodes_per_limb, limb_length, rod_radius, density):
-    robot = Seastar(n_limbs, nodes_per_limb, limb_length, rod_radius, density=density)
-    mass = make_rods(Scene(robot=robot, actuator=SmaPulse(peak_angle=0.1))).mass
-    assert mass.shape == (robot.n_nodes,)
-    assert mass.sum() == pytest.approx(n_limbs * limb_length * math.pi * rod_radius**2 * density, rel=1e-12)
 
 
 @pytest.mark.parametrize("hub_hinge", ["opening", "turning"])

@@ -45,6 +45,7 @@ from seastar_gym import (
 from seastar_gym.scene.per_robot import side_by_side
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
+from simulator.test_conservation import CURLED
 from strokes import finished
 
 pytestmark = pytest.mark.filterwarnings("ignore:Limbs of robot:RuntimeWarning")
@@ -79,10 +80,6 @@ FLUID = Water(1000.0, 1.0, 0.1, UniformCurrent(0.1, -0.05), 1.0)
 ON_BODY = Seastar(4, 5, body=Body.rectangle(
     0.06, 0.03, attachments=corners((0.03, 0.015), (-0.03, 0.015), (-0.03, -0.015), (0.03, -0.015))
 ))  # fmt: skip
-CURLED = Seastar(2, 7, 0.06, limbs=(Limb(natural_curvature=50.0),) * 2, body=Body.rectangle(
-    0.06, 0.03, attachments=(Attachment(0.03, 0.0, 0.6), Attachment(-0.03, 0.0, 0.6 + np.pi))
-))  # fmt: skip
-"""Limbs around a plate, at some distance; + turns them onto it."""
 OF_EACH = replace(FAST.robot, youngs_modulus=np.geomspace(5e5, 1.9e6, 2 * N_LANES + 3))
 TERMS = {
     "plain": {},

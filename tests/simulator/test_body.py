@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from momenta import bodied_momenta as momenta
 from momenta import cross
-from seastar_gym import Attachment, Body, Numerics, Scene, Seastar, Simulator, SmaPulse, UniformCurrent, Water
+from seastar_gym import Attachment, Body, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 
 MIDPOINT = Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-10)
 SPECK = {"n_limbs": 2, "nodes_per_limb": 2, "limb_length": 1e-3, "rod_radius": 1e-4, "density": 1.0}
@@ -40,32 +39,6 @@ def test_a_small_light_body_swims_as_the_point_hub_does():
         paths.append(simulator.positions[0])
     far, near = (np.abs(path - paths[0]).max() for path in paths[1:])
     assert near < 2e-4 and near == pytest.approx(0.5 * far, rel=0.2)
-
-
-@pytest.mark.parametrize("scheme", ["implicit-midpoint", "implicit-euler", "sdirk2", "sdirk3"])
-def test_a_free_robot_of_stiff_limbs_turns_and_moves_on_as_a_rigid_one(scheme):
-    robot = Seastar(nodes_per_limb=4, youngs_modulus=1e8, body=Body(radius=0.02, mass=0.02))
-    simulator = Simulator(Scene(robot, None, numerics=Numerics(scheme, 1e-3, 1e-10)))
-    set_moving(simulator, (0.1, -0.05), 2.0)
-    (p, spin), energy = momenta(simulator), simulator.kinetic_energy()[0]
-    mass, inertia = rigid_numbers(robot)
-    assert spin == pytest.approx(2.0 * inertia, rel=0.01)
-    np.testing.assert_allclose(p, mass * np.array([0.1, -0.05]), rtol=1e-12)
-    assert energy == pytest.approx(0.5 * (0.1**2 + 0.05**2) * mass + 0.5 * spin * 2.0, rel=1e-9)
-    simulator.advance(0.2, np.zeros((1, 5)))
-    p_1, spin_1 = momenta(simulator)
-    np.testing.assert_allclose(p_1, p, rtol=1e-9)
-    loss = {"implicit-euler": 1e-3, "implicit-midpoint": 1e-5}.get(scheme, 3e-4)
-    assert spin_1 == pytest.approx(spin, rel=loss)
-    assert simulator.orientation()[0] == pytest.approx(0.4, rel=2e-3)
-    np.testing.assert_allclose(simulator.hub_position()[0], [0.02, -0.01], rtol=1e-9)
-
-
-def rigid_numbers(robot: Seastar) -> tuple[float, float]:
-    """Mass [kg] and moment of inertia [kg m^2] of a disc with thin rods around it."""
-    a, L, m = robot.body.radius, robot.limb_length, robot.density * math.pi * robot.rod_radius**2 * robot.limb_length
-    of_rods = robot.n_limbs * m * (a**2 + a * L + L**2 / 3.0)
-    return robot.body.mass + robot.n_limbs * m, 0.5 * robot.body.mass * a**2 + of_rods
 
 
 def test_a_robot_with_a_lopsided_body_turns_about_its_centre_of_mass():
@@ -155,22 +128,3 @@ def test_an_ellipse_in_an_ideal_fluid_keeps_impulse_and_energy():
     simulator.advance(1.0, [[0.0, 0.0]])
     assert abs(simulator.orientation()[0]) > 0.3
     np.testing.assert_allclose(kept(), before, rtol=2e-4)
-
-
-def test_a_robot_with_two_alike_sides_swims_straight():
-    simulator = Simulator(Scene(FOUR_LIMBS, numerics=MIDPOINT))
-    simulator.stroke([[-1, 1, 1, -1]])
-    assert abs(simulator.hub_position()[0, 0]) > 1e-3
-    assert abs(simulator.hub_position()[0, 1]) < 1e-9 and abs(simulator.orientation()[0]) < 1e-7
-
-
-@pytest.mark.slow
-def test_a_uniform_current_carries_a_robot_along():
-    still = Simulator(Scene(FOUR_LIMBS, Water(), numerics=MIDPOINT))
-    carried = Simulator(Scene(FOUR_LIMBS, Water(current=UniformCurrent(0.02, -0.01)), numerics=MIDPOINT))
-    set_moving(carried, (0.02, -0.01), 0.0)
-    for simulator in (still, carried):
-        simulator.advance(0.3, [[1, 0, 0.5, -1]])
-    drift = 0.3 * np.array([0.02, -0.01])
-    np.testing.assert_allclose(carried.positions - drift, still.positions, rtol=0.0, atol=1e-9)
-    np.testing.assert_allclose(carried.orientation(), still.orientation(), atol=1e-8)

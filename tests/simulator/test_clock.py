@@ -7,7 +7,6 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-import oracle
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse
 from seastar_gym.envs.swimming import first_after
 from seastar_gym.simulator.pauses import completed, pausing
@@ -25,14 +24,6 @@ def test_rounding_of_time_does_not_accumulate_over_intervals_equal_or_not(interv
     exact = 1000 * intervals[0] if len(intervals) == 1 else float(1000 * sum(map(Fraction, intervals)))
     assert abs(simulator.time[0] - exact) <= ulps * np.spacing(exact)
     assert abs(sum(intervals * 1000) - exact) > 10.0 * np.spacing(exact)
-
-
-@pytest.mark.parametrize("step", [1.0 / 3.0, 0.25, 0.1, 0.05, 0.03, 0.02, 0.003, 0.001, 0.0007, 1e-4])
-def test_steps_are_those_of_the_oracle(step):
-    starts, lengths = np.array(oracle.stroke_steps(step)).T
-    times = step_times(CHAPTER, step)
-    np.testing.assert_allclose(times[:-1], starts, rtol=0.0, atol=1e-13)
-    np.testing.assert_allclose(np.diff(times), lengths, rtol=0.0, atol=1e-13)
 
 
 @given(durations, durations, st.floats(1e-3, 20.0))

@@ -1,7 +1,6 @@
 """Limbs that meet: they do not cross, push each other alike, and come to rest where statics says."""
 
 import itertools
-import math
 import pickle
 from collections.abc import Iterator
 from typing import Any
@@ -17,9 +16,9 @@ from seastar_gym.der.contact.contact import tapered
 from seastar_gym.model.mesh import make_mesh
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.contact import LARGEST_OVERLAP
-from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.scene.shape import rest_positions
 from seastar_gym.simulator.report import report_of_pieces
+from simulator.test_conservation import CURLED
 from strokes import finished
 
 COMMANDS = np.array(list(itertools.product([-1.0, 0.0, 1.0], repeat=5)))
@@ -109,10 +108,6 @@ def test_limbs_in_contact_do_not_cross(scene, commands, parts, share):
         assert (report.status != 0).sum() <= share * len(given)
 
 
-def test_distinct_commands_stand_for_all():
-    assert {image for command in DISTINCT for image in images(command)} == set(map(tuple, CLOSING.tolist()))
-
-
 def test_pressed_limbs_rest_where_statics_says():
     """All nodes are held but the tip of limb 1, and a load F presses it against limb 2: where it comes to rest, contact
     pushes with what bending of the last hinge leaves of F, EI/dl over the edge length squared times the way of the tip.
@@ -143,25 +138,6 @@ def test_pressed_limbs_rest_where_statics_says():
     bending = float(make_rods(scene).bending.EI_over_dl[tip - 1]) / robot.edge_length**2
     assert way > 5e-4
     assert -contact @ push == pytest.approx(force - bending * way, rel=0.02)
-
-
-def test_schemes_agree_on_limbs_that_meet():
-    """Contact is inelastic and of first order with every scheme: with shorter steps they come together.
-
-    At the default's opening angle these two hardly press each other.
-    """
-    contact = Contact(opening_angle=0.3)
-
-    def swim(scheme, step):
-        simulator = Simulator(Scene(TEN, numerics=Numerics(scheme, step), contact=contact), 1)
-        for _ in range(2):
-            simulator.stroke(np.array([[1.0, -1.0, 0.0, 0.0, 0.0]]))
-        return simulator.hub_position()[0]
-
-    coarse = swim("sdirk2", 5e-3) - swim("implicit-midpoint", 5e-3)
-    fine = swim("sdirk2", 5e-4) - swim("implicit-midpoint", 5e-4)
-    assert np.linalg.norm(fine) < 0.5 * np.linalg.norm(coarse)
-    assert np.linalg.norm(fine) < 0.02 * np.linalg.norm(swim("sdirk2", 5e-4))
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.003])
@@ -199,17 +175,6 @@ def test_limbs_pressed_onto_each_other_come_to_stand_at_the_opening_angle(angle)
     next(stroke)
     first, second = (simulator.positions[0, tip] - simulator.positions[0, tip - 1] for tip in (36, 72))
     assert np.arctan2(cross(first, second), first @ second) == pytest.approx(angle, rel=0.05)
-
-
-def test_limbs_taper_flat_at_the_root_within_cones_of_the_opening_angle():
-    reach, angle = 1.6e-3, 0.3
-    x = np.linspace(0.0, 4.0 * reach / angle, 401)
-    found = np.array([tapered(reach, each, angle) for each in x])
-    slope = np.gradient(found, x)
-    assert found[0] == 0.0 and found[-1] == reach
-    assert slope[0] < 0.01 * angle and slope[-1] == 0.0
-    assert slope.max() == pytest.approx(0.5 * angle, rel=1e-3)
-    assert np.all(found <= 0.5 * angle * x)
 
 
 def thrown(speed: float, numerics: Numerics, contact: Contact, n_robots: int = 1) -> Simulator:
@@ -332,25 +297,7 @@ def test_the_modulus_of_a_layer_is_that_of_a_beam_on_an_elastic_foundation():
     np.testing.assert_allclose(by_layer, default, rtol=1e-12)
 
 
-# Limbs that are pressed onto a body: they stay outside, and push it as it pushes them.
-
-
-PEAK = 0.8
-DISC = Body(radius=0.02, attachments=tuple(
-    Attachment(0.02 * math.cos(a), 0.02 * math.sin(a), a + 1.0) for a in (0.0, 2.0 * math.pi / 3.0, 4.0 * math.pi / 3.0)
-))  # fmt: skip
-
-PLATE = Body.rectangle(0.06, 0.03, attachments=(Attachment(0.03, 0.0, 0.6), Attachment(-0.03, 0.0, 0.6 + math.pi)))
-ROBOTS = {
-    "disc": Seastar(3, 7, 0.06, limbs=(Limb(natural_curvature=45.0),) * 3, body=DISC),
-    "plate": Seastar(2, 7, 0.06, limbs=(Limb(natural_curvature=50.0),) * 2, body=PLATE),
-}
-"""Limbs that are curled around a body, at some distance at rest; + turns them onto it."""
-
-
-def scene(name: str, scheme: SchemeName, step: float, fluid: Water | None) -> Scene:
-    numerics = Numerics(scheme, step, newton_tolerance=1e-9)
-    return Scene(ROBOTS[name], fluid, SmaPulse(PEAK), numerics, contact=Contact())
+# Limbs that are pressed onto a body
 
 
 def heights(simulator: Simulator) -> np.ndarray:
@@ -365,23 +312,17 @@ def heights(simulator: Simulator) -> np.ndarray:
     return np.array([robot.body.shape.height_over(each).min() for each in of_robots])
 
 
-def commands(name: str) -> np.ndarray:
-    """Of four robots; of the second, all limbs are turned onto the body."""
-    each = np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [0.5, 1.0, -1.0]])
-    return each[:, : ROBOTS[name].n_limbs]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["implicit-euler", "implicit-midpoint", "sdirk2"])
-@pytest.mark.parametrize("name", ROBOTS)
-def test_pressed_limbs_stay_outside_of_the_body(name, scheme):
+def test_pressed_limbs_stay_outside_of_the_body(scheme):
     """Into which they would be turned if it were not for contact: limbs of the natural shape end inside."""
-    limbs = [limb._replace(direction=limb.direction + PEAK) for limb in ROBOTS[name].limb_shapes()]
-    assert ROBOTS[name].body.shape.height_over(rest_positions(limbs, 7, tangent=True)[1:]).min() < -1e-3
-    assert ROBOTS[name].body.shape.height_over(ROBOTS[name].nodes()[1:]).min() > 1.6e-3
-    simulator = Simulator(scene(name, scheme, 5e-3, Water()), 4)
+    peak, numerics = 0.8, Numerics(scheme, 5e-3, newton_tolerance=1e-9)
+    limbs = [limb._replace(direction=limb.direction + peak) for limb in CURLED.limb_shapes()]
+    assert CURLED.body.shape.height_over(rest_positions(limbs, 7, tangent=True)[1:]).min() < -1e-3
+    assert CURLED.body.shape.height_over(CURLED.nodes()[1:]).min() > 1.6e-3
+    simulator = Simulator(Scene(CURLED, Water(), SmaPulse(peak), numerics, contact=Contact()), 4)
     for _ in range(2):
-        stroke = simulator.stroke_in_parts(commands(name), 50)
+        stroke = simulator.stroke_in_parts(np.array([[1.0, 0.0], [1.0, 1.0], [1.0, -1.0], [0.5, 1.0]]), 50)
         found, report = finished(stroke, lambda time: heights(simulator))
         found = np.array(found)
         assert (report.status == 0).all()

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import oracle
-from along_oracle import Bent
 from seastar_gym import (
     AlongLimb,
     MeasuredCurve,
@@ -18,6 +17,7 @@ from seastar_gym import (
     Stiffening,
 )
 from seastar_gym.gaits import PAIRS, STRAIGHT
+from simulator.test_oracle_steps import BENT, TWIN
 
 LIMIT = {"straight": 34.360, "{1-,2+}": 28.189, "{1-,4+}": 39.355, "{1-,5+}": 32.282}
 """Distances after ten strokes with N to infinity and h to 0 [mm]."""
@@ -114,49 +114,10 @@ def test_a_profile_at_the_root_is_the_rotation_at_the_hub_in_the_limit():
     assert off[1] == pytest.approx(0.1 * off[0], rel=0.05)
 
 
-def test_few_nodes_bend_and_swim_as_many_do():
-    """Errors fall with the second power of the edge length: 10, 19 and 37 nodes."""
-    ends = []
-    for nodes in (10, 19, 37):
-        along, hot = AlongLimb(0.8, (1.0, 0.5)), Stiffening()
-        robot = Seastar(nodes_per_limb=nodes, along=along, stiffening=hot, relaxation_time=5e-3)
-        ends.append(swum(robot, strokes=2, numerics=Numerics("implicit-midpoint", 0.004))[0, 0])
-    coarse, middle, fine = ends
-    assert abs(coarse - fine) < 0.01 * abs(fine)
-    assert abs(middle - fine) < 0.4 * abs(coarse - fine)
-
-
-# The oracle
-
-
-BENT = Bent(
-    3, 5, directions=(0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0), lengths=(0.1,) * 3, radii=((1.6e-3,) * 2,) * 3,
-    moduli=((1e6,) * 2,) * 3, curvatures=(0.0,) * 3, share=0.8, ratio=2.5, peak=0.6, relaxation_time=2e-3,
-)  # fmt: skip
-TWIN = Seastar(3, 5, along=AlongLimb(0.8), stiffening=Stiffening(2.5), relaxation_time=2e-3)
-
-
-@pytest.mark.parametrize("scheme", ["implicit-euler", "implicit-midpoint"])
-def test_steps_of_a_robot_that_bends_and_stiffens_are_those_of_the_oracle(scheme):
-    h, command = 0.01, np.array([1.0, -0.7, 0.2])
-    numerics = Numerics(scheme, h, newton_tolerance=1e-13)
-    simulator = Simulator(Scene(TWIN, actuator=SmaPulse(0.6, 4 * h, 4 * h), numerics=numerics))
-    simulator.advance(3 * h, [command])
-    q, v = BENT.rest, np.zeros_like(BENT.rest)
-    gamma = h if scheme == "implicit-euler" else 0.5 * h
-    for k in range(3):
-        now = BENT.at(command * 0.6 * (k * h + gamma) / (4 * h))
-        ends, velocities = oracle.stage(now, q, v, gamma, np.zeros(3))
-        q, v = (ends, velocities) if scheme == "implicit-euler" else (2.0 * ends - q, 2.0 * velocities - v)
-    assert np.abs(q - BENT.rest).max() > 1e-3
-    np.testing.assert_allclose(simulator.positions[0], q, rtol=0.0, atol=1e-11)
-    np.testing.assert_allclose(simulator.velocities[0], v, rtol=0.0, atol=1e-8)
-
-
 def test_a_robot_that_stiffens_violently_gains_no_energy_but_the_actuators():
     """Implicit Euler in vacuum, with steps that straddle most of the transformation: the guard keeps the balance."""
     h, peak = 0.01, 0.6
-    robot, star = replace(TWIN, relaxation_time=None, stiffening=Stiffening(20.0)), replace(BENT, ratio=20.0)
+    robot, star = replace(TWIN, relaxation_time=None, stiffening=Stiffening(20.0)), replace(BENT, ratio=20.0, peak=peak)
     simulator = Simulator(Scene(robot, None, SmaPulse(peak, 0.02, 0.02), Numerics("implicit-euler", h)))
     command, q, start, energy = np.array([1.0, -1.0, 1.0]), star.rest, 0.0, 0.0
     for _ in range(5):

@@ -6,7 +6,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from refusals import assert_refused
 from seastar_gym import Contact, DomainRandomization, Numerics, Scene, Seastar, Simulator, SmaPulse, Uniform
 from seastar_gym.accuracy.commands import STROKES, draw_classes
 from seastar_gym.accuracy.measure import SHORT, swim
@@ -185,12 +184,3 @@ def test_info_has_what_is_measured_alone_as_in_the_batch_and_nothing_else(name):
     assert batch.step(actions)[4][name].tolist() == [at_rest] * 2  # the next episodes have begun
     silent = SeastarSwimEnv(fidelity="fast")
     assert name not in silent.reset(seed=0)[1] and name not in silent.step(actions[0])[4]
-
-
-def test_the_environment_of_a_spec_has_error_bars_too():
-    env = gym.make("SeastarSwim-v0", fidelity="fast", error_bars=True)
-    again = gym.make(type(env.spec).from_json(env.spec.to_json()))
-    again.reset(seed=0)
-    assert again.step([0, 1, 0, 0, 2])[4]["error_estimate"] > 0.0
-    with assert_refused("error_bars"):
-        SeastarSwimEnv(error_bars=1)

@@ -198,20 +198,6 @@ def test_robots_that_need_more_iterations_than_they_have_fail_and_the_others_kee
     assert not bound.stroke(commands).status.any()
 
 
-def test_adapted_steps_that_were_halved_grow_again_within_their_interval():
-    """From velocities that need short steps at first: without growth, they took 65,533 for the two intervals."""
-    adapted = Numerics("implicit-midpoint", 0.1, path_tolerance=0.02)
-    scene = Scene(TEN, actuator=SmaPulse(0.3, 0.1, 0.1), numerics=adapted)
-    simulator, rng = Simulator(scene, 8), np.random.default_rng(0)
-    state = simulator.get_state()
-    simulator.set_state(state._replace(velocities=300.0 * rng.standard_normal(state.positions.shape)))
-    report = simulator.stroke(rng.integers(-1, 2, (8, 5)))
-    assert not report.status.any()
-    assert report.halvings.max() > 4
-    assert report.steps.max() < 4096  # the shortest step, of an interval
-    np.testing.assert_allclose(report.covered, 0.2, rtol=1e-12)
-
-
 def crowd() -> Simulator:
     """Two robots of twelve limbs that touch, those of the second thrown at each other at 30 m/s."""
     scene = Scene(Seastar(12, 10), None, SmaPulse(0.2), Numerics("implicit-midpoint", 5e-3), contact=Contact())

@@ -9,11 +9,24 @@ import numpy as np
 import pytest
 
 import oracle
+from along_oracle import Bent
 from continuum_oracle import Continuum, ContinuumShaped
 from currents import CURRENTS, velocity
 from oracle import Array, Star
-from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Strip, UniformCurrent, Water
-from seastar_gym.model.rods import make_rods
+from seastar_gym import (
+    AlongLimb,
+    Contact,
+    Limb,
+    Numerics,
+    Scene,
+    Seastar,
+    Simulator,
+    SmaPulse,
+    Stiffening,
+    Strip,
+    UniformCurrent,
+    Water,
+)
 from seastar_gym.scene.robot import HubHinge
 from stages import random_shape
 from unlike import DIFFERENT, robot_and_star
@@ -90,8 +103,8 @@ def assert_steps_agree(scene: Scene, star: Star, n_steps: int = 4) -> None:
     """
     simulator, (q, v, command) = Simulator(scene), moving(star)
     simulator.set_state((q[None], v[None], np.zeros(1)))
-    at_rest = oracle.elastic_energy(star, q, np.zeros(star.n_limbs))
-    assert simulator.elastic_energy()[0] == pytest.approx(at_rest, rel=1e-10)
+    still, turns = star.turned(np.zeros(star.n_limbs))
+    assert simulator.elastic_energy()[0] == pytest.approx(oracle.elastic_energy(still, q, turns), rel=1e-10)
     assert simulator.kinetic_energy()[0] == pytest.approx(oracle.kinetic_energy(star, v), rel=1e-12)
     stroke = simulator.stroke_in_parts(command[None], 4)
     for k in range(n_steps):
@@ -102,26 +115,13 @@ def assert_steps_agree(scene: Scene, star: Star, n_steps: int = 4) -> None:
     np.testing.assert_allclose(simulator.velocities[0], v, rtol=0.0, atol=1e-10 * np.abs(v).max())
 
 
-# Coefficients
-
-
-@pytest.mark.parametrize("curvatures", [(0.0, 0.0, 0.0, 0.0), (2.0, -1.0, 3.0, -4.0)])
-def test_rest_shape_and_coefficients_are_those_of_the_oracle(curvatures):
-    robot, star = shaped(UNLIKE, 5, curvatures, fluid_density=900.0, **ACROSS, **MASS)
-    rods = make_rods(make_scene(robot, Water(900.0, **ACROSS, **MASS)))
-    np.testing.assert_allclose(robot.nodes(), star.rest, atol=1e-15)
-    np.testing.assert_allclose(rods.mass, star.masses, rtol=1e-13)
-    np.testing.assert_allclose(rods.edge_mass, star.edge_mass, rtol=1e-13)
-    np.testing.assert_allclose(np.concatenate([rods.drag, 8.0 * rods.middle_drag]), star.drag_places[1], rtol=1e-13)
-    np.testing.assert_allclose(8.0 * rods.middle_cross_drag, star.cross_drag * 4.0 / 3.0, rtol=1e-13)
-    np.testing.assert_allclose(rods.edge_added_mass, star.added_mass_coupling, rtol=1e-13)
-    hinges = rods.bending.EI_over_dl.reshape(4, -1)
-    np.testing.assert_allclose(hinges[:, 0], [clamp.stiffness for clamp in star.clamps], rtol=1e-13)
-    np.testing.assert_allclose(hinges[:, 1:].ravel(), star.hinge_EI / star.hinge_dl, rtol=1e-13)
-
-
 # Steps
 
+BENT = Bent(
+    3, 5, directions=(0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0), lengths=(0.1,) * 3, radii=((1.6e-3,) * 2,) * 3,
+    moduli=((1e6,) * 2,) * 3, curvatures=(0.0,) * 3, share=0.8, ratio=2.5, peak=PEAK, relaxation_time=2e-3,
+)  # fmt: skip
+TWIN = Seastar(3, 5, along=AlongLimb(0.8), stiffening=Stiffening(2.5), relaxation_time=2e-3)
 CURVED = (2.0, -1.0, 3.0, -4.0)
 HELD = {"held_nodes": (0, 1, 2)}
 PULLED = {"loads": ((4, 2e-4, -1e-4), (7, 0.0, 3e-4)), "gravity": (1.0, -9.81)}
@@ -185,6 +185,8 @@ def cases() -> Iterator[Any]:
         twins = shaped(UNLIKE, 5, CURVED, fluid_density=900.0, relaxation_time=TAU, **EVERY, **PULLED, **flowing(name))
         fluid = Water(900.0, **EVERY, current=CURRENTS[name])
         yield case(f"every term-{name}-unlike", twins, "implicit-euler", 1, fluid=fluid, **PULLED)
+    for scheme in ("implicit-euler", "implicit-midpoint"):
+        yield case("bent along and stiffer", (TWIN, BENT), scheme, 3)
     pulled = HELD | PULLED
     for name, twins, parts in (
         ("plain", alike(5, 10), {}),

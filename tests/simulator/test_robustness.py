@@ -12,14 +12,11 @@ from hypothesis import strategies as st
 
 import oracle
 from continuum_oracle import Continuum
-from fuzz.promises import assert_told
-from hubs import HUBS, TEN, robot_with
+from hubs import HUBS, robot_with
 from oracle import Star
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from simulator.test_conservation import rattled
 from strokes import finished, ternary
-
-SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
 
 
 def powers(smallest: float, largest: float) -> st.SearchStrategy[float]:
@@ -60,7 +57,7 @@ HAIRS = Scene(
 @example(HAIRS, 1.0, 24)
 @given(scenes(), st.sampled_from([0.01, 1.0, 30.0]), st.integers(0, 1000))
 def test_no_step_that_has_not_converged_is_accepted(scene, speed, seed):
-    """The oracle's Newton step from where a time step ended is about the tolerance long, see test_simulator.py."""
+    """The oracle's Newton step from where a time step ended is about the tolerance long."""
     simulator, robot, fluid = rattled(Simulator(scene, 2), speed, 0.1, seed=seed), scene.robot, scene.fluid
     kind = Continuum if robot.discretisation == "continuum" else Star
     star = kind(
@@ -79,26 +76,3 @@ def test_no_step_that_has_not_converged_is_accepted(scene, speed, seed):
         hessian = oracle.incremental_hessian(star, after.positions[k], before.positions[k], h, delta_psi)
         move = np.linalg.norm(oracle.descent(hessian, gradient), axis=1).max()
         assert move < 100.0 * scene.numerics.newton_tolerance * robot.limb_length
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize(
-    "robot, step, speed",
-    [
-        *((TEN, 0.01, speed) for speed in (0.0, 0.1, 1.0, 10.0)),
-        (TEN, 0.05, 100.0),
-        (Seastar(nodes_per_limb=40), 0.05, 0.0),
-        (Seastar(nodes_per_limb=80), 0.05, 0.0),
-        (TEN, 0.2, 0.0),
-        (Seastar(n_limbs=12), 0.02, 0.0),
-        *((Seastar(nodes_per_limb=10, youngs_modulus=10.0**k), 0.02, 0.0) for k in range(2, 12)),
-    ],
-    ids=lambda value: f"{value.nodes_per_limb} nodes, {value.youngs_modulus:g} Pa" if type(value) is Seastar else None,
-)
-def test_scenes_that_defeat_plain_newton_arrive(robot, step, speed, scheme):
-    simulator = rattled(Simulator(Scene(robot, numerics=Numerics(scheme, step)), 8), speed)
-    for commands in ternary(3, 8, n_limbs=robot.n_limbs):
-        commands[0] = np.resize([1.0, -1.0], robot.n_limbs)
-        report = simulator.stroke(commands)
-        assert not report.status.any()
-        assert_told(simulator, report)

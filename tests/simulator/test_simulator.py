@@ -156,15 +156,6 @@ def test_a_report_says_what_a_stroke_cost():
     assert report.smallest_opening_angle[0] == pytest.approx(2.0 * np.pi / 5.0)
 
 
-def test_adapted_steps_are_short_where_the_swim_is_hard_and_long_where_it_is_easy():
-    simulator = Simulator(scene_of("adaptive", 0.05), 2)
-    for _ in range(3):
-        report = simulator.stroke(np.array([[0.0] * 5, [-1.0, 1.0, 0.0, 0.0, 0.0]]))
-    assert report.steps[0] < 50 < report.steps[1]
-    assert report.rejections[0] == 0
-    np.testing.assert_allclose(report.covered, 1.0, rtol=1e-12)
-
-
 @pytest.mark.parametrize(
     "hub, peak", [("rigid", 0.5), ("rigid", 0.9), ("opening", np.pi / 5), ("turning", 0.5), ("opening", 0.9)]
 )
@@ -181,30 +172,6 @@ def test_smallest_opening_angle_is_that_of_the_limbs_during_the_stroke(hub, peak
     smallest, report = finished(simulator.stroke_in_parts([[1.0, -1.0, 0.0, 0.3, 0.0]], 100), opening)
     assert report.smallest_opening_angle[0] == pytest.approx(min(smallest), abs=1e-4)
     assert (report.smallest_opening_angle[0] < 0.0) == (peak == 0.9)
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_nodes_are_within_the_tolerance_as_a_rule_and_nowhere_far_beyond_it(scheme):
-    """One step of robots that swim, against the same step at a far tighter tolerance.
-
-    The last Newton step is foreseen, not taken (see minimise), and now and then it is longer than foreseen.
-    """
-    n_robots, h = 128, 0.01
-    swimmers = Simulator(scene_of("implicit-midpoint", 5e-3), n_robots)
-    for command in random_commands(n_robots, 2):
-        swimmers.stroke(command)
-    actuator, ends = SmaPulse(heating_time=h, cooling_time=h), {}
-    for tolerance in (1e-6, 1e-8, 1e-13):
-        numerics = Numerics(scheme, h, newton_tolerance=tolerance)
-        simulator = Simulator(Scene(TEN, actuator=actuator, numerics=numerics), n_robots)
-        simulator.set_state(swimmers.get_state())
-        parts = simulator.stroke_in_parts(random_commands(n_robots, seed=1)[0], 2)
-        next(parts)
-        ends[tolerance] = simulator.positions
-        finished(parts)
-    for tolerance in (1e-6, 1e-8):
-        error = np.linalg.norm(ends[tolerance] - ends[1e-13], axis=2).max(axis=1) / (tolerance * 0.1)
-        assert np.median(error) < 1.0 and error.max() < 100.0
 
 
 def test_a_step_that_does_not_converge_is_two_steps_of_half_its_length():
