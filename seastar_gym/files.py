@@ -1,12 +1,14 @@
-"""Files that are written all at once, and JSON files of others."""
+"""Files that are written all at once, or line by line, never through a link; and JSON files of others."""
 
+import errno
 import json
 import math
 import os
 import re
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from io import FileIO
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,49 @@ def write_atomically(path: str | os.PathLike[str], data: bytes | str) -> None:
     """
     with beside(path) as part:
         part.write_bytes(data.encode() if isinstance(data, str) else data)
+
+
+def as_line(fields: Iterable[object]) -> str:
+    """Line of a CSV file whose fields need no quotes."""
+    return ",".join(map(str, fields)) + "\n"
+
+
+def write_lines(path: str | os.PathLike[str], rows: Iterable[Iterable[object]]) -> None:
+    """Write a CSV file all at once, see `as_line`."""
+    write_atomically(path, "".join(map(as_line, rows)))
+
+
+class LineFile:
+    """A CSV file that is written line by line, so that what was known is there whatever happens.
+
+    path: Where it is written anew; a link is replaced. OSError, here and with every line, where the disk refuses.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]):
+        with beside(path):
+            pass
+        flags = getattr(os, "O_NOFOLLOW", 0)
+        self._file = FileIO(os.fspath(path), "a", opener=lambda name, mode: os.open(name, mode | flags))
+
+    def add(self, fields: Iterable[object]) -> None:
+        """Write a line, see `as_line`."""
+        line = as_line(fields).encode()
+        if self._file.write(line) != len(line):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), self._file.name)
+
+    def close(self) -> None:
+        """Close the file; may be called again."""
+        self._file.close()
+
+
+def within(folder: str | os.PathLike[str], *names: str) -> Path:
+    """Path of a folder within one of results. ValueError where it is a link, or behind one: none is written to."""
+    path = Path(folder)
+    for name in names:
+        path = path / name
+        if path.is_symlink():
+            raise ValueError(f"{path} is a link, and nothing is written through links: take it out.")
+    return path
 
 
 def write_json(path: str | os.PathLike[str], data: object) -> None:

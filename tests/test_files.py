@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
+from seastar_gym import Seastar
 from seastar_gym.accuracy import timed_certificate
 from seastar_gym.accuracy.command import draw
 from seastar_gym.benchmark.command import publish
@@ -25,6 +26,7 @@ from seastar_gym.evaluation.results import results, write_csv
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import beside, is_left_behind, part_name, read_json, write_atomically, write_json
 from seastar_gym.identify.measurement import Measurement
+from seastar_gym.plant.logs import Logs
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -138,6 +140,7 @@ WRITERS = {
     "traces.png": lambda file: draw_traces(swims(), 0.01, file),
     "film.gif": filmed,
     "film.mp4": filmed,
+    **{f"{name}.csv": lambda file: Logs(file.parent, Seastar(), 0).close() for name in ("tracking", "poses")},
     "trajectory.csv": lambda file: measured().to_csv(file, file.with_name("other.csv")),
     "commands.csv": lambda file: measured().to_csv(file.with_name("other.csv"), file),
     "policy.safetensors": lambda file: save(load(), file),
@@ -163,7 +166,9 @@ def test_no_writer_writes_through_a_link(name, tmp_path, somebodys):
 
 
 CALLS = re.compile(
-    r"""(\S*)\.(?:write_text|write_bytes)\(|(\S*)\.open\(["'](?:[wx]|a(?!b))|(?:savefig|savez\w*|savetxt)\((\w*)"""
+    r"""(\S*)\.(?:write_text|write_bytes)\(|(\S*)\.open\(["'](?:[wx]|a(?!b))|(?:savefig|savez\w*|savetxt)\((\w*)
+    |\b(?:FileIO|open)\((\w*),\s*["'](?:[wx]|a(?!b))""",
+    re.VERBOSE,
 )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.files import beside, write_atomically
+from seastar_gym.files import write_lines
 from seastar_gym.scene.checks import is_whole_number, require_file, require_unmasked, shown
 from seastar_gym.scene.csv_rows import read_numbers, read_table
 
@@ -81,13 +81,12 @@ class Measurement:
         require_file("commands", commands)
         write_trajectory(trajectory, self.time, self.positions, self.nodes)
         if self.command_times is None:
-            with beside(commands) as part:
-                np.savetxt(part, self.commands, "%g", ",")
+            write_lines(commands, ([f"{share:g}" for share in row] for row in self.commands.tolist()))
             return
         lines = [["time", *(f"limb{limb + 1}" for limb in range(self.commands.shape[1]))]]
         timed = zip(self.command_times.tolist(), self.commands.tolist(), strict=True)
         lines += [[repr(when), *(f"{share:g}" for share in row)] for when, row in timed]
-        write_atomically(commands, "".join(",".join(line) + "\n" for line in lines))
+        write_lines(commands, lines)
 
 
 def require_command_times(times: Floats, n_strokes: int) -> None:
@@ -106,7 +105,7 @@ def write_trajectory(file: str | Path, time: Floats, positions: Floats, nodes: t
             names, columns = [*names, f"x{node}", f"y{node}"], [*columns, *of_node.T]
     rows = np.column_stack(columns).tolist()
     lines = [[repr(when), *("" if math.isnan(x) else f"{x:.7g}" for x in row)] for when, *row in rows]
-    write_atomically(file, "".join(",".join(line) + "\n" for line in [names, *lines]))
+    write_lines(file, [names, *lines])
 
 
 def _read_trajectory(file: str | Path) -> tuple[Floats, Floats, tuple[int, ...]]:
