@@ -10,6 +10,7 @@ when it is written. Reading constructs parts of registered classes only: it eval
 """
 
 import inspect
+import math
 import sys
 from collections.abc import Mapping
 from functools import cache, wraps
@@ -17,13 +18,15 @@ from typing import Any, ClassVar, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 
-from seastar_gym.scene.checks import as_typed, shown
+from seastar_gym.scene.checks import as_typed, is_finite_number, shown
 from seastar_gym.scene.number import PerRobot, Unnamed
 
 VERSION = 1
 """Version of the plain form."""
 DEEPEST = 32
 """Largest depth of nested lists and dicts that is read."""
+MOST_ENTRIES = 100_000
+"""Most entries of a tuple of a part, such as loads or points of a curve; not of numbers of each robot."""
 
 Part = TypeVar("Part")
 
@@ -57,6 +60,10 @@ def _make_floats(kind: type) -> None:
 
     @wraps(check)
     def floats_first(part: Any, *arguments: Any) -> None:
+        for name in _arguments(kind):
+            value = getattr(part, name, None)
+            if type(value) is tuple and len(value) > MOST_ENTRIES:
+                raise ValueError(f"{name} has {len(value):,} entries: {MOST_ENTRIES:,} are the most.")
         for name, hint in annotations().items():
             if get_origin(hint) is not ClassVar and hasattr(part, name):
                 object.__setattr__(part, name, as_typed(getattr(part, name), hint))
@@ -65,6 +72,7 @@ def _make_floats(kind: type) -> None:
     kind.__post_init__ = floats_first  # type: ignore[attr-defined]
 
 
+@cache
 def _arguments(kind: type) -> list[str]:
     return list(inspect.signature(kind).parameters)
 
@@ -136,6 +144,10 @@ def _read(value: object, where: str, depth: int = 0) -> Any:
             return value
         case int() | float() if abs(value) <= sys.float_info.max:
             return value
+        case list() if set(map(type, value)) <= {float} and all(map(math.isfinite, value)):
+            return tuple(value)
+        case list() if len(value) > MOST_ENTRIES and not all(map(is_finite_number, value)):
+            raise ValueError(f"{where} has {len(value):,} entries: {MOST_ENTRIES:,} are the most.")
         case list():
             return tuple(_read(one, f"{where}[{k}]", depth + 1) for k, one in enumerate(value))
         case {"kind": str(kind), **fields} if kind in KINDS:
