@@ -12,6 +12,8 @@ from io import FileIO
 from pathlib import Path
 from typing import Any
 
+LARGEST_FILE = 2**30
+"""Size of the largest file that is read whole [bytes]."""
 PART = ".part"
 """End of the names of files that are being written."""
 
@@ -126,6 +128,14 @@ def _to_disk(file: Path) -> None:
         os.close(descriptor)
 
 
+def read_whole(path: str | os.PathLike[str]) -> bytes:
+    """Contents of a file. ValueError, with one sentence, for one that is too large."""
+    size = Path(path).stat().st_size
+    if size > LARGEST_FILE:
+        raise ValueError(f"{path} has {size:,} bytes: {LARGEST_FILE:,} are the most that is read.")
+    return Path(path).read_bytes()
+
+
 def read_json(path: str | os.PathLike[str]) -> Any:
     """Contents of a JSON file, whose numbers are all finite.
 
@@ -134,8 +144,9 @@ def read_json(path: str | os.PathLike[str]) -> Any:
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"There is no file {path}.")
+    data = read_whole(path)
     try:
-        return parse_json(path.read_text(encoding="utf-8-sig"))
+        return parse_json(data.decode("utf-8-sig"))
     except ValueError as damaged:
         reason = re.split("[;\n]", str(damaged))[0].rstrip(".")
         raise ValueError(f"{path} is no JSON that can be read: {reason}.") from damaged

@@ -27,6 +27,8 @@ from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import beside, is_left_behind, part_name, read_json, write_atomically, write_json
 from seastar_gym.identify.measurement import Measurement
 from seastar_gym.plant.logs import Logs
+from seastar_gym.scene.csv_rows import read_rows
+from seastar_gym.scene.scene_file import load_scene
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -198,5 +200,10 @@ def test_json_is_read_or_refused_by_its_name(tmp_path):
     for name in ("pipe", "", "none"):
         with pytest.raises(FileNotFoundError, match="There is no file"):
             read_json(tmp_path / name)
+    with (tmp_path / "large.json").open("wb") as large:
+        large.truncate(2**30 + 1)  # which takes no room
+    for read in (read_json, read_rows, load_scene):
+        with assert_refused("large.json", "has 1,073,741,825 bytes"):
+            read(tmp_path / "large.json")
     (tmp_path / "data.json").write_text("\ufeff[1, 2.5]", encoding="utf-8")
     assert read_json(tmp_path / "data.json") == [1, 2.5]

@@ -27,7 +27,7 @@ from seastar_gym.controllers.contract import as_floating, can_be_decided_by, mem
 from seastar_gym.controllers.description import Description, read_facts
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.symmetry import FrameStack
-from seastar_gym.files import write_atomically
+from seastar_gym.files import read_whole, write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number, require_file, require_flag, require_kind, require_period, shown
 
@@ -286,9 +286,9 @@ def load(path: str | os.PathLike[str] = BUNDLED) -> LearnedPolicy:
     for file in (path, path.with_suffix(".json")):
         if not file.is_file():
             raise FileNotFoundError(f"There is no trained policy at {path}: {file.name} is missing.")
-    data = path.read_bytes()
+    data, description_of = read_whole(path), read_whole(path.with_suffix(".json"))
     try:
-        facts = read_facts(path.with_suffix(".json").read_bytes())
+        facts = read_facts(description_of)
         if hashlib.sha256(data).hexdigest() != facts["sha256"]:
             raise ValueError("The weights are not those that its .json file describes.")
         description, weights = Description.from_facts(facts), safetensors.numpy.load(data)

@@ -10,15 +10,14 @@ when it is written. Reading constructs parts of registered classes only: it eval
 """
 
 import inspect
-import math
 import sys
 from collections.abc import Mapping
-from functools import cache, wraps
+from functools import cache, partial, wraps
 from typing import Any, ClassVar, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 
-from seastar_gym.scene.checks import as_typed, is_finite_number, shown
+from seastar_gym.scene.checks import as_typed, is_finite_number, require_few, shown
 from seastar_gym.scene.number import PerRobot, Unnamed
 
 VERSION = 1
@@ -56,14 +55,14 @@ def register_part(kind: type[Part]) -> type[Part]:
 def _make_floats(kind: type) -> None:
     """Have a dataclass make floats of its numbers before it checks them, where its annotations say float."""
     check = kind.__post_init__  # type: ignore[attr-defined]
+    arguments_of = cache(partial(_arguments, kind))
     annotations = cache(lambda: {name: hint for name, hint in get_type_hints(kind).items() if "float" in str(hint)})
 
     @wraps(check)
     def floats_first(part: Any, *arguments: Any) -> None:
-        for name in _arguments(kind):
-            value = getattr(part, name, None)
-            if type(value) is tuple and len(value) > MOST_ENTRIES:
-                raise ValueError(f"{name} has {len(value):,} entries: {MOST_ENTRIES:,} are the most.")
+        for name in arguments_of():
+            if type(value := getattr(part, name, None)) is tuple:
+                require_few(name, value, MOST_ENTRIES)
         for name, hint in annotations().items():
             if get_origin(hint) is not ClassVar and hasattr(part, name):
                 object.__setattr__(part, name, as_typed(getattr(part, name), hint))
@@ -72,7 +71,6 @@ def _make_floats(kind: type) -> None:
     kind.__post_init__ = floats_first  # type: ignore[attr-defined]
 
 
-@cache
 def _arguments(kind: type) -> list[str]:
     return list(inspect.signature(kind).parameters)
 
@@ -120,6 +118,8 @@ def _written(value: Any, where: str) -> Any:
 
 
 def _written_items(values: tuple[Any, ...], where: str) -> list[Any]:
+    if set(map(type, values)) == {float}:
+        return list(values)
     return [_written(value, f"{where}[{k}]") for k, value in enumerate(values)]
 
 
@@ -144,11 +144,10 @@ def _read(value: object, where: str, depth: int = 0) -> Any:
             return value
         case int() | float() if abs(value) <= sys.float_info.max:
             return value
-        case list() if set(map(type, value)) <= {float} and all(map(math.isfinite, value)):
-            return tuple(value)
-        case list() if len(value) > MOST_ENTRIES and not all(map(is_finite_number, value)):
-            raise ValueError(f"{where} has {len(value):,} entries: {MOST_ENTRIES:,} are the most.")
+        case list() if set(map(type, value)) <= {int, float} and all(map(is_finite_number, value)):
+            return tuple(value)  # of numbers, as many as there are robots
         case list():
+            require_few(where, value, MOST_ENTRIES)
             return tuple(_read(one, f"{where}[{k}]", depth + 1) for k, one in enumerate(value))
         case {"kind": str(kind), **fields} if kind in KINDS:
             return _read_part(kind, fields, where, depth)

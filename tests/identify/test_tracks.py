@@ -123,7 +123,7 @@ def test_hdf5_without_h5py_says_what_to_install(tmp_path, monkeypatch, capsys):
 HARMFUL = {
     "16 TiB": (lambda file, _: file.create_dataset("tracks", (2**10, 2, 2**10, 2**20), "f8", chunks=(1, 2, 16, 512)),
                "with /tracks it declares 17,592,186,044,416 bytes"),
-    "many of some": (lambda file, _: [file.create_dataset(str(k), (20_000,), "f8") for k in range(99)], "it declares"),
+    "many of some": (lambda file, _: [file.create_dataset(str(k), (200_000,), "f8") for k in range(99)], "it declares"),
     "a chunk": (lambda file, _: file.create_dataset("a", (1,), "f8", maxshape=(None,), chunks=(2**28,)), "it declares"),
     "long names": (lambda file, _: file.create_dataset("a", (2**20,), "S9999"), "it declares"),
     "elsewhere": (lambda file, other: file.create_dataset("tracks", (10,), "f8", external=other), "in other files"),
@@ -261,6 +261,7 @@ def no_plane(points):
 
 LOST = np.array([[[np.nan, np.nan]], [[0.0, 0.0]]])
 NOTHING = Track(np.zeros(1), {"a": np.zeros((1, 2)), "b": np.zeros((1, 2))}, {})
+HORIZON = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, -1.0, 0.0]])
 REFUSED = [
     (lambda file: read_deeplabcut(file, 30.0), SEVERAL, "has the individuals a, b: name one"),
     (lambda file: read_deeplabcut(file, 30.0, "c"), SEVERAL, "has the individuals a, b: name one"),
@@ -280,6 +281,14 @@ REFUSED = [
     (lambda file: read_deeplabcut(file, 1.0), "scorer,s\nbodyparts,a\ncoords,x\n0,1\n", "x, y and likelihood"),
     (lambda file: read_sleap(file, 1.0), POSE, "the first line must be track,frame_idx,instance.score"),
     (lambda file: read_sleap(file, 1.0), SLEAP[:-1] + "1\n" + "track_0,4\n", "line 5: the line must have 9 fields"),
+    (read_pose, "time,x,y\n0,1,2\n1,1e308,2\n", "In picture 2, the place of tag is [1.e+308 2.e+000]"),
+    (read_pose, "time,x,y,theta\n0,1,2,-1e308\n", "the orientation of tag is -1e+308: nothing is beyond 1e+06"),
+    (read_pose, "time,x,y\n1e308,1,2\n", "the time is 1e+308: nothing is beyond 1e+10"),
+    (lambda file: read_deeplabcut(file, 30.0), DEEPLABCUT.replace("100.5", "1e7"), "the place of"),
+    (lambda file: read_sleap(file, 1e-300), SLEAP, "the time is"),
+    (read_motive, MOTIVE.replace("0.8660254", "1e200"), "the quaternion of Seastar is"),
+    (read_homography, "0,0,0,0\n1,0,1,0\n0,1,0,1\n1,1,1e200,1\n", "no pixel and no place is beyond 1e+06"),
+    (lambda _: in_metres(Track(np.zeros(1), {"a": np.array([[1.0, 1.0]])}, {}), HORIZON), "", "the place of a is [inf"),
     (read_motive, POSE, "has no types, names and Position"),
     (read_motive, MOTIVE.replace("Millimeters", "Feet"), "line 1: Format Version and Length Units must be there"),
     (read_motive, MOTIVE.replace("Z,W,", "Z,,"), "export it with the rotation type Quaternion"),
