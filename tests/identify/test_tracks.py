@@ -1,6 +1,7 @@
 """Files of trackers, with their headers as the tools write them, become trajectories that `identify` reads."""
 
 import math
+import pickle
 import sys
 import zlib
 from importlib.util import find_spec
@@ -136,6 +137,7 @@ HARMFUL = {
     "rows": (lambda file, _: file.create_dataset("a", (1,), h5("vlen_dtype")(float)), "rows of any length"),
     "in a record": (lambda file, _: file.create_dataset("a", (1,), [("b", h5("string_dtype")())]), "of any length"),
     "an attribute's": (lambda file, _: file.attrs.__setitem__("a", file.ref), "references"),
+    "a pickle": (lambda file, _: file.attrs.__setitem__("a", np.bytes_(pickle.dumps(print, 0))), "would run code"),
     "objects": (lambda file, _: file.__setitem__("a", np.void(b"cos")), "objects"),
     "a type": (lambda file, _: file.__setitem__("a", np.dtype("f8")), "neither a folder nor a data set"),
     "sets": (lambda file, _: [file.create_group(str(k)) for k in range(1001)], "more than 1,000"),
@@ -181,6 +183,7 @@ def test_hdf5_as_trackers_write_it_is_read(tmp_path):
         file["node_names"], file["track_names"], file["labels_path"] = ["hub", "tip"], ["a"], "C:/labels.slp"
         file.create_group("more")["table"] = np.zeros(3, [("a", float), ("b", "S3"), ("c", float, (2,)), ("d", bool)])
         file["again"], file["more/all"], file["none"] = file["tracks"], file["/"], h5("Empty")("f")
+        file.attrs["plain"] = np.bytes_(pickle.dumps([(1, ["hub", None]), {"a": 1.5}], 0))
         file.attrs["words"], file.attrs["numbers"] = ["a", "b"], [1, 2]
     track = read_sleap(tmp_path / "sleap.h5", 10.0)
     np.testing.assert_array_equal(track.points["tip"], tracks[0, :, 1].T)

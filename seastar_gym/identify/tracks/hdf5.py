@@ -5,6 +5,7 @@ outside, virtual data sets and links. What no tracker writes is refused.
 """
 
 import math
+import pickletools
 import zlib
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,9 @@ LONGEST = 1_000_000
 """Most bytes of those texts together."""
 DEFLATE, SHUFFLE, CHECKSUM = 1, 2, 3
 """Filters of HDF5 that data sets may have."""
+
+CALLING = {"GLOBAL", "STACK_GLOBAL", "INST", "EXT1", "EXT2", "EXT4", "PERSID", "BINPERSID"}
+"""Codes of pickles that are more than numbers, texts and lists."""
 
 
 class _RefusedError(Exception):
@@ -49,7 +53,7 @@ def _look(file: Any, size: int) -> None:
     """Look at everything in a file of a size [bytes]."""
     import h5py
 
-    waiting, known, datasets = [file], set[int](), list[Any]()
+    waiting, known, datasets, texts = [file], set[int](), list[Any](), list[Any]()
     n, declared, room = 0, 0, min(LARGEST, PACKED * size + SLACK)
     while waiting:
         found = waiting.pop()
@@ -64,6 +68,7 @@ def _look(file: Any, size: int) -> None:
             attribute = h5py.h5a.open(found.id, index=k)
             of_one = size if _is_text(attribute) else _bytes_of(attribute.get_type(), f"an attribute of {found.name}")
             declared += of_one * math.prod(attribute.shape or ())
+            texts.append((found, attribute.name))
         if isinstance(found, h5py.Group):
             waiting += [_linked(found, name) for name in found]
         elif isinstance(found, h5py.Dataset):
@@ -73,9 +78,22 @@ def _look(file: Any, size: int) -> None:
             raise _RefusedError(f"{found.name} is neither a folder nor a data set")
         if declared > room:
             raise _RefusedError(f"with {found.name} it declares {declared:,} bytes; for its size {room:,} are the most")
+    for found, name in texts:
+        if _imports(found.attrs[name]):
+            raise _RefusedError(f"an attribute of {found.name} is a pickle that would run code")
     for found in datasets:
         _require_texts_short(found)
         _require_unpacked_as_declared(found)
+
+
+def _imports(value: object) -> bool:
+    """Whether a library that unpickles texts, as PyTables does those that end with a point, would import for this."""
+    if not isinstance(value, bytes) or not value.endswith(b"."):
+        return False
+    try:
+        return any(code.name in CALLING for code, *_ in pickletools.genops(value))
+    except ValueError:
+        return False
 
 
 def _linked(group: Any, name: str) -> Any:
