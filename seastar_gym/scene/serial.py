@@ -39,9 +39,9 @@ def register_part(kind: type[Part]) -> type[Part]:
     """Register a class, such as an actuator of your own, so that scenes with it can be written and read. A decorator.
 
     The class must keep its constructor's arguments as attributes of the same names and compare by value, as a dataclass
-    does. The arguments may be numbers, texts, None, tuples, dicts and parts of registered classes. The class must be
-    registered before a scene with it is read. Finite numbers of a dataclass with `__post_init__` become floats before
-    it, where its annotations say float.
+    does. The arguments may be numbers, texts, None, tuples of at most MOST_ENTRIES, dicts and parts of registered
+    classes. The class must be registered before a scene with it is read. Finite numbers of a dataclass with
+    `__post_init__` become floats before it, where its annotations say float.
     """
     known = KINDS.setdefault(kind.__name__, kind)
     if (known.__module__, known.__qualname__) != (kind.__module__, kind.__qualname__):
