@@ -77,12 +77,13 @@ def test_a_million_entries_are_refused_before_each_is_looked_at(name):
 
 
 def test_a_million_robots_are_read_and_long_gaits_known_without_a_table_for_each_command():
-    begin, gait = time.process_time(), np.random.default_rng(0).integers(-1, 2, (100_000, 8)).astype(float)
-    scene = Scene.from_dict(Scene(Seastar(youngs_modulus=np.full(MANY, 1e6))).to_dict())
-    assert scene.n_robots == MANY
+    gait, data = np.random.default_rng(0).integers(-1, 2, (100_000, 5)).astype(float), Scene().to_dict()
+    data["robot"]["youngs_modulus"] = {"kind": "per robot", "items": [1e6] * MANY}
+    begin = time.process_time()
+    assert Scene.from_dict(data).n_robots == MANY
     actions = OpenLoopPolicy(gait, "joint").predict(np.zeros(1))[0]
-    np.testing.assert_array_equal(to_commands("joint", 8, [actions], 1)[0], gait[0])
-    assert time.process_time() - begin < 15.0
+    assert time.process_time() - begin < 4.0
+    np.testing.assert_array_equal(to_commands("joint", 5, [actions], 1)[0], gait[0])
 
 
 @pytest.mark.filterwarnings("ignore")
