@@ -1,15 +1,19 @@
-"""Files that are written all at once, and JSON files of others."""
+"""Files that are written all at once, or line by line, never through a link; and JSON files of others."""
 
+import errno
 import json
 import math
 import os
 import re
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from io import FileIO
 from pathlib import Path
 from typing import Any
 
+LARGEST_FILE = 2**30
+"""Size of the largest file that is read whole [bytes]."""
 PART = ".part"
 """End of the names of files that are being written."""
 
@@ -21,6 +25,49 @@ def write_atomically(path: str | os.PathLike[str], data: bytes | str) -> None:
     """
     with beside(path) as part:
         part.write_bytes(data.encode() if isinstance(data, str) else data)
+
+
+def as_line(fields: Iterable[object]) -> str:
+    """Line of a CSV file whose fields need no quotes."""
+    return ",".join(map(str, fields)) + "\n"
+
+
+def write_lines(path: str | os.PathLike[str], rows: Iterable[Iterable[object]]) -> None:
+    """Write a CSV file all at once, see `as_line`."""
+    write_atomically(path, "".join(map(as_line, rows)))
+
+
+class LineFile:
+    """A CSV file that is written line by line, so that what was known is there whatever happens.
+
+    path: Where it is written anew; a link is replaced. OSError, here and with every line, where the disk refuses.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]):
+        with beside(path):
+            pass
+        flags = getattr(os, "O_NOFOLLOW", 0)
+        self._file = FileIO(os.fspath(path), "a", opener=lambda name, mode: os.open(name, mode | flags))
+
+    def add(self, fields: Iterable[object]) -> None:
+        """Write a line, see `as_line`."""
+        line = as_line(fields).encode()
+        if self._file.write(line) != len(line):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), self._file.name)
+
+    def close(self) -> None:
+        """Close the file; may be called again."""
+        self._file.close()
+
+
+def within(folder: str | os.PathLike[str], *names: str) -> Path:
+    """Path of a folder within one of results. ValueError where it is a link, or behind one: none is written to."""
+    path = Path(folder)
+    for name in names:
+        path = path / name
+        if path.is_symlink():
+            raise ValueError(f"{path} is a link, and nothing is written through links: take it out.")
+    return path
 
 
 def write_json(path: str | os.PathLike[str], data: object) -> None:
@@ -81,6 +128,14 @@ def _to_disk(file: Path) -> None:
         os.close(descriptor)
 
 
+def read_whole(path: str | os.PathLike[str]) -> bytes:
+    """Contents of a file. ValueError, with one sentence, for one that is too large."""
+    size = Path(path).stat().st_size
+    if size > LARGEST_FILE:
+        raise ValueError(f"{path} has {size:,} bytes: {LARGEST_FILE:,} are the most that is read.")
+    return Path(path).read_bytes()
+
+
 def read_json(path: str | os.PathLike[str]) -> Any:
     """Contents of a JSON file, whose numbers are all finite.
 
@@ -89,8 +144,9 @@ def read_json(path: str | os.PathLike[str]) -> Any:
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"There is no file {path}.")
+    data = read_whole(path)
     try:
-        return parse_json(path.read_text(encoding="utf-8-sig"))
+        return parse_json(data.decode("utf-8-sig"))
     except ValueError as damaged:
         reason = re.split("[;\n]", str(damaged))[0].rstrip(".")
         raise ValueError(f"{path} is no JSON that can be read: {reason}.") from damaged

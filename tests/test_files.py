@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
+from seastar_gym import Seastar
 from seastar_gym.accuracy import timed_certificate
 from seastar_gym.accuracy.command import draw
 from seastar_gym.benchmark.command import publish
@@ -25,6 +26,9 @@ from seastar_gym.evaluation.results import results, write_csv
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import beside, is_left_behind, part_name, read_json, write_atomically, write_json
 from seastar_gym.identify.measurement import Measurement
+from seastar_gym.plant.logs import Logs
+from seastar_gym.scene.csv_rows import read_rows
+from seastar_gym.scene.scene_file import load_scene
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -138,6 +142,7 @@ WRITERS = {
     "traces.png": lambda file: draw_traces(swims(), 0.01, file),
     "film.gif": filmed,
     "film.mp4": filmed,
+    **{f"{name}.csv": lambda file: Logs(file.parent, Seastar(), 0).close() for name in ("tracking", "poses")},
     "trajectory.csv": lambda file: measured().to_csv(file, file.with_name("other.csv")),
     "commands.csv": lambda file: measured().to_csv(file.with_name("other.csv"), file),
     "policy.safetensors": lambda file: save(load(), file),
@@ -163,7 +168,9 @@ def test_no_writer_writes_through_a_link(name, tmp_path, somebodys):
 
 
 CALLS = re.compile(
-    r"""(\S*)\.(?:write_text|write_bytes)\(|(\S*)\.open\(["'](?:[wx]|a(?!b))|(?:savefig|savez\w*|savetxt)\((\w*)"""
+    r"""(\S*)\.(?:write_text|write_bytes)\(|(\S*)\.open\(["'](?:[wx]|a(?!b))|(?:savefig|savez\w*|savetxt)\((\w*)
+    |\b(?:FileIO|open)\((\w*),\s*["'](?:[wx]|a(?!b))""",
+    re.VERBOSE,
 )
 
 
@@ -193,5 +200,10 @@ def test_json_is_read_or_refused_by_its_name(tmp_path):
     for name in ("pipe", "", "none"):
         with pytest.raises(FileNotFoundError, match="There is no file"):
             read_json(tmp_path / name)
+    with (tmp_path / "large.json").open("wb") as large:
+        large.truncate(2**30 + 1)  # which takes no room
+    for read in (read_json, read_rows, load_scene):
+        with assert_refused("large.json", "has 1,073,741,825 bytes"):
+            read(tmp_path / "large.json")
     (tmp_path / "data.json").write_text("\ufeff[1, 2.5]", encoding="utf-8")
     assert read_json(tmp_path / "data.json") == [1, 2.5]

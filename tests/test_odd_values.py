@@ -1,6 +1,7 @@
 """Whatever is given as an argument is taken, as a file says, or refused with a ValueError of one sentence."""
 
 import inspect
+import time
 
 import numpy as np
 import pytest
@@ -8,6 +9,13 @@ import pytest
 import documented
 from fuzz import odd
 from odd_values import ODD, REFUSED, outcome, taken
+from refusals import assert_refused
+from seastar_gym import AlongLimb, Body, Limb, MeasuredCurve, Scene, Seastar, Strip
+from seastar_gym.controllers.scripted import OpenLoopPolicy
+from seastar_gym.envs.commands import to_commands
+from seastar_gym.envs.paths import make_path
+from seastar_gym.identify import Measurement
+from seastar_gym.scene.serial import from_dict
 
 FUNCTIONS = ("watch", "on_step", "make", "function")
 """Arguments that are functions of the caller's: what they raise is theirs."""
@@ -41,6 +49,41 @@ def test_odd_values_are_taken_as_before_or_refused_in_a_sentence(name, golden):
     found = [line for call, arguments in calls_of(name) for line in taken(call, arguments, FUNCTIONS)]
     assert found
     golden(f"{name}.txt", "\n".join(found))
+
+
+MANY = 10**6
+MILLIONS = {
+    "loads": lambda: Scene(loads=((9, 0.0, 1e-9),) * MANY),
+    "held nodes": lambda: Scene(held_nodes=(9,) * MANY),
+    "loads of a file": lambda: Scene.from_dict({**Scene().to_dict(), "loads": [[9, 0.0, 1e-9]] * MANY}),
+    "limbs of a file": lambda: from_dict({"version": 1, "kind": "Seastar", "limbs": [{}] * MANY}, Seastar),
+    "a profile": lambda: Limb(radius=(1e-3,) * MANY),
+    "a section": lambda: Strip((1e-3,) * MANY, 1e-2),
+    "an actuator along a limb": lambda: AlongLimb(0.3, (1.0,) * MANY),
+    "an outline": lambda: Body(outline=((0.1, 0.1),) * MANY),
+    "a curve": lambda: MeasuredCurve((0.0,) * MANY, (0.0,) * MANY),
+    "a path": lambda: make_path([(0.1, 0.1)] * MANY, np.random.default_rng(0)),
+    "a gait": lambda: OpenLoopPolicy([[1.0, -1.0, 0.0, 0.0, 0.0]] * MANY, "joint"),
+    "nodes": lambda: Measurement(np.zeros(1), np.zeros((1, 1, 2)), (0,) * MANY, np.zeros((1, 5))),
+}
+
+
+@pytest.mark.parametrize("name", MILLIONS)
+def test_a_million_entries_are_refused_before_each_is_looked_at(name):
+    begin = time.process_time()
+    with assert_refused("entries", "are the most"):
+        MILLIONS[name]()
+    assert time.process_time() - begin < 1.5
+
+
+def test_a_million_robots_are_read_and_long_gaits_known_without_a_table_for_each_command():
+    gait, data = np.random.default_rng(0).integers(-1, 2, (100_000, 5)).astype(float), Scene().to_dict()
+    data["robot"]["youngs_modulus"] = {"kind": "per robot", "items": [1e6] * MANY}
+    begin = time.process_time()
+    assert Scene.from_dict(data).n_robots == MANY
+    actions = OpenLoopPolicy(gait, "joint").predict(np.zeros(1))[0]
+    assert time.process_time() - begin < 4.0
+    np.testing.assert_array_equal(to_commands("joint", 5, [actions], 1)[0], gait[0])
 
 
 @pytest.mark.filterwarnings("ignore")

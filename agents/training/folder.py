@@ -25,7 +25,7 @@ from agents.training.options import CONFIG, Options, config_of
 from seastar_gym.controllers.learned import save as save_policy
 from seastar_gym.evaluation.report.charts import read_progress
 from seastar_gym.evaluation.swim import Swim
-from seastar_gym.files import PART, is_left_behind, is_part_of, write_atomically, write_json
+from seastar_gym.files import PART, is_left_behind, is_part_of, write_json, write_lines
 
 
 def write_config(options: Options, arguments: Sequence[str], folder: Path) -> None:
@@ -129,7 +129,7 @@ def record(folder: Path, strokes: int, seconds: float, pentagon: Swim) -> Effici
     """
     rows = [row for row in recorded(folder) if row[0] < strokes]
     rows.append([strokes, pentagon.strokes, pentagon.waypoints_reached])
-    write_atomically(folder / "progress.csv", "".join(",".join(map(str, row)) + "\n" for row in rows))
+    write_lines(folder / "progress.csv", rows)
     found = efficiency.read(folder).after(strokes, seconds, pentagon)
     efficiency.write(found, folder)
     return found

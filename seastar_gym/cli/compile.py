@@ -67,7 +67,7 @@ def compile_all(options: argparse.Namespace) -> None:
         print(f"{task}: {time.perf_counter() - begin:.1f} s", flush=True)
     folder = energies.stats.cache_path
     if folder is None:
-        raise ValueError("No folder for the machine code can be written: set NUMBA_CACHE_DIR to one.")
+        raise ValueError("No folder keeps the machine code: set NUMBA_CACHE_DIR to one that you alone can write.")
     print(f"Machine code: {folder}")
 
 

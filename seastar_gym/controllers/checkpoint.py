@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, Weights, reason_of
+from seastar_gym.files import LARGEST_FILE
 
 DESCRIPTION, LEARNER = "policy.json", "learner.safetensors"
 NETWORK = "network."
@@ -49,6 +50,8 @@ def opened(path: str | os.PathLike[str]) -> Iterator[zipfile.ZipFile]:
     if not os.path.isfile(path):
         raise FileNotFoundError(f"There is no trained policy at {os.fspath(path)}.")
     with one_sentence(path), zipfile.ZipFile(path) as archive:
+        if sum(member.file_size for member in archive.infolist()) > LARGEST_FILE:
+            raise ValueError(f"It unpacks to more than {LARGEST_FILE:,} bytes")
         yield archive
 
 

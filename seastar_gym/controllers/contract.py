@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from seastar_gym.envs.tasks.challenge import Challenge
 
 
+LARGEST_SEEN = 1e30
+"""Largest number of an observation by which a policy decides: sums of larger ones may have no float."""
+
+
 class Policy(Protocol):
     """Anything with Stable-Baselines3's `predict`; see `actions_of` for the action mode that it is made for."""
 
@@ -108,6 +112,14 @@ def observed(observation: object, smallest: int) -> NDArray[np.floating[Any]]:
             f"An observation must have shape (size,) or (n, size), with {smallest} numbers or more, not {array.shape}."
         )
     return array
+
+
+def can_be_decided_by(observations: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which observations, shape (..., size), are of finite numbers that a network can add up.
+
+    By any other a robot rests: action 0 of every discrete mode moves no limb.
+    """
+    return np.asarray((np.abs(observations) <= LARGEST_SEEN).all(axis=-1))
 
 
 def starts(episode_start: object, n: int) -> NDArray[np.bool_]:

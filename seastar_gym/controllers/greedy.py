@@ -18,7 +18,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.contract import observed
+from seastar_gym.controllers.contract import can_be_decided_by, observed
 from seastar_gym.envs.commands import Actions, checked_decision_period, command_table, decisions_in
 from seastar_gym.envs.layout import OBSERVATION_LAYOUT, Layout
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
@@ -136,8 +136,15 @@ class Searcher(ABC):
         episode_start: Any = None,
         deterministic: bool = False,
     ) -> tuple[NDArray[np.int64], None]:
-        """Actions for observations of shape (size,) or (n, size), and None: there is no state."""
-        chosen = self.choose(np.atleast_2d(observed(observation, 1)))
+        """Actions for observations of shape (size,) or (n, size), and None: there is no state.
+
+        A robot whose observation has a number that is NaN, infinite or beyond 1e30 rests, by action 0.
+        """
+        observations = np.atleast_2d(observed(observation, 1))
+        known = can_be_decided_by(observations)
+        chosen = np.zeros(len(observations), np.int64)
+        if known.any():
+            chosen[known] = self.choose(observations[known])
         return (chosen[0] if np.ndim(observation) == 1 else chosen), None
 
 

@@ -23,11 +23,11 @@ import safetensors
 import safetensors.numpy
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.contract import as_floating, memory_of, starts
+from seastar_gym.controllers.contract import as_floating, can_be_decided_by, memory_of, starts
 from seastar_gym.controllers.description import Description, read_facts
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.symmetry import FrameStack
-from seastar_gym.files import write_atomically
+from seastar_gym.files import read_whole, write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number, require_file, require_flag, require_kind, require_period, shown
 
@@ -97,6 +97,8 @@ class LearnedPolicy:
     ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...] | None]:
         """Actions for observations of shape (size,) or (n, size), and the state for the next call.
 
+        A robot whose observation, or memory, has a number that is NaN, infinite or beyond 1e30 rests, by action 0.
+
         state: State that the last call gave, None for the first. A policy without memory has none. With memory, it is
             the past observations, latest first, shape (n, past, size).
         episode_start: Which robots have begun an episode, shape (n,); their past is the present observation.
@@ -109,12 +111,14 @@ class LearnedPolicy:
                 f"This policy was trained on a robot of {n_limbs} limbs: it sees {self._n_seen} numbers, not an "
                 f"observation of shape {observation.shape}."
             )
-        if self.reduction is None:
-            return self._choose(observation, deterministic), None
         if self.frame_stack is not None:
             return self._stacking(self.frame_stack, observation, state, episode_start, deterministic)
+        known = can_be_decided_by(observation)
+        observation = np.where(known[..., None], observation, 0)
+        if self.reduction is None:
+            return self._choose(observation, known, deterministic), None
         reduced, elements = self.reduction.reduce(observation)
-        return self.reduction.restore(self._choose(reduced, deterministic), elements), None
+        return self.reduction.restore(self._choose(reduced, known, deterministic), elements), None
 
     def _stacking(
         self,
@@ -130,17 +134,20 @@ class LearnedPolicy:
         at_first = np.repeat(present[:, None], frame_stack.past, axis=1)
         begun = starts(episode_start, len(present))
         past = at_first if state is None else np.where(begun[:, None, None], at_first, state[0])
-        shown, elements = frame_stack.stacked(present, past)
-        chosen = frame_stack.symmetry.restore(self._choose(shown, deterministic), elements)
+        known = can_be_decided_by(present) & can_be_decided_by(past).all(axis=1)
+        shown, elements = frame_stack.stacked(
+            np.where(known[:, None], present, 0), np.where(known[:, None, None], past, 0)
+        )
+        chosen = frame_stack.symmetry.restore(self._choose(shown, known, deterministic), elements)
         later = np.concatenate([present[:, None], past[:, :-1]], axis=1)
         return (chosen if observation.ndim == 2 else chosen[0]), (later,)
 
-    def _choose(self, observation: NDArray[Any], deterministic: bool) -> NDArray[np.intp]:
+    def _choose(self, observation: NDArray[Any], known: NDArray[np.bool_], deterministic: bool) -> NDArray[np.intp]:
         logits = self.logits(observation)
         if not deterministic:
             noise = self.rng.gumbel(size=logits.shape).astype(np.float32)
             logits = logits + noise  # the largest is then a draw from softmax(logits)
-        chosen = np.argmax(logits, axis=-1)
+        chosen = np.where(known[..., None], np.argmax(logits, axis=-1), 0)
         return chosen if self.actions == "limbs" else chosen[..., 0]
 
     def logits(self, observation: NDArray[Any]) -> NDArray[np.float32]:
@@ -281,9 +288,9 @@ def load(path: str | os.PathLike[str] = BUNDLED) -> LearnedPolicy:
     for file in (path, path.with_suffix(".json")):
         if not file.is_file():
             raise FileNotFoundError(f"There is no trained policy at {path}: {file.name} is missing.")
-    data = path.read_bytes()
+    data, description_of = read_whole(path), read_whole(path.with_suffix(".json"))
     try:
-        facts = read_facts(path.with_suffix(".json").read_bytes())
+        facts = read_facts(description_of)
         if hashlib.sha256(data).hexdigest() != facts["sha256"]:
             raise ValueError("The weights are not those that its .json file describes.")
         description, weights = Description.from_facts(facts), safetensors.numpy.load(data)

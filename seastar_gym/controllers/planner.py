@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.controllers.contract import observed, starts
+from seastar_gym.controllers.contract import can_be_decided_by, observed, starts
 from seastar_gym.controllers.greedy import Searcher, require_search, waypoints_of
 from seastar_gym.envs.commands import checked_decision_period, command_table
 from seastar_gym.envs.headings import HeadingTargets, wrapped
@@ -242,21 +242,19 @@ class Planner(Searcher):
 
         state: Moves under way and how many of their decisions are made, shapes (n,); None before the first decision.
         The state stays None where moves are one decision long. episode_start: Whether an episode begins, shape (n,).
+        A robot whose observation has a number that is NaN, infinite or beyond 1e30 rests, and its move waits.
         """
-        if self.moves.shape[1] == 1:
-            observations = np.atleast_2d(observed(observation, 1))
-            chosen, state = self.choose(observations), None
-            actions = chosen if self.actions == "pairs" else self.moves[chosen, 0].astype(np.float32)
-        else:
-            observations = np.atleast_2d(observed(observation, self._layout.size))
-            n = len(observations)
-            under_way, made = (np.zeros(n, np.int64), np.zeros(n, np.int64)) if state is None else state
-            made = np.where(starts(episode_start, n), 0, made)
-            chosen, due = under_way.copy(), made == 0
-            if due.any():
-                chosen[due] = self.choose(observations[due])
-            actions = self.moves[chosen, made].astype(np.float32)
-            state = chosen, (made + 1) % self.moves.shape[1]
+        observations, length = np.atleast_2d(observed(observation, self._layout.size)), self.moves.shape[1]
+        n, known = len(observations), can_be_decided_by(observations)
+        under_way, made = (np.zeros(n, np.int64), np.zeros(n, np.int64)) if state is None or length == 1 else state
+        made = np.where(starts(episode_start, n), 0, made)
+        chosen, due = under_way.copy(), known & (made == 0)
+        if due.any():
+            chosen[due] = self.choose(observations[due])
+        actions = chosen
+        if self.actions != "pairs":
+            actions = np.where(known[:, None], self.moves[chosen, made], 0.0).astype(np.float32)
+        state = None if length == 1 else (chosen, np.where(known, (made + 1) % length, made))
         return (actions[0] if np.ndim(observation) == 1 else actions), state
 
     def _targets(self, observations: NDArray[np.float32]) -> Targets:

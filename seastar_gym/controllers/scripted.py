@@ -32,12 +32,24 @@ from seastar_gym.gaits import (
     timed,
     turning_wave,
 )
-from seastar_gym.scene.checks import as_finite, require_choice, require_kind, require_limbs, require_period, shown
+from seastar_gym.scene.checks import (
+    as_finite,
+    require_choice,
+    require_few,
+    require_kind,
+    require_limbs,
+    require_period,
+    shown,
+)
 
 Floats = NDArray[np.float64]
 PolicyState = tuple[NDArray[np.int64], ...] | None
 
 _PAIR = re.compile(r"\{?(\d+)([+-]),(\d+)([+-])\}?")
+
+
+MOST_COMMANDS = 100_000
+"""Most decisions of a gait, which is repeated."""
 
 
 def to_actions(commands: ArrayLike, actions: Actions, n_limbs: int) -> NDArray[Any]:
@@ -65,6 +77,7 @@ class OpenLoopPolicy:
     batched = True
 
     def __init__(self, commands: ArrayLike, actions: Actions = "limbs", decision_period: float | None = None):
+        require_few("A gait", commands, MOST_COMMANDS)
         commands = as_finite("commands", commands, ())
         require_choice("actions", actions, get_args(Actions))
         require_period(decision_period)
@@ -73,7 +86,8 @@ class OpenLoopPolicy:
         self.actions: Actions = actions
         self.n_limbs = commands.shape[1]
         self.decision_period = decision_period
-        self._gait = to_actions(commands, actions, commands.shape[1])
+        unlike, each = np.unique(commands, axis=0, return_inverse=True)
+        self._gait = to_actions(unlike, actions, commands.shape[1])[each.reshape(-1)]
 
     def predict(
         self,

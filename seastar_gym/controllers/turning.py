@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.contract import Policy, can_be_decided_by
 from seastar_gym.controllers.scripted import to_actions
 from seastar_gym.envs.commands import Actions, to_commands
 from seastar_gym.envs.headings import HeadingTargets
@@ -51,6 +51,8 @@ class TurnThenSwim:
     ) -> tuple[NDArray[Any], tuple[bool, int]]:
         """Action of one robot for an observation of shape (size,), and whether it turns, with the gait's decisions."""
         turns, k = (False, 0) if state is None else state
+        if not can_be_decided_by(observation):
+            return self._action(np.zeros(self.scene.robot.n_limbs)), (turns, k)
         at = Layout.of(self.scene, entries=HEADINGS)
         c, s = observation[at.headings][:2].astype(np.float64).tolist()
         left = math.atan2(s, c)

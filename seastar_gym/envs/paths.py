@@ -21,7 +21,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.scene.checks import require_callable, require_kind, require_unmasked, shown
+from seastar_gym.scene.checks import require_callable, require_few, require_kind, require_unmasked, shown
 
 Floats: TypeAlias = NDArray[np.float64]
 Point: TypeAlias = Sequence[float]
@@ -45,6 +45,8 @@ FIGURE_EIGHT_WIDTH = 0.4
 """Width of the path "figure-eight" [m]."""
 FIGURE_EIGHT_WAYPOINTS = 16
 
+MOST_WAYPOINTS = 100_000
+"""Most waypoints of a path."""
 FARTHEST = 1e6
 """Largest coordinate of a waypoint [m], and largest radius: beyond it a stroke's progress is lost in rounding."""
 
@@ -264,6 +266,7 @@ def _touch_of_one(p_x: float, p_y: float, n_x: float, n_y: float, begin: float, 
 
 
 def _checked_waypoints(path: ArrayLike) -> NDArray[np.float64]:
+    require_few("A path", path, MOST_WAYPOINTS)
     require_unmasked("A path", path)
     try:
         waypoints = np.asarray(path)

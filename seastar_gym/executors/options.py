@@ -7,6 +7,7 @@ from seastar_gym.executors import Executor
 from seastar_gym.executors.here import Here
 from seastar_gym.executors.processes import Processes
 from seastar_gym.extras import require_extra
+from seastar_gym.files import within
 from seastar_gym.scene.checks import require_count
 
 
@@ -41,5 +42,7 @@ def executor_of(options: argparse.Namespace) -> Executor:
             require_extra("Runs on SLURM", "slurm", "submitit")
             from seastar_gym.executors.slurm import SlurmArrays
 
-            return SlurmArrays(options.out / "slurm", options.executor, options.workers, partition=options.partition)
+            return SlurmArrays(
+                within(options.out, "slurm"), options.executor, options.workers, partition=options.partition
+            )
     return Processes(options.workers)

@@ -218,9 +218,8 @@ class Record:
         commands, found = self._commands, list[dict[int, Floats]]()
         drives = Rotations(self._scene, self._state, commands, [Unknown("commands", commands.shape)])
         for k in range(len(commands)):
-            rises = drives.interval(k, self._duration)[2]
-            rises = rises.reshape(*rises.shape[:2], *commands.shape)
-            found.append({int(felt): rises[:, :, felt].copy() for felt in np.flatnonzero(rises.any(axis=(0, 1, 3)))})
+            rises = drives.felt(k, self._duration)[2]
+            found.append({command: rise.copy() for command, rise in rises.items() if rise.any()})
         return found
 
     def _counts(self, name: str) -> NDArray[np.int64]:
@@ -323,6 +322,7 @@ class _Sweep:
         self.of_turns: list[Floats] = []
         self.of_commands: list[Floats] = []
         rises = record.rises_by_commands() if by_commands or feedback is not None else []
+        by_command: list[list[Floats]] = [[np.zeros(record._n_limbs)] for _ in rises]  # from interval to interval
         for k in range(len(record._turns), -1, -1):
             if k < len(record._turns):
                 kept_still = self.of_q[held].copy()
@@ -330,8 +330,10 @@ class _Sweep:
                 self.of_turns.insert(0, self._pull_back(k, float(given["work"][k])))
                 self.of_q[held] += kept_still
                 self.of_v[held] = 0.0
+                for command, rise in rises[k].items() if rises else ():
+                    by_command[command].insert(1, np.tensordot(self.of_turns[0], rise, 2))
                 if rises:
-                    self.of_commands.insert(0, self._of_command(k, rises[k:]))
+                    self.of_commands.insert(0, np.sum(by_command[k], axis=0))
                 if feedback is not None:
                     by_policy = _shaped(feedback(k, self.of_commands[0]), (one.n_nodes, 2))
                     self.of_q[:n] += by_policy[0].ravel()
@@ -339,11 +341,6 @@ class _Sweep:
             self.of_q[:n] += in_places[k].ravel()
             self.of_v[:n] += given["velocities"][k].ravel()
         self.of_coefficients: Floats = self._slopes[1 : 1 + self._n_coefficients]
-
-    def _of_command(self, k: int, rises: list[dict[int, Floats]]) -> Floats:
-        """Slopes in the command of interval k, which limbs feel in it and later. rises: Of it and the later ones."""
-        felt = [(turn, rise[k]) for turn, rise in zip(self.of_turns, rises, strict=True) if k in rise]
-        return np.sum([np.zeros(self._record._n_limbs), *(np.tensordot(turn, rise, 2) for turn, rise in felt)], axis=0)
 
     def slope_along(self, start: Start) -> float:
         """Slope of the number if what the swim begins with changes like this."""

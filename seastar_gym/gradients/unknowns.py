@@ -164,12 +164,11 @@ class Rotations:
     def interval(self, k: int, duration: float) -> tuple[Floats, Floats, Floats]:
         """Ends of the time steps of interval k [s], rotations, shape (n_times, n_limbs) [rad], and slopes (.., n)."""
         told = self._commands[k]
-        before = self._drive.state, self._drive.commands, self._drive.phase
-        times, turned = _turned(self._drive, told[None], duration)
-        value = turned[:, 0]
+        times, value, felt = self.felt(k, duration)
         slopes = np.zeros((*value.shape, self._n))
-        if self._in_commands >= 0:
-            self._add_slopes_in_commands(k, duration, before, value, slopes)
+        for interval, rises in felt.items():
+            column = self._in_commands + told.size * interval
+            slopes[..., column : column + told.size] = rises
         for column, unknown, drives in self._own:
             grids, beside_it = zip(*(_turned(drive, told[None], duration) for drive in drives), strict=True)
             if any(len(grid) != len(times) or not np.array_equal(grid, times) for grid in grids):
@@ -177,9 +176,19 @@ class Rotations:
             slopes[..., column] = CENTRAL.slope(value, np.array([each[:, 0] for each in beside_it]), unknown.step)
         return times, value, slopes
 
-    def _add_slopes_in_commands(
-        self, k: int, duration: float, before: tuple[Floats, Floats, float], value: Floats, slopes: Floats
-    ) -> None:
+    def felt(self, k: int, duration: float) -> tuple[Floats, Floats, dict[int, Floats]]:
+        """Ends and rotations as of `interval`, and slopes in the commands that limbs still feel, by their numbers.
+
+        Shape (n_times, n_limbs, n_limbs) each, the command's limb last.
+        """
+        before = self._drive.state, self._drive.commands, self._drive.phase
+        times, turned = _turned(self._drive, self._commands[k][None], duration)
+        value = turned[:, 0]
+        return times, value, self._slopes_in_commands(k, duration, before, value) if self._in_commands >= 0 else {}
+
+    def _slopes_in_commands(
+        self, k: int, duration: float, before: tuple[Floats, Floats, float], value: Floats
+    ) -> dict[int, Floats]:
         """Let drives beside this one follow the interval, four for every command that is still felt and every limb."""
         told, n_limbs = self._commands[k], self._commands.shape[1]
         size = 4 * n_limbs  # four drives for the command of every limb
@@ -200,9 +209,7 @@ class Rotations:
         _, turned = _turned(drive, given, duration)
         beside = (turned - value[:, None]).reshape(len(value), n_felt, n_limbs, 4, n_limbs)
         found = np.einsum("tflpx,flp->txfl", beside, np.array([felt.weights for felt in self._felt])) / OF_COMMANDS
-        for i, felt in enumerate(self._felt):
-            column = self._in_commands + n_limbs * felt.interval
-            slopes[..., column : column + n_limbs] = found[..., i, :]
+        slopes = {felt.interval: found[..., i, :] for i, felt in enumerate(self._felt)}
         base = self._drive.state
         differs = np.abs(drive.state - base) > FORGOTTEN * np.abs(base)
         self._felt = [
@@ -210,6 +217,7 @@ class Rotations:
             for felt, own in ((felt, slice(size * i, size * (i + 1))) for i, felt in enumerate(self._felt))
             if differs[own].any()
         ]
+        return slopes
 
 
 def _drive(scene: Scene, state: State | None) -> Drive:

@@ -8,14 +8,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.files import beside, write_atomically
-from seastar_gym.scene.checks import is_whole_number, require_file, require_unmasked, shown
+from seastar_gym.files import write_lines
+from seastar_gym.scene.checks import is_whole_number, require_few, require_file, require_unmasked, shown
 from seastar_gym.scene.csv_rows import read_numbers, read_table
 
 Floats = NDArray[np.float64]
 
 FARTHEST = 1e3
 """Largest coordinate [m]. Squares of much larger ones would have no float."""
+LATEST = 1e10
+"""Largest time [s], beyond that of any clock that counts seconds."""
+MOST_NODES = 10_000
+"""Most nodes that are seen."""
 NODE = re.compile("[0-9]{1,5}")
 """Number of a node in the name of a column."""
 ORIENTATION = -1
@@ -49,6 +53,7 @@ class Measurement:
             require_unmasked(name, array)
             if not isinstance(array, np.ndarray) or array.dtype.kind not in "iuf":
                 raise ValueError(f"{name} must be an array of numbers, not {shown(array)}.")
+        require_few("nodes", self.nodes, MOST_NODES)
         whole = isinstance(self.nodes, tuple) and all(map(is_whole_number, self.nodes))
         if not whole or min(self.nodes, default=0) < ORIENTATION or self.time.ndim != 1:
             raise ValueError(f"nodes must be a tuple of whole numbers, not {shown(self.nodes)}, and time a single row.")
@@ -60,6 +65,8 @@ class Measurement:
             raise ValueError("commands must have one row per stroke with one number per limb.")
         if not np.isfinite(self.time).all() or self.time.min() < 0.0 or (np.diff(self.time) < 0.0).any():
             raise ValueError("Times must be finite, not negative, and in order [s].")
+        if self.time.max() > LATEST:
+            raise ValueError(f"Times must be within {LATEST:g} s, in seconds.")
         if self.command_times is not None:
             require_command_times(self.command_times, len(self.commands))
 
@@ -81,19 +88,20 @@ class Measurement:
         require_file("commands", commands)
         write_trajectory(trajectory, self.time, self.positions, self.nodes)
         if self.command_times is None:
-            with beside(commands) as part:
-                np.savetxt(part, self.commands, "%g", ",")
+            write_lines(commands, ([f"{share:g}" for share in row] for row in self.commands.tolist()))
             return
         lines = [["time", *(f"limb{limb + 1}" for limb in range(self.commands.shape[1]))]]
         timed = zip(self.command_times.tolist(), self.commands.tolist(), strict=True)
         lines += [[repr(when), *(f"{share:g}" for share in row)] for when, row in timed]
-        write_atomically(commands, "".join(",".join(line) + "\n" for line in lines))
+        write_lines(commands, lines)
 
 
 def require_command_times(times: Floats, n_strokes: int) -> None:
     """ValueError unless times are finite, one for every stroke, and increase [s]."""
     if times.shape != (n_strokes,) or not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
         raise ValueError(f"command_times must be {n_strokes} finite times that increase [s], one for every command.")
+    if np.abs(times).max() > LATEST:
+        raise ValueError(f"command_times must be within {LATEST:g} s, in seconds.")
 
 
 def write_trajectory(file: str | Path, time: Floats, positions: Floats, nodes: tuple[int, ...]) -> None:
@@ -106,7 +114,7 @@ def write_trajectory(file: str | Path, time: Floats, positions: Floats, nodes: t
             names, columns = [*names, f"x{node}", f"y{node}"], [*columns, *of_node.T]
     rows = np.column_stack(columns).tolist()
     lines = [[repr(when), *("" if math.isnan(x) else f"{x:.7g}" for x in row)] for when, *row in rows]
-    write_atomically(file, "".join(",".join(line) + "\n" for line in [names, *lines]))
+    write_lines(file, [names, *lines])
 
 
 def _read_trajectory(file: str | Path) -> tuple[Floats, Floats, tuple[int, ...]]:

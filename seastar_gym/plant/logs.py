@@ -6,14 +6,10 @@
     poses.csv      time of the picture, time at which it was known [s], x, y [m], heading [rad]: in the tank
 """  # fmt: skip
 
-import errno
 import math
-import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from io import FileIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +17,7 @@ from numpy.typing import NDArray
 from seastar_gym.command import refused_by_disk
 from seastar_gym.envs.layout import N_STATIONS
 from seastar_gym.envs.sight import stations_seen
+from seastar_gym.files import LineFile
 from seastar_gym.plant.plant import PlantError, Sighting
 from seastar_gym.scene import Seastar
 
@@ -28,18 +25,18 @@ from seastar_gym.scene import Seastar
 class Logs:
     """Files of a swim in a folder, written line by line, so that what was measured is there whatever happens.
 
-    folder: Where the files go, which are written anew. robot: Whose nodes are seen. n_markers: Of a limb.
-    PlantError: the disk refuses.
+    folder: Where the files go, which are written anew; links are replaced. robot: Whose nodes are seen. n_markers: Of a
+    limb. PlantError: the disk refuses.
     """
 
     def __init__(self, folder: Path, robot: Seastar, n_markers: int):
         self._nodes = nodes_of(robot, n_markers)
         self._origin, self._begun = Sighting(0.0, 0.0, (0.0, 0.0, 0.0)), math.inf
-        self._files: dict[str, FileIO] = {}
+        self._files: dict[str, LineFile] = {}
         with self._told_in_a_sentence():
             folder.mkdir(parents=True, exist_ok=True)
             for name in ("tracking", "commands", "poses"):
-                self._files[name] = FileIO(folder / f"{name}.csv", "w")
+                self._files[name] = LineFile(folder / f"{name}.csv")
         places = [f"{axis}{node}" for node in [0, *self._nodes.values()] for axis in "xy"]
         self._write("tracking", ["time", *places])
         self._write("poses", ["captured_at", "seen_at", "x", "y", "heading"])
@@ -69,19 +66,16 @@ class Logs:
         self._write("commands", [f"{command:g}" for command in commands.tolist()])
 
     def _write(self, name: str, fields: Iterable[str]) -> None:
-        line, file = (",".join(fields) + "\n").encode("ascii"), self._files[name]
-        with self._told_in_a_sentence(file.name):
-            if file.write(line) != len(line):
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        with self._told_in_a_sentence():
+            self._files[name].add(fields)
 
     @contextmanager
-    def _told_in_a_sentence(self, file: Any = None) -> Iterator[None]:
+    def _told_in_a_sentence(self) -> Iterator[None]:
         """Context in which the disk may refuse; the files are closed then."""
         try:
             yield
         except OSError as failure:
             self.close()
-            failure.filename = failure.filename or file
             raise PlantError(refused_by_disk(failure)) from None
 
     def close(self) -> None:

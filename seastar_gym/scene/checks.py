@@ -39,6 +39,8 @@ def is_whole_number(value: object) -> bool:
 
 def is_finite_number(value: object) -> bool:
     """Whether a value is a number that is finite in double precision. Flags are none."""
+    if type(value) is float:  # nearly all are, of a million robots too
+        return math.isfinite(value)
     if not (is_whole_number(value) or isinstance(value, float | np.floating)):
         return False
     try:
@@ -49,7 +51,7 @@ def is_finite_number(value: object) -> bool:
 
 def as_float(value: Any) -> Any:
     """A finite number as a Python float: other kinds could compute otherwise. Anything else unchanged."""
-    return float(value) if is_finite_number(value) else value
+    return float(value) if type(value) is not float and is_finite_number(value) else value
 
 
 def as_typed(value: Any, kind: Any) -> Any:
@@ -164,6 +166,13 @@ def require_numbers(name: str, values: object, unit: str) -> None:
     """Refuse what is no tuple of finite numbers. unit: Unit in the sentence."""
     if not isinstance(values, tuple) or not all(map(is_finite_number, values)):
         raise ValueError(f"{name} must be a tuple of finite numbers [{unit}], not {shown(values)}.")
+
+
+def require_few(name: str, values: object, most: int) -> None:
+    """Refuse a list, a tuple or an array of more than `most` entries, before anybody looks at each."""
+    counts = isinstance(values, list | tuple) or (isinstance(values, np.ndarray) and values.ndim > 0)
+    if counts and len(values) > most:  # type: ignore[arg-type]
+        raise ValueError(f"{name} has {len(values):,} entries: {most:,} are the most.")  # type: ignore[arg-type]
 
 
 def require_unmasked(name: str, value: object) -> None:

@@ -7,15 +7,20 @@ line of numbers is therefore an error, not a header.
 
 import csv
 import io
+import itertools
 import math
 import re
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from seastar_gym.files import read_whole
+
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 NAME = re.compile(r"[^\W\d_]\D*")
 NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
+MOST_ROWS = 1_000_000
+"""Most lines of a file."""
 LONGEST_SHOWN = 40
 """Largest number of characters of a field in a sentence."""
 
@@ -59,11 +64,17 @@ class Row(NamedTuple):
         return float(field)
 
 
-def read_rows(file: str | Path) -> list[Row]:
-    """All lines of a file that are not empty. FileNotFoundError or ValueError if it cannot be read."""
+def read_rows(file: str | Path, most: int = MOST_ROWS) -> list[Row]:
+    """All lines of a file that are not empty. FileNotFoundError or ValueError if it cannot be read.
+
+    most: Most lines that it may have.
+    """
     if not Path(file).is_file():
         raise FileNotFoundError(f"There is no file {file}.")
-    return [row for row in _rows(file) if row.fields not in ((), ("",))]
+    rows = list(itertools.islice((row for row in _rows(file) if row.fields not in ((), ("",))), most + 1))
+    if len(rows) > most:
+        raise ValueError(f"{file} has more than {most:,} lines, which are the most that is read.")
+    return rows
 
 
 def read_table(file: str | Path) -> tuple[tuple[str, ...], list[Row]]:
@@ -72,13 +83,15 @@ def read_table(file: str | Path) -> tuple[tuple[str, ...], list[Row]]:
     return (rows[0].fields if rows else ()), rows[1:]
 
 
-def read_numbers(file: str | Path, columns: str, n_columns: int | None = None) -> list[list[float]]:
+def read_numbers(
+    file: str | Path, columns: str, n_columns: int | None = None, most: int = MOST_ROWS
+) -> list[list[float]]:
     """Numbers of all lines, equally many in each, without the first line if it holds names.
 
     columns: Content of a line for sentences, such as "a time [s] and an angle [rad]".
-    n_columns: Numbers per line. None means as many as fields in the first line.
+    n_columns: Numbers per line. None means as many as fields in the first line. most: Most lines.
     """
-    rows = read_rows(file)
+    rows = read_rows(file, most)
     for row in rows:
         if ";" in "".join(row.fields):
             raise row.refused("fields must be separated by commas, not by semicolons")
@@ -91,7 +104,7 @@ def read_numbers(file: str | Path, columns: str, n_columns: int | None = None) -
 
 
 def _text(file: str | Path) -> str:
-    data = Path(file).read_bytes()
+    data = read_whole(file)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as undecodable:

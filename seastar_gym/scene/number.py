@@ -144,8 +144,9 @@ def check_numbers(part: Any, whose: str = "") -> None:
         if is_per_robot and isinstance(value, np.ndarray | tuple):
             value = _of_robots(name, value)
             object.__setattr__(part, name, value)
+        called = f"{whose or number.whose}{name}"
         for one in value if isinstance(value, PerRobot) else (value,):
-            number.require(f"{whose or number.whose}{name}", one)
+            number.require(called, one)
 
 
 def _require_profile(name: str, profile: tuple[float, ...], unit: str) -> None:

@@ -12,18 +12,20 @@ when it is written. Reading constructs parts of registered classes only: it eval
 import inspect
 import sys
 from collections.abc import Mapping
-from functools import cache, wraps
+from functools import cache, partial, wraps
 from typing import Any, ClassVar, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 
-from seastar_gym.scene.checks import as_typed, shown
+from seastar_gym.scene.checks import as_typed, is_finite_number, require_few, shown
 from seastar_gym.scene.number import PerRobot, Unnamed
 
 VERSION = 1
 """Version of the plain form."""
 DEEPEST = 32
 """Largest depth of nested lists and dicts that is read."""
+MOST_ENTRIES = 100_000
+"""Most entries of a tuple of a part, such as loads or points of a curve; not of numbers of each robot."""
 
 Part = TypeVar("Part")
 
@@ -37,9 +39,9 @@ def register_part(kind: type[Part]) -> type[Part]:
     """Register a class, such as an actuator of your own, so that scenes with it can be written and read. A decorator.
 
     The class must keep its constructor's arguments as attributes of the same names and compare by value, as a dataclass
-    does. The arguments may be numbers, texts, None, tuples, dicts and parts of registered classes. The class must be
-    registered before a scene with it is read. Finite numbers of a dataclass with `__post_init__` become floats before
-    it, where its annotations say float.
+    does. The arguments may be numbers, texts, None, tuples of at most MOST_ENTRIES, dicts and parts of registered
+    classes. The class must be registered before a scene with it is read. Finite numbers of a dataclass with
+    `__post_init__` become floats before it, where its annotations say float.
     """
     known = KINDS.setdefault(kind.__name__, kind)
     if (known.__module__, known.__qualname__) != (kind.__module__, kind.__qualname__):
@@ -53,10 +55,14 @@ def register_part(kind: type[Part]) -> type[Part]:
 def _make_floats(kind: type) -> None:
     """Have a dataclass make floats of its numbers before it checks them, where its annotations say float."""
     check = kind.__post_init__  # type: ignore[attr-defined]
+    arguments_of = cache(partial(_arguments, kind))
     annotations = cache(lambda: {name: hint for name, hint in get_type_hints(kind).items() if "float" in str(hint)})
 
     @wraps(check)
     def floats_first(part: Any, *arguments: Any) -> None:
+        for name in arguments_of():
+            if type(value := getattr(part, name, None)) is tuple:
+                require_few(name, value, MOST_ENTRIES)
         for name, hint in annotations().items():
             if get_origin(hint) is not ClassVar and hasattr(part, name):
                 object.__setattr__(part, name, as_typed(getattr(part, name), hint))
@@ -112,6 +118,8 @@ def _written(value: Any, where: str) -> Any:
 
 
 def _written_items(values: tuple[Any, ...], where: str) -> list[Any]:
+    if set(map(type, values)) == {float}:
+        return list(values)
     return [_written(value, f"{where}[{k}]") for k, value in enumerate(values)]
 
 
@@ -136,7 +144,10 @@ def _read(value: object, where: str, depth: int = 0) -> Any:
             return value
         case int() | float() if abs(value) <= sys.float_info.max:
             return value
+        case list() if set(map(type, value)) <= {int, float} and all(map(is_finite_number, value)):
+            return tuple(value)  # of numbers, as many as there are robots
         case list():
+            require_few(where, value, MOST_ENTRIES)
             return tuple(_read(one, f"{where}[{k}]", depth + 1) for k, one in enumerate(value))
         case {"kind": str(kind), **fields} if kind in KINDS:
             return _read_part(kind, fields, where, depth)

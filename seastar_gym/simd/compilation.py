@@ -5,8 +5,9 @@ the GIL and keeps the machine code on disk. Numba's own cache looks at the file 
 in a called file would silently run the old code. Ours lives in a folder named after a digest of every file of the
 package that defines kernels, the versions of numba, llvmlite and numpy and the lane width: whatever changes, the old
 code cannot be found. Every file begins with a digest of the rest: what was cut off or written over is not there, and is
-compiled and written anew. What cannot be written is compiled in every process. Processes that want the same code at
-once wait for the first of them, which compiles it, and load it then.
+compiled and written anew. What cannot be written is compiled in every process, and so is all where others than the user
+could have written it (ownership.py): numba keeps pickles. Processes that want the same code at once wait for the first
+of them, which compiles it, and load it then.
 """
 
 import contextlib
@@ -29,6 +30,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 
 from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.ownership import ForeignFolderError, is_own, opened_by_owner, own_folder
 from seastar_gym.simd.pipeline import EntryCompiler, KernelCompiler
 from seastar_gym.simd.plain import plain_kernels
 
@@ -115,6 +117,10 @@ class _DigestLocator(UserWideCacheLocator):
         root = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else Path(self._cache_path).parent
         self._cache_path = str(root / f"seastar_gym-{digest_of_this_process()}")
 
+    def ensure_cache_path(self):
+        self._cache_path = str(own_folder(Path(self._cache_path)))
+        super().ensure_cache_path()
+
     def get_source_stamp(self):
         # An entry point may stand outside the package.
         return digest_of_this_process(), hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
@@ -154,9 +160,7 @@ class _SoundFile(IndexDataCacheFile):
             return None
 
     def _save(self, path, value):
-        content = self._dump(value)
-        with self._open_for_write(path) as file:
-            file.write(hashlib.sha256(content).digest() + content)
+        _leave(Path(path), self._dump(value))
 
 
 @contextlib.contextmanager
@@ -166,8 +170,7 @@ def _alone(path: Path) -> Iterator[None]:
         with contextlib.suppress(OSError, ImportError):  # Windows has no fcntl
             import fcntl
 
-            path.parent.mkdir(parents=True, exist_ok=True)
-            file = stack.enter_context(path.open("ab"))
+            file = stack.enter_context(open(path, "ab", opener=opened_by_owner))
             stack.callback(fcntl.flock, file, fcntl.LOCK_UN)  # a forked child has the file open, too
             until = time.monotonic() + PATIENCE
             while time.monotonic() < until:
@@ -205,8 +208,8 @@ class _DigestCache(FunctionCache):
         return found or _say_that_it_compiles("once: later runs find the code")
 
     def save_overload(self, sig, data):
-        # OSError: the disk is full, or the folder is gone or no longer ours.
-        with contextlib.suppress(OSError), self._lock(self._impl.filename_base):  # of the index, which gets a line
+        # The disk is full, or the folder is gone or no longer ours.
+        with contextlib.suppress(OSError, ForeignFolderError), self._lock(self._impl.filename_base):  # of the index
             super().save_overload(sig, data)
 
     def end_turn(self):
@@ -215,8 +218,21 @@ class _DigestCache(FunctionCache):
 
 
 class _NoCache(NullCache):
+    def __init__(self, reason):
+        self._reason = reason
+
     def load_overload(self, sig, target_context):
-        return _say_that_it_compiles("in every process, as no folder for the code can be written: set NUMBA_CACHE_DIR")
+        return _say_that_it_compiles(self._reason)
+
+
+UNWRITTEN = "in every process, as no folder for the code can be written: set NUMBA_CACHE_DIR"
+
+
+def _foreign(refused: ForeignFolderError) -> str:
+    return (
+        f"in every process, as {refused}, who could put code there that would run: take that right away (chmod go-w), "
+        "or set NUMBA_CACHE_DIR to a folder that is yours alone"
+    )
 
 
 class EntryPoint(CPUDispatcher):
@@ -232,7 +248,14 @@ class EntryPoint(CPUDispatcher):
 
 def kept_code(name: str, make: Callable[[], bytes]) -> bytes:
     """Code by name from the disk, beside that of entry points; else what `make` returns, which is left there."""
-    path = Path(_DigestLocator(kept_code, __file__).get_cache_path()) / name
+    try:
+        path = own_folder(Path(_DigestLocator(kept_code, __file__).get_cache_path())) / name
+    except ForeignFolderError as refused:
+        _say_that_it_compiles(_foreign(refused))
+        return make()
+    except (OSError, RuntimeError):  # Python 3.11 tells of a circle of links so
+        _say_that_it_compiles(UNWRITTEN)
+        return make()
     code = _sound(path)
     if code is None:
         with _alone(path.with_name(f"{name}.lock")):
@@ -245,9 +268,12 @@ def kept_code(name: str, make: Callable[[], bytes]) -> bytes:
 
 
 def _sound(path: Path) -> bytes | None:
-    """Content of a file that begins with its digest; None if it is damaged or not there."""
+    """Content of a file that begins with its digest; None if it is damaged, not there, or may be another user's."""
     try:
-        kept = path.read_bytes()
+        with open(path, "rb") as file:
+            if not is_own(os.fstat(file.fileno())):
+                return _say_that_some_are_foreign(path.parent)
+            kept = file.read()
     except OSError:
         return None
     digest, code = kept[:DIGEST_SIZE], kept[DIGEST_SIZE:]
@@ -257,10 +283,10 @@ def _sound(path: Path) -> bytes | None:
 def _leave(path: Path, code: bytes) -> None:
     """Write a file whole, behind its digest; nothing where none can be written."""
     with contextlib.suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
         part = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}")
         try:
-            part.write_bytes(hashlib.sha256(code).digest() + code)
+            with open(part, "xb", opener=opened_by_owner) as file:
+                file.write(hashlib.sha256(code).digest() + code)
             part.replace(path)
         finally:
             part.unlink(missing_ok=True)
@@ -274,6 +300,13 @@ def _say_that_it_compiles(how_often):
     )
 
 
+@functools.cache
+def _say_that_some_are_foreign(folder):
+    logging.getLogger("seastar_gym").warning(
+        "Files in %s that belong to another user, or that others may write, are compiled anew and never run.", folder
+    )
+
+
 def entry_point(function):
     """Compile `function` for calls from Python, with the GIL released and the machine code kept on disk."""
     if numba.config.DISABLE_JIT:
@@ -282,6 +315,8 @@ def entry_point(function):
     compiled.__class__ = EntryPoint
     try:
         compiled._cache = _DigestCache(function)
+    except ForeignFolderError as refused:
+        compiled._cache = _NoCache(_foreign(refused))
     except RuntimeError:  # no folder can be written (a read-only home)
-        compiled._cache = _NoCache()
+        compiled._cache = _NoCache(UNWRITTEN)
     return compiled

@@ -30,6 +30,7 @@ from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.executors.options import add_options, executor_of
 from seastar_gym.extras import require_extra
+from seastar_gym.files import within
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
 from seastar_gym.scene.scene_file import load_scene
@@ -146,8 +147,7 @@ def search(sweep: Sweep, options: argparse.Namespace) -> int:
     work = work_of(options)
     options.out.mkdir(parents=True, exist_ok=True)
     for file in options.out.glob("study.db*"):
-        if file.is_symlink():  # SQLite writes through links
-            raise ValueError(f"{file} is a link: take it out, or name the database itself with --storage.")
+        within(options.out, file.name)  # SQLite writes through links
     storage = options.storage or f"sqlite:///{options.out}/study.db"
     wanted = Search(options.objective, not options.minimize, options.seed, options.stale_after)
     with tqdm(total=options.optuna, unit="design") as bar:

@@ -9,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet
 
-from seastar_gym.files import write_atomically
+from seastar_gym.files import within, write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_file
 from seastar_gym.scene.per_robot import unit_of
@@ -60,8 +60,8 @@ class ResultFiles:
         self.folder = Path(folder) / "parts"
 
     def file(self, name: str) -> Path:
-        """File of the batch of this name."""
-        return self.folder / name[:2] / f"{name}.parquet"
+        """File of the batch of this name. ValueError where it would be written through a link."""
+        return within(self.folder.parent, self.folder.name, name[:2]) / f"{name}.parquet"
 
     def has(self, name: str) -> bool:
         """Whether the batch of this name is finished: its part is there and sound."""

@@ -246,6 +246,78 @@ def test_c_decides_as_numpy_does_for_random_observations(name, tmp_path):
         np.testing.assert_array_equal(np.array(robots[7].past).reshape(past.shape[1:]), later[0][7])
 
 
+PROGRAM = """
+#include <stdio.h>
+#include "policy.c"
+
+static float observation[SEASTAR_SIZE], past[SEASTAR_PAST > 0 ? SEASTAR_PAST : 1][SEASTAR_SIZE];
+
+int main(void)
+{
+    struct seastar robot;
+    int action[SEASTAR_NUMBERS];
+    float commands[SEASTAR_LIMBS];
+    while (fread(observation, sizeof observation, 1, stdin) == 1) {
+        seastar_begin(&robot);
+        if (SEASTAR_PAST > 0 && fread(past, sizeof past, 1, stdin) == 1) {
+            memcpy(robot.past, past, sizeof past);
+            robot.begun = 1;
+        }
+        seastar_act(&robot, observation, action, commands);
+        for (int limb = 0; limb < SEASTAR_LIMBS; limb++)
+            printf("%g ", commands[limb]);
+    }
+    return 0;
+}
+"""
+SANITISERS = "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"
+ODD = np.array([np.nan, np.inf, -np.inf, 3.4e38, -1e31, 1e30, 1e20, 1e-45, -1e-40, 0.0], np.float32)
+
+
+def odd_observations(policy: LearnedPolicy, n: int):
+    """Observations, and what robots remember, of which most have numbers that cannot be, or hardly."""
+    observations, rng = random_observations(policy, n), np.random.default_rng(2)
+    past, _ = random_past(policy, observations)
+    for array in (observations,) if past is None else (observations, past):
+        odd = rng.random(array.shape) < rng.choice([0.0, 0.003, 0.3, 1.0], (n, *[1] * (array.ndim - 1)))
+        odd[n // 2 :, ..., :-4] = False  # the waypoints alone
+        array[odd] = rng.choice(ODD, odd.sum())
+        array[n // 2 :, ..., -4:] = rng.choice(ODD, array[n // 2 :, ..., -4:].shape)
+    return observations, past
+
+
+def commands_and_margins(policy: LearnedPolicy, observations: np.ndarray, past: np.ndarray | None):
+    """What Python commands, shape (n, n_limbs), and whether rounding could not change it, shape (n,)."""
+    every = observations[:, None] if past is None else np.concatenate([observations[:, None], past], axis=1)
+    known = (np.abs(every) <= 1e30).all(axis=(1, 2))
+    chosen, _ = policy.predict(observations, None if past is None else (past,), deterministic=True)
+    commands = to_commands(policy.actions, policy.scene.robot.n_limbs, chosen, len(chosen))
+    assert known.any() and not known.all() and not commands[~known].any() and commands[known].any()
+    logits = policy.logits(input_of(policy, *(None if a is None else a[known] for a in (observations, past))))
+    first, second = np.sort(logits, axis=2)[..., :-3:-1].transpose(2, 0, 1)
+    sure = np.ones(len(known), bool)
+    sure[known] = (first - second > 1e-4 * np.abs(logits).max(axis=2)).all(axis=1)
+    return commands, sure
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", [*TASKS, *OWN])
+def test_c_rests_as_numpy_does_by_what_cannot_be_and_no_sanitiser_finds_anything(name, tmp_path):
+    policy = policy_of(name)
+    (tmp_path / "policy.c").write_text(to_c(policy, name))
+    (tmp_path / "main.c").write_text(PROGRAM)
+    flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic", *SANITISERS]
+    subprocess.run(["cc", *flags, str(tmp_path / "main.c"), "-o", str(tmp_path / "main"), "-lm"], check=True)
+    observations, past = odd_observations(policy, 2000)
+    rows = [observations] if past is None else [observations, past.reshape(2000, -1)]
+    done = subprocess.run([str(tmp_path / "main")], input=np.concatenate(rows, axis=1).tobytes(), capture_output=True)
+    assert done.returncode == 0, done.stderr.decode()
+    commands, sure = commands_and_margins(policy, observations, past)
+    found = np.array(done.stdout.split(), float).reshape(commands.shape)
+    np.testing.assert_array_equal(found[sure], commands[sure])
+    assert sure.mean() > 0.9
+
+
 @needs_compiler
 @pytest.mark.parametrize("name", ["learned", "timed-0.2s", "miswired-0.5s"])
 def test_c_sees_what_the_environment_shows(name, tmp_path):
@@ -382,3 +454,7 @@ def test_onnx_decides_as_numpy_does(name):
         if past is not None:
             np.testing.assert_array_equal(found["later"], later[0])
     assert close < 20 and len(to_onnx(drawn(ON_A_BODY), "body")) > 1000
+    observations, past = odd_observations(policy, 2000)
+    commands, sure = commands_and_margins(policy, observations, past)
+    found = session.run(["commands"], {"observation": observations} | ({} if past is None else {"past": past}))[0]
+    np.testing.assert_array_equal(found[sure], commands[sure])

@@ -15,7 +15,6 @@ from types import ModuleType
 import numba
 import numpy as np
 import pytest
-from numba.core import caching
 
 from seastar_gym import Numerics, Scene, Simulator
 from seastar_gym.simd import compilation
@@ -231,13 +230,17 @@ class FullDisk(io.FileIO):
         raise OSError(errno.ENOSPC, "No space left on device")
 
 
+def full(file: Path, mode: str) -> io.IOBase:
+    return FullDisk(file, mode) if mode == "xb" else open(file, mode)
+
+
 def test_on_a_full_disk_kernels_are_compiled_and_what_is_there_is_found(fresh, monkeypatch):
     with monkeypatch.context() as patch:
-        patch.setattr(caching, "open", lambda file, mode: FullDisk(file, "w"), raising=False)
+        patch.setattr(compilation, "open", lambda file, mode, **_: full(file, mode), raising=False)
         assert [fresh.call(), fresh.call()] == [COMPILED, COMPILED]
         assert not [file for file in fresh.cache.rglob("*") if file.is_file() and file.suffix != ".lock"]
     assert fresh.call() == COMPILED
-    monkeypatch.setattr(caching, "open", lambda file, mode: FullDisk(file, "w"), raising=False)
+    monkeypatch.setattr(compilation, "open", lambda file, mode, **_: full(file, mode), raising=False)
     assert fresh.call() == FOUND
     assert fresh.call(3) == (4.5, 0, 1)
 
@@ -246,15 +249,12 @@ def test_on_a_full_disk_kernels_are_compiled_and_what_is_there_is_found(fresh, m
 def test_files_that_may_not_be_read_or_written_do_no_harm(cached, monkeypatch, suffix):
     """A folder that has become read-only, or another user's; to root nothing is, so it is only said to be."""
 
-    whole = Path.read_bytes
-
-    def forbidden(file: Path, *_):
-        if str(file).endswith(suffix) or ".tmp." in str(file):
+    def forbidden(file: Path, mode: str, **_):
+        if str(file).endswith(suffix) or mode == "xb":
             raise PermissionError(errno.EACCES, "Permission denied")
-        return whole(file)
+        return open(file, mode)
 
-    monkeypatch.setattr(Path, "read_bytes", forbidden)
-    monkeypatch.setattr(caching, "open", forbidden, raising=False)
+    monkeypatch.setattr(compilation, "open", forbidden, raising=False)
     assert [cached.call(), cached.call()] == [COMPILED, COMPILED]
 
 
@@ -263,6 +263,79 @@ def test_a_folder_that_is_lost_within_a_process_does_no_harm(fresh):
     shutil.rmtree(fresh.cache)
     fresh.cache.write_text("a file where the folder was", encoding="utf-8")
     assert number(1.0) == 2.5
+
+
+# What others may have written is not run
+
+
+def let_everyone_write(place: Path, patch: pytest.MonkeyPatch) -> None:
+    place.chmod(0o757)
+
+
+def let_the_group_write(place: Path, patch: pytest.MonkeyPatch) -> None:
+    place.chmod(0o775)
+
+
+def give_away(place: Path, patch: pytest.MonkeyPatch) -> None:
+    if os.geteuid() == 0:
+        os.chown(place, 12345, -1)
+    else:
+        patch.setattr(os, "geteuid", lambda: 12345)
+
+
+SPOIL = [let_everyone_write, let_the_group_write, give_away]
+
+
+@pytest.fixture
+def told(caplog):
+    """Sentences that this process says from now on, as if it began."""
+    for say in (compilation._say_that_it_compiles, compilation._say_that_some_are_foreign):
+        say.cache_clear()
+    caplog.clear()
+    return lambda: [record.getMessage() for record in caplog.records]
+
+
+posix = pytest.mark.skipif(os.name == "nt", reason="Windows has no such bits")
+
+
+@posix
+@pytest.mark.parametrize("spoil", SPOIL)
+@pytest.mark.parametrize("above", [0, 1, 2])
+def test_code_from_a_folder_that_others_can_write_or_exchange_never_runs(cached, told, monkeypatch, spoil, above):
+    """Nor is any written there: both kinds of code are compiled in memory, and one sentence says why."""
+    assert compilation.kept_code("name", lambda: b"code") == b"code"
+    folder = cached.file(".nbc").parent
+    place, before = (folder, *folder.parents)[above], {file: file.stat().st_mtime_ns for file in folder.iterdir()}
+    assert len(told()) == 1
+    spoil(place, monkeypatch)
+    assert [cached.call(), cached.call(3)] == [COMPILED, (4.5, 0, 1)]
+    assert compilation.kept_code("name", lambda: b"other") == b"other"
+    assert {file: file.stat().st_mtime_ns for file in folder.iterdir()} == before
+    (sentence,) = told()[1:]
+    assert "NUMBA_CACHE_DIR" in sentence and str(place) in sentence
+
+
+@posix
+@pytest.mark.parametrize("spoil", SPOIL)
+def test_a_file_of_others_in_an_own_folder_never_runs_and_is_written_anew(cached, told, spoil):
+    with pytest.MonkeyPatch.context() as patch:
+        spoil(cached.file(".nbc"), patch)
+        assert cached.call() == COMPILED
+    assert len(told()) >= 1
+    assert cached.call() == FOUND
+
+
+@posix
+def test_own_folders_keep_code_below_a_sticky_one_by_a_link_and_whatever_the_umask(fresh, tmp_path, monkeypatch):
+    (tmp_path / "tmp").mkdir()
+    (tmp_path / "tmp").chmod(0o1777)
+    (tmp_path / "link").symlink_to(tmp_path / "tmp" / "far" / "cache")
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "link"))
+    umask = os.umask(0)
+    try:
+        assert [fresh.call(), fresh.call()] == [COMPILED, FOUND]
+    finally:
+        os.umask(umask)
 
 
 # Whoever waits is told

@@ -1,7 +1,9 @@
 """Files of trackers, with their headers as the tools write them, become trajectories that `identify` reads."""
 
 import math
+import pickle
 import sys
+import zlib
 from importlib.util import find_spec
 
 import numpy as np
@@ -119,6 +121,74 @@ def test_hdf5_without_h5py_says_what_to_install(tmp_path, monkeypatch, capsys):
     assert_told(capsys, 'need h5py: pip install "seastar-gym[data]"')
 
 
+HARMFUL = {
+    "16 TiB": (lambda file, _: file.create_dataset("tracks", (2**10, 2, 2**10, 2**20), "f8", chunks=(1, 2, 16, 512)),
+               "with /tracks it declares 17,592,186,044,416 bytes"),
+    "many of some": (lambda file, _: [file.create_dataset(str(k), (200_000,), "f8") for k in range(99)], "it declares"),
+    "a chunk": (lambda file, _: file.create_dataset("a", (1,), "f8", maxshape=(None,), chunks=(2**28,)), "it declares"),
+    "long names": (lambda file, _: file.create_dataset("a", (2**20,), "S9999"), "it declares"),
+    "elsewhere": (lambda file, other: file.create_dataset("tracks", (10,), "f8", external=other), "in other files"),
+    "virtual": (lambda file, other: virtual(file, other), "in other files"),
+    "soft": (lambda file, _: file.__setitem__("a", h5("SoftLink")("/b")), "a is a link to elsewhere"),
+    "outside": (lambda file, other: file.create_group("in").__setitem__("a", h5("ExternalLink")(other, "/b")),
+                "a is a link to elsewhere"),
+    "reference": (lambda file, _: file.create_dataset("a", (1,), h5("ref_dtype")), "references"),
+    "region": (lambda file, _: file.create_dataset("a", (1,), h5("regionref_dtype")), "references"),
+    "rows": (lambda file, _: file.create_dataset("a", (1,), h5("vlen_dtype")(float)), "rows of any length"),
+    "in a record": (lambda file, _: file.create_dataset("a", (1,), [("b", h5("string_dtype")())]), "of any length"),
+    "an attribute's": (lambda file, _: file.attrs.__setitem__("a", file.ref), "references"),
+    "a pickle": (lambda file, _: file.attrs.__setitem__("a", np.bytes_(pickle.dumps(print, 0))), "would run code"),
+    "objects": (lambda file, _: file.__setitem__("a", np.void(b"cos")), "objects"),
+    "a type": (lambda file, _: file.__setitem__("a", np.dtype("f8")), "neither a folder nor a data set"),
+    "sets": (lambda file, _: [file.create_group(str(k)) for k in range(1001)], "more than 1,000"),
+    "attributes": (lambda file, _: [file.attrs.__setitem__(str(k), 1) for k in range(1001)], "more than 1,000"),
+    "texts": (lambda file, _: file.__setitem__("a", ["a"] * 1001), "more than 1,000 texts"),
+    "long texts": (lambda file, _: file.__setitem__("a", ["a" * 2000] * 999), "longer than 1,000,000 bytes"),
+    "bomb": (lambda file, _: packed(file, zlib.compress(bytes(10**8))), "unpacks to more than it declares"),
+    "another packing": (lambda file, _: file.create_dataset("a", (9,), "f8", compression="lzf"), "once by gzip"),
+}  # fmt: skip
+
+
+def h5(name):
+    return getattr(pytest.importorskip("h5py", reason="h5py is not installed (extra data)"), name)
+
+
+def virtual(file, other):
+    layout = h5("VirtualLayout")((10,), float)
+    layout[:] = h5("VirtualSource")(other, "a", (10,))
+    file.create_virtual_dataset("tracks", layout)
+
+
+def packed(file, data):
+    file.create_dataset("tracks", (1000,), "f8", chunks=(1000,), compression="gzip").id.write_direct_chunk((0,), data)
+
+
+@pytest.mark.parametrize("name", HARMFUL)
+def test_hdf5_that_could_do_harm_is_refused_before_it_is_read(tmp_path, name):
+    make, words = HARMFUL[name]
+    (tmp_path / "private").write_text("secret")
+    with h5("File")(tmp_path / "sleap.h5", "w") as file:
+        make(file, str(tmp_path / "private"))
+    with assert_refused("is refused before it is read", words):
+        read_sleap(tmp_path / "sleap.h5", 10.0)
+
+
+def test_hdf5_as_trackers_write_it_is_read(tmp_path):
+    """Packed, with checksums, texts of any length, records, flags, a hard link twice and one in a circle."""
+    tracks = np.where(np.random.default_rng(0).random((1, 2, 2, 5000)) < 0.5, np.nan, 1.0)
+    with h5("File")(tmp_path / "sleap.h5", "w") as file:
+        packing = {"compression": "gzip", "shuffle": True, "fletcher32": True}
+        file.create_dataset("tracks", data=tracks, **packing)
+        file.create_dataset("track_occupancy", data=np.full((10_000, 1), np.nan), **packing)
+        file["node_names"], file["track_names"], file["labels_path"] = ["hub", "tip"], ["a"], "C:/labels.slp"
+        file.create_group("more")["table"] = np.zeros(3, [("a", float), ("b", "S3"), ("c", float, (2,)), ("d", bool)])
+        file["again"], file["more/all"], file["none"] = file["tracks"], file["/"], h5("Empty")("f")
+        file.attrs["plain"] = np.bytes_(pickle.dumps([(1, ["hub", None]), {"a": 1.5}], 0))
+        file.attrs["words"], file.attrs["numbers"] = ["a", "b"], [1, 2]
+    track = read_sleap(tmp_path / "sleap.h5", 10.0)
+    np.testing.assert_array_equal(track.points["tip"], tracks[0, :, 1].T)
+
+
 @pytest.mark.parametrize("up", ["y", "z"])
 def test_a_rigid_body_turns_as_its_points_do(up, tmp_path):
     """Anti-clockwise from above, whichever axis is up: a marker on the body's x-axis is where its heading says."""
@@ -194,13 +264,14 @@ def no_plane(points):
 
 LOST = np.array([[[np.nan, np.nan]], [[0.0, 0.0]]])
 NOTHING = Track(np.zeros(1), {"a": np.zeros((1, 2)), "b": np.zeros((1, 2))}, {})
+HORIZON = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, -1.0, 0.0]])
 REFUSED = [
     (lambda file: read_deeplabcut(file, 30.0), SEVERAL, "has the individuals a, b: name one"),
     (lambda file: read_deeplabcut(file, 30.0, "c"), SEVERAL, "has the individuals a, b: name one"),
     (lambda file: read_deeplabcut(file, 30.0, "a"), DEEPLABCUT, "names no individuals: leave --individual out"),
     (lambda file: read_sleap(sleap_h5(file.parent, "sleap.h5", ""), 10.0), "", "has the individuals a, b"),
     pytest.param(
-        lambda file: read_sleap(file.rename(file.with_suffix(".h5")), 10.0), "x", "h5 is no analysis file of SLEAP",
+        lambda file: read_sleap(file.rename(file.with_suffix(".h5")), 10.0), "x", "h5 is no HDF5 file that can be read",
         marks=pytest.mark.skipif(find_spec("h5py") is None, reason="needs h5py"),
     ),
     (read_pose, "time,x\n0,1\n", "the first line must be time,x,y,theta"),
@@ -213,6 +284,14 @@ REFUSED = [
     (lambda file: read_deeplabcut(file, 1.0), "scorer,s\nbodyparts,a\ncoords,x\n0,1\n", "x, y and likelihood"),
     (lambda file: read_sleap(file, 1.0), POSE, "the first line must be track,frame_idx,instance.score"),
     (lambda file: read_sleap(file, 1.0), SLEAP[:-1] + "1\n" + "track_0,4\n", "line 5: the line must have 9 fields"),
+    (read_pose, "time,x,y\n0,1,2\n1,1e308,2\n", "In picture 2, the place of tag is [1.e+308 2.e+000]"),
+    (read_pose, "time,x,y,theta\n0,1,2,-1e308\n", "the orientation of tag is -1e+308: nothing is beyond 1e+06"),
+    (read_pose, "time,x,y\n1e308,1,2\n", "the time is 1e+308: nothing is beyond 1e+10"),
+    (lambda file: read_deeplabcut(file, 30.0), DEEPLABCUT.replace("100.5", "1e7"), "the place of"),
+    (lambda file: read_sleap(file, 1e-300), SLEAP, "the time is"),
+    (read_motive, MOTIVE.replace("0.8660254", "1e200"), "the quaternion of Seastar is"),
+    (read_homography, "0,0,0,0\n1,0,1,0\n0,1,0,1\n1,1,1e200,1\n", "no pixel and no place is beyond 1e+06"),
+    (lambda _: in_metres(Track(np.zeros(1), {"a": np.array([[1.0, 1.0]])}, {}), HORIZON), "", "the place of a is [inf"),
     (read_motive, POSE, "has no types, names and Position"),
     (read_motive, MOTIVE.replace("Millimeters", "Feet"), "line 1: Format Version and Length Units must be there"),
     (read_motive, MOTIVE.replace("Z,W,", "Z,,"), "export it with the rotation type Quaternion"),

@@ -17,7 +17,7 @@ import pytest
 
 from evaluation import made_up
 from refusals import assert_refused, assert_told
-from seastar_gym import DomainRandomization, Scene, Seastar, Sight, Simulator, SmaPulse, SmaWires, Uniform
+from seastar_gym import DomainRandomization, Scene, Seastar, Sight, Simulator, SmaPulse, SmaWires, Uniform, files
 from seastar_gym.cli.drive import report
 from seastar_gym.cli.main import main
 from seastar_gym.controllers import learned
@@ -315,8 +315,11 @@ def test_logs_are_what_identify_reads(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["tracking", "commands", "poses"])
-def test_a_full_disk_stops_the_wires_in_a_sentence(name, tmp_path):
-    (tmp_path / f"{name}.csv").symlink_to("/dev/full")
+def test_a_full_disk_stops_the_wires_in_a_sentence(name, tmp_path, monkeypatch):
+    def full(path, mode, **_):
+        return io.FileIO("/dev/full" if name in path else path, mode)
+
+    monkeypatch.setattr(files, "FileIO", full)
     plant = simulated()
     env = PlantSwim(plant, logs=tmp_path, **OPTIONS)
     try:

@@ -65,3 +65,10 @@ def test_what_is_no_file_of_numbers_is_refused_with_its_line(tmp_path, data, wor
         read(tmp_path, data)
     with pytest.raises(FileNotFoundError, match=r"^There is no file .*\.$"):
         read_rows(tmp_path)  # a folder
+
+
+def test_a_file_of_more_lines_than_are_read_is_refused(tmp_path):
+    (tmp_path / "long.csv").write_text("1,2\n" * 1001)
+    assert len(read_rows(tmp_path / "long.csv", 1001)) == 1001
+    with assert_refused("long.csv has more than 1,000 lines"):
+        read_rows(tmp_path / "long.csv", 1000)

@@ -14,6 +14,7 @@ import pytest
 
 import works
 from losing import Interrupted
+from refusals import assert_refused
 from seastar_gym.executors import Outcome
 from seastar_gym.executors.here import Here
 from seastar_gym.executors.processes import Processes
@@ -95,6 +96,19 @@ def test_a_part_that_the_disk_refuses_costs_its_cell_alone(tmp_path, sweep, larg
     monkeypatch.setenv("SWOLLEN", "")
     again = run(iter(batches), tmp_path, Here(), work=works.swollen)
     assert (again.done, again.kept, again.problems) == (1, 3, {})
+
+
+def test_parts_are_not_written_through_links(tmp_path, sweep):
+    """Neither that of all nor that of some; no batch is simulated for nothing."""
+    batches, others = list(sweep.batches()), tmp_path / "somebody's"
+    others.mkdir()
+    for place in (tmp_path / "parts", tmp_path / "parts" / batches[0].name[:2]):
+        place.symlink_to(others)
+        with assert_refused("is a link, and nothing is written through links"):
+            run(iter(batches), tmp_path, Here(), lambda _: pytest.fail("simulated"), works.swollen)
+        place.unlink()
+        (tmp_path / "parts").mkdir(exist_ok=True)
+    assert not list(others.iterdir())
 
 
 def test_a_full_disk_keeps_what_is_there_and_the_same_run_goes_on(sweep, small_disk):

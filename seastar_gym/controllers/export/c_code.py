@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.controllers.contract import LARGEST_SEEN
 from seastar_gym.controllers.export import tables
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.layout import N_STATIONS, SIZES, VELOCITY_SCALE
@@ -84,6 +85,7 @@ def _constants(policy: LearnedPolicy, points_per_limb: int) -> Iterator[str]:
         "SECTOR_WIDTH": sectors.width,
         "AXIS": sectors.axis,
         "BOUNDARY_WIDTH": BOUNDARY_WIDTH,
+        "LARGEST_SEEN": LARGEST_SEEN,
     }
     yield from (f"#define SEASTAR_{name} {value}" for name, value in wholes.items())
     yield from (f"#define SEASTAR_{name} {float(value)!r}" for name, value in floats.items())

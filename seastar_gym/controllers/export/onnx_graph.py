@@ -12,7 +12,8 @@
 | `logits` | (n, distributions, choices), float32 | of the network, whose waypoint is in sector 0 |
 | `later` | (n, past, size), float32 | `past` for the next decision |
 
-At the beginning of an episode, `past` is the present observation again and again.
+At the beginning of an episode, `past` is the present observation again and again. A robot whose observation or past
+has a number that is NaN, infinite or beyond 1e30 rests: its actions and commands are 0.
 """
 
 from typing import Any
@@ -20,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.controllers.contract import LARGEST_SEEN
 from seastar_gym.controllers.export import tables
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.symmetry.symmetry import BOUNDARY_WIDTH
@@ -88,16 +90,19 @@ class Graph:
 
 
 def _shown(graph: Graph, policy: LearnedPolicy) -> None:
-    """Values "element", shape (n,), and "input" of the network, shape (n, inputs)."""
+    """Values "element", shape (n,), "known", 0 or 1, shape (n, 1), and "input" of the network, shape (n, inputs)."""
     description, axis_1 = policy.description, np.array([1])
-    _element(graph, policy)
-    matrices = graph.add("Gather", tables.carried(description), "element")  # (n, size, size)
-    present = graph.add("Unsqueeze", "observation", axis_1)
-    every = present
+    every = graph.add("Unsqueeze", "observation", axis_1)
     if description.past:
-        every = graph.add("Concat", present, "past", axis=1)
+        every = graph.add("Concat", every, "past", axis=1)
         ends = np.array([0]), np.array([description.past])
         graph.add("Slice", every, *ends, axis_1, out="later")
+    are_known = graph.add("LessOrEqual", graph.add("Abs", every), np.array(LARGEST_SEEN, np.float32))
+    of_robot = graph.add("Flatten", graph.add("Cast", are_known, to=7))  # int64
+    graph.add("ReduceMin", of_robot, out="known", axes=[1], keepdims=1)
+    every = graph.add("Where", are_known, every, np.zeros((), np.float32))
+    _element(graph, policy, graph.add("Flatten", graph.add("Slice", every, np.array([0]), np.array([1]), axis_1)))
+    matrices = graph.add("Gather", tables.carried(description), "element")  # (n, size, size)
     reduced = graph.add("MatMul", every, matrices)
     first = graph.add("Flatten", graph.add("Slice", reduced, np.array([0]), np.array([1]), axis_1))
     if not description.past:
@@ -108,14 +113,14 @@ def _shown(graph: Graph, policy: LearnedPolicy) -> None:
     graph.add("Concat", first, told, axis=1, out="input")
 
 
-def _element(graph: Graph, policy: LearnedPolicy) -> None:
+def _element(graph: Graph, policy: LearnedPolicy, observation: str) -> None:
     """Value "element", of the group that brings the current waypoint into sector 0, shape (n,).
 
     As `Symmetry.sectors`, but by the sides of the sectors' boundaries on which a waypoint lies, without its angle, for
     which ONNX has no operator.
     """
     sectors, size = tables.sectors_of(policy.description), policy.description.observation_size
-    waypoints = graph.add("Slice", "observation", np.array([size - 4]), np.array([size]), np.array([1]))
+    waypoints = graph.add("Slice", observation, np.array([size - 4]), np.array([size]), np.array([1]))
     waypoints = graph.add("Cast", waypoints, to=11)  # double
     if sectors.n == 1:  # all directions: element 0 of every robot
         nothing = graph.add("Mul", graph.add("ReduceSum", waypoints, np.array([1]), keepdims=0), np.zeros(()))
@@ -162,9 +167,9 @@ def _network(graph: Graph, policy: LearnedPolicy) -> None:
 
 
 def _actions(graph: Graph, policy: LearnedPolicy) -> None:
-    """Values "action" and "commands", of "logits" and "element"."""
+    """Values "action" and "commands", of "logits", "known" and "element"."""
     description = policy.description
-    chosen = graph.add("ArgMax", "logits", axis=2, keepdims=0)  # (n, distributions)
+    chosen = graph.add("Mul", graph.add("ArgMax", "logits", axis=2, keepdims=0), "known")  # (n, distributions)
     places, actions = tables.restored(description)
     of_element = graph.add("Gather", actions.astype(np.int64), "element")  # (n, choices)
     became = graph.add("GatherElements", of_element, chosen, axis=1)

@@ -120,12 +120,21 @@ void seastar_observe(const double *history, int n, double interval, const double
     seastar_observe_moving(history, velocities, limbs, further, targets, observation);
 }
 
+/* Whether n numbers are finite, and so small that the network can add them up. */
+static int are_known(const float *numbers, int n)
+{
+    for (int k = 0; k < n; k++)
+        if (!(fabsf(numbers[k]) <= (float)SEASTAR_LARGEST_SEEN))
+            return 0;
+    return 1;
+}
+
 /* Element of the symmetry group that brings the current waypoint into sector 0; see envs/symmetry. */
 static int element_of(const float *observation)
 {
-    if (SEASTAR_ELEMENTS == 1)
-        return 0;
     const float *targets = observation + SEASTAR_SIZE - 4;
+    if (SEASTAR_ELEMENTS == 1 || !are_known(targets, 4))
+        return 0;
     double ca = cos(SEASTAR_AXIS), sa = sin(SEASTAR_AXIS);
     double x = ca * targets[0] + sa * targets[1], y = ca * targets[1] - sa * targets[0];
     double next_x = ca * targets[2] + sa * targets[3], next_y = ca * targets[3] - sa * targets[2];
@@ -177,7 +186,8 @@ int seastar_input(const struct seastar *robot, const float *observation, float *
     return element;
 }
 
-/* The most probable action for an observation.
+/* The most probable action for an observation; rest, action 0, if a number of it, or of one that the robot remembers, is
+   NaN, infinite or beyond SEASTAR_LARGEST_SEEN.
 
    observation: [SEASTAR_SIZE]
    action: the environment's action, [SEASTAR_NUMBERS].
@@ -186,11 +196,13 @@ void seastar_act(struct seastar *robot, const float *observation, int *action, f
 {
     float input[SEASTAR_INPUTS], logits[SEASTAR_OUTPUTS];
     int element = seastar_input(robot, observation, input);
+    int known = are_known(observation, SEASTAR_SIZE)
+                && (!robot->begun || are_known(robot->past[0], SEASTAR_PAST * SEASTAR_SIZE));
     seastar_logits(input, logits);
     for (int number = 0; number < SEASTAR_NUMBERS; number++) {
         const float *of_number = logits + number * SEASTAR_CHOICES;
         int best = 0;
-        for (int k = 1; k < SEASTAR_CHOICES; k++)
+        for (int k = 1; known && k < SEASTAR_CHOICES; k++)
             if (of_number[k] > of_number[best])
                 best = k;
         action[restored_place[element][number]] = restored[element][best];

@@ -2,6 +2,7 @@
 
 track.py    points and orientations over time, and how they become those of nodes from a robot at rest
 plane.py    from pixels to metres
+hdf5.py     what a file of HDF5 declares, before it is read
 pose.py, deeplabcut.py, sleap.py, motive.py    readers, one per format
 command.py  `seastar track2csv`
 """

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.identify.tracks.track import NOT_SEEN, Track
+from seastar_gym.identify.tracks.track import NOT_SEEN, Track, require_possible
 from seastar_gym.scene.checks import require_choice, require_file
 from seastar_gym.scene.csv_rows import Row, read_rows
 
@@ -38,17 +38,18 @@ def read_motive(file: str | Path, up: Up = "y") -> Track:
     if at < 4 or len(rows) == at + 1:
         raise ValueError(f"{file} has no types, names and Position above Frame,Time (Seconds),X,.. with numbers below.")
     unit, (times, *_) = _unit(file, rows[0]), (_numbers(rows[at + 1 :], [1]).T)
-    track = Track(times, {}, {})
+    points, orientations = dict[str, Floats](), dict[str, Floats]()
     for (kind, name), columns in sorted(_columns(rows[: at + 1]).items(), key=lambda entry: KINDS.index(entry[0][0])):
         if all(("Position", axis) in columns for axis in "XYZ"):
             places = _numbers(rows[at + 1 :], [columns["Position", axis] for axis in "XYZ"])
-            track.points[name] = unit * _from_above(places, up)
+            points[name] = unit * _from_above(places, up)
         if kind == "Rigid Body" and ("Rotation", "X") in columns:
             if ("Rotation", "W") not in columns:
                 raise ValueError(f"{file}: export it with the rotation type Quaternion.")
             turns = _numbers(rows[at + 1 :], [columns["Rotation", axis] for axis in "XYZW"])
-            track.orientations[name] = _heading(turns, up)
-    return track
+            require_possible(f"the quaternion of {name}", turns)
+            orientations[name] = _heading(turns, up)
+    return Track(times, points, orientations)
 
 
 def _is_axes(row: Row) -> bool:

@@ -7,12 +7,13 @@ With pixels (u, v), v down, and metres (x, y), y up, the homography H is a matri
 A camera that looks straight down is a scale with y flipped. Lenses that distort are to be corrected before.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.identify.tracks.track import Track
+from seastar_gym.identify.tracks.track import FARTHEST, Track
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.csv_rows import read_numbers
 
@@ -63,6 +64,8 @@ def read_homography(file: str | Path) -> Floats:
     """Homography from a file of points, one line `u,v,x,y` for each [pixel, pixel, m, m]."""
     numbers = np.array(read_numbers(file, "a pixel u,v and its place x,y [m]", 4))
     try:
+        if np.abs(numbers).max() > FARTHEST:
+            raise ValueError(f"no pixel and no place is beyond {FARTHEST:g}.")
         return homography(numbers[:, :2], numbers[:, 2:])
     except ValueError as unfit:
         raise ValueError(f"{file}: {unfit}") from None
@@ -71,7 +74,8 @@ def read_homography(file: str | Path) -> Floats:
 def mapped(matrix: Floats, points: Floats) -> Floats:
     """Points by a homography, shape (n, 2)."""
     found = np.hstack([points, np.ones((len(points), 1))]) @ matrix.T
-    return np.asarray(found[:, :2] / found[:, 2:])
+    with np.errstate(all="ignore"):  # on the horizon a place is infinite, which no track takes
+        return np.asarray(found[:, :2] / found[:, 2:])
 
 
 def turned(matrix: Floats, points: Floats, angles: Floats) -> Floats:
@@ -89,4 +93,4 @@ def in_metres(track: Track, matrix: Floats) -> Track:
     """Track in metres, of one in pixels."""
     points = {name: mapped(matrix, places) for name, places in track.points.items()}
     turns = {name: turned(matrix, track.points[name], angles) for name, angles in track.orientations.items()}
-    return track._replace(points=points, orientations=turns)
+    return replace(track, points=points, orientations=turns)

@@ -2,7 +2,7 @@
 
 The columns of CSV are track, frame_idx, instance.score, and x, y and score of every node, such as hub.x, hub.y,
 hub.score. The HDF5 file has `tracks`, shape (n_tracks, 2, n_nodes, n_frames), `node_names` and `track_names`. What was
-not seen is empty or NaN.
+not seen is empty or NaN. What a file of HDF5 declares is looked at before it is read, see hdf5.py.
 """
 
 from pathlib import Path
@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.extras import require_extra
+from seastar_gym.identify.tracks.hdf5 import require_plain
 from seastar_gym.identify.tracks.track import NOT_SEEN, Track, chosen_individual
 from seastar_gym.scene.checks import require_file, require_number
 from seastar_gym.scene.csv_rows import read_table
@@ -48,11 +48,9 @@ def _read_csv(file: str | Path, rate: float, individual: str | None) -> Track:
 
 
 def _read_hdf5(file: str | Path, rate: float, individual: str | None) -> Track:
-    require_extra("HDF5 files of SLEAP", "data", "h5py")
+    require_plain(file)
     import h5py
 
-    if not Path(file).is_file():
-        raise FileNotFoundError(f"There is no file {file}.")
     try:
         with h5py.File(file) as found:
             tracks: NDArray[np.float64] = np.array(found["tracks"], dtype=float)

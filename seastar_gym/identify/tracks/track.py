@@ -1,13 +1,14 @@
 """`Track`: points and orientations over time, as a tracker saw them, and as they are from a robot at rest."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.identify.measurement import ORIENTATION, pointer
+from seastar_gym.identify.measurement import LATEST, ORIENTATION, pointer
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_kind
 
@@ -15,9 +16,12 @@ Floats = NDArray[np.float64]
 
 NOT_SEEN = ("", "nan", "none")
 """Fields of a file of what was not seen."""
+FARTHEST = 1e6
+"""Largest coordinate [m], [mm] or [pixel], and largest angle [rad], that can be."""
 
 
-class Track(NamedTuple):
+@dataclass(frozen=True)
+class Track:
     """What a tracker saw in n pictures. NaN stands for what it did not see.
 
     time: [s], shape (n,).
@@ -28,6 +32,21 @@ class Track(NamedTuple):
     time: Floats
     points: dict[str, Floats]
     orientations: dict[str, Floats]
+
+    def __post_init__(self) -> None:
+        require_possible("the time", self.time, LATEST)
+        for name, places in self.points.items():
+            require_possible(f"the place of {name}", places)
+        for name, angles in self.orientations.items():
+            require_possible(f"the orientation of {name}", angles)
+
+
+def require_possible(what: str, numbers: Floats, largest: float = FARTHEST) -> None:
+    """Refuse numbers of pictures, shape (n, ..), that are beyond anything. NaN was not seen."""
+    beyond = (np.abs(numbers) > largest).reshape(len(numbers), -1).any(axis=1)
+    if beyond.any():
+        picture = int(beyond.argmax())
+        raise ValueError(f"In picture {picture + 1}, {what} is {numbers[picture]}: nothing is beyond {largest:g}.")
 
 
 class Seen(NamedTuple):

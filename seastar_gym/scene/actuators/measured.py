@@ -11,7 +11,7 @@ from seastar_gym.scene.actuators.actuator import ActuatorBase
 from seastar_gym.scene.actuators.heating import WIRE_POWER, share_of_pulse
 from seastar_gym.scene.checks import require_number, require_numbers, shown
 from seastar_gym.scene.number import Numbers, check_numbers, not_negative
-from seastar_gym.scene.serial import register_part
+from seastar_gym.scene.serial import MOST_ENTRIES, register_part
 
 Floats = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ class MeasuredCurve(ActuatorBase):
             raise FileNotFoundError(f"There is no measured curve at {file}: give the path of a CSV file.")
         from seastar_gym.scene.csv_rows import read_numbers  # only files need it
 
-        times, angles = zip(*read_numbers(file, "a time [s] and an angle [rad]", 2), strict=True)
+        times, angles = zip(*read_numbers(file, "a time [s] and an angle [rad]", 2, MOST_ENTRIES), strict=True)
         try:
             return cls(times=times, angles=angles)
         except ValueError as no_curve:
@@ -81,7 +81,7 @@ class MeasuredCurve(ActuatorBase):
         require_number("limb_length", limb_length, "m")
         from seastar_gym.scene.csv_rows import read_numbers  # only files need it
 
-        lines = read_numbers(file, "a phase [1] and a curvature [1/m]", 2)
+        lines = read_numbers(file, "a phase [1] and a curvature [1/m]", 2, MOST_ENTRIES)
         phases, curvatures = np.array([line for line in lines if line[0] != 1.0] or lines).T
         if phases[0] != 0.0 or phases[-1] >= 1.0 or (np.diff(phases) <= 0.0).any():
             raise ValueError(f"{file}: phases must begin at 0 and increase to 1 at most, not {shown(phases.tolist())}.")
