@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import OptimizeResult, least_squares
-from scipy.stats import t as student
 
 from seastar_gym.identify.covariance import uncertainty_of
 from seastar_gym.identify.measurement import ORIENTATION, Measurement
@@ -199,6 +198,8 @@ class Residuals:
 
 def estimate_of(fit: OptimizeResult, residuals: Residuals, confidence: float) -> Estimate:
     """Estimates with confidence intervals, from a least-squares fit of the residuals."""
+    from scipy.stats import t as student  # takes half a second
+
     names, guess, p = residuals.names, residuals.guess, len(residuals.names)
     freedom = residuals.seen.sum() - len(fit.x)
     times = residuals.measurement.time[np.nonzero(residuals.seen)[0]]
