@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from seastar_gym import Body, HeadingTargets, Numerics, RewardWeights, Scene, Seastar, Simulator, ThermalSma
+from every_part import ACTUATORS
+from seastar_gym import Body, HeadingTargets, Numerics, RewardWeights, Scene, Seastar, Simulator
 from seastar_gym.controllers.greedy import waypoints_of
 from seastar_gym.controllers.planner import TIMED_BUDGETS, Budget, Planner, Targets, gait_planner, state_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -16,8 +17,11 @@ FAST = Scene(numerics=Numerics.preset("fast"))
 
 
 def swum(n_robots=3, strokes=4, scene=FAST):
-    """A batch on its way, with its observations."""
-    env = SeastarSwimVectorEnv(n_robots, path="random", random_heading=True, actions="pairs", scene=scene, threads=1)
+    """A batch on its way, with its observations. Where actuators remember, it decides every half second."""
+    env = SeastarSwimVectorEnv(
+        n_robots, path="random", random_heading=True, actions="pairs", scene=scene, threads=1,
+        decision_period=0.5 if scene.actuator.has_memory else None,
+    )  # fmt: skip
     observations, _ = env.reset(seed=3)
     env.action_space.seed(4)
     for _ in range(strokes):
@@ -30,7 +34,8 @@ STATES = {
     "few nodes": (Scene(Seastar(nodes_per_limb=7), numerics=FAST.numerics), 1e-4),
     "more nodes than stations": (Scene(Seastar(nodes_per_limb=19), numerics=FAST.numerics), 1e-2),
     "a body": (Scene(Seastar(4, 5, body=Body.rectangle(0.06, 0.02)), numerics=FAST.numerics), None),
-    "thermal": (Scene(Seastar(nodes_per_limb=10), actuator=ThermalSma(), numerics=FAST.numerics), None),
+    **{name: (Scene(actuator=ACTUATORS[name], numerics=FAST.numerics), 1e-3)
+       for name in ("thermal", "wires", "limited pulse")},
 }  # fmt: skip
 """Scenes, and by how much the way of the next stroke may differ from that of a state that was observed.
 
@@ -56,13 +61,13 @@ def test_an_observation_is_the_whole_state(scene, allowed):
     np.testing.assert_allclose(*speeds, rtol=1e-5)
     for found, waypoints, place in zip(waypoints_of(observations, scene)[0], env.waypoints, hub, strict=True):
         assert np.hypot(*found) == pytest.approx(np.hypot(*(waypoints[0] - place)), rel=1e-5)
-    if allowed is None:
-        np.testing.assert_allclose(twin.kinetic_energy(), env.simulator.kinetic_energy(), rtol=1e-4)
-        return
+    if scene.actuator.has_memory:
+        largest = max(1.0, twin.actuators.max())
+        np.testing.assert_allclose(twin.actuators, env.simulator.actuators, atol=1e-5 * largest)
     commands = np.zeros((3, scene.robot.n_limbs))
     commands[:, :2] = 1.0, -1.0
-    twin.stroke(commands)
-    env.simulator.stroke(commands)
+    for simulator in (twin, env.simulator):
+        simulator.advance(0.5 if scene.actuator.has_memory else 1.0, commands)
     moved = np.linalg.norm(env.simulator.hub_position() - hub, axis=1)
     np.testing.assert_allclose(np.linalg.norm(twin.hub_position(), axis=1), moved, rtol=allowed)
 
