@@ -1,10 +1,7 @@
 """Evaluation: the measures of a swim, the loop in which policies swim, and what is written of a comparison."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from itertools import count
-from pathlib import Path
 from typing import get_args
 
 import gymnasium as gym
@@ -32,7 +29,6 @@ from seastar_gym.evaluation.rollout import Episodes, TaskBatch, rollout
 from seastar_gym.evaluation.swim import RECORDED, swim, swims_of
 from seastar_gym.evaluation.tasks import make_batch
 
-ROOT = Path(__file__).resolve().parents[2]
 SHORT = [[0.02, 0.0]]
 EASY = {"fidelity": "fast", "waypoint_radius": 2e-3, "say": lambda text: None}
 
@@ -154,15 +150,6 @@ REFUSED = [
 def test_what_cannot_be_evaluated_is_refused(call, words):
     with assert_refused(words):
         call()
-
-
-def test_the_policy_in_the_box_and_scripted_agents_are_evaluated_without_torch():
-    code = "import sys, seastar_gym.cli.evaluate as e; e.fitting_agents(['pentagon', 'random', 'learned'])"
-    code += "; print(*sys.modules)"
-    answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    loaded = set(answer.stdout.split())
-    assert "seastar_gym.controllers.scripted" in loaded
-    assert loaded.isdisjoint({"torch", "stable_baselines3", "matplotlib", "pygame"})
 
 
 # The one loop in which policies swim: what they are asked, when episodes end, and what is kept of them.

@@ -129,9 +129,6 @@ def test_a_swim_ends_at_its_last_waypoint():
     assert numbers["success_rate"][0] == 1.0
     assert all(done.strokes < 90 and done.waypoint_index[-2] == 0 for done in swims)
     assert numbers["strokes_to_finish"][0] == pytest.approx(np.mean([done.strokes for done in swims]))
-    assert numbers["limbs_heated_per_metre"][0] == pytest.approx(np.mean([done.heated_per_metre for done in swims]))
-    errors = [1e3 * done.cross_track_errors.mean() for done in swims]
-    assert numbers["mean_cross_track_error_mm"][0] == pytest.approx(np.mean(errors))
 
 
 # On the command line; more of it in cli/test_cli.py.
@@ -140,8 +137,8 @@ def test_a_swim_ends_at_its_last_waypoint():
 @pytest.mark.parametrize(
     "options, sets, words",
     [
-        (["--agents", "rest", "--sets", "nominal", "--fidelity", "fast", "balanced", "--seconds", "20"], 2 * 4,
-         ("path", "fidelity", "success", "0.0 [0.0, 0.0]")),
+        (["--agents", "rest", "--sets", "nominal", "--fidelity", "fast", "balanced", "--seconds", "20",
+          "--decision-period", "0.5"], 2 * 4, ("path", "fidelity", "success", "0.0 [0.0, 0.0]", "of 0.5 s")),
         pytest.param(["--agents", "greedy", "pentagon", "--sets", *SETS, "--swims", "4", "--fidelity", "fast"],
                      2 * (4 + 6 + 5), ("success",), marks=pytest.mark.slow),
     ],
@@ -150,7 +147,7 @@ def test_the_command_line_writes_a_row_for_every_set_agent_and_fidelity(options,
     file = tmp_path / "trials.csv"
     assert main(["evaluate", *options, "--num-threads", "1", "--out", str(file)]) == 0
     printed, rows = capsys.readouterr().out, read_trials(file)
-    assert len(rows) == sets and all(word in printed for word in words) and "decisions" not in printed
+    assert len(rows) == sets and all(word in printed for word in words)
     if "balanced" in options:
         assert [row["fidelity"] for row in rows] == ["fast"] * 4 + ["balanced"] * 4
         assert {row["success_rate"] for row in rows} == {0.0}
