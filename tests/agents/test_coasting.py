@@ -54,8 +54,8 @@ def test_it_foretells_where_other_robots_come_to_rest(fitted):
 
 
 def test_what_is_added_is_the_change_of_the_way_saved(fitted):
-    weights, actions = RewardWeights(), [3, 3, 0, 7, 7, 0, 0, 0, 0, 0, 0]
-    plain, shaped = batch(8), CoastingProgress(batch(8), fitted, weights)
+    actions = [3, 3, 0, 7, 7, 0, 0, 0, 0, 0, 0]
+    plain, shaped = batch(8), CoastingProgress(batch(8), fitted, RewardWeights())
     before, _ = plain.reset(seed=1)
     shaped.reset(seed=1)
     added = np.zeros(8)

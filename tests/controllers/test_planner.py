@@ -104,15 +104,16 @@ def test_a_search_in_time_compares_robots_that_have_coasted():
     assert ways[chosen] == ways.min() and np.argmin(np.hypot(*(later.positions[:, 0] - goal).T)) != chosen
 
 
-def test_two_strokes_ahead_it_finds_what_an_exhaustive_search_finds():
+@pytest.mark.parametrize("current", [(0.2, 0.1), (0.0, 0.0)])
+def test_two_strokes_ahead_it_finds_what_an_exhaustive_search_finds(current):
+    """Nearest to the last waypoint; one that is not the last, and within which the robot is, is passed."""
     _, observations = swum(n_robots=1)
-    wide = Planner(FAST, budget=Budget(2, 21), threads=1).predict(observations)[0]
-    states, planner = state_of(observations, FAST), Planner(FAST, threads=1)
-    ends = planner._swim_all(planner._swim_all(states))
-    waypoint = 0.1 * observations[0, -4:-2].astype(float)
-    way = np.linalg.norm(ends.positions[:, 0] - waypoint, axis=1)  # far away: the circle is a constant
-    chosen = wide[0] * 21
-    assert way[chosen : chosen + 21].min() == pytest.approx(way.min(), abs=2e-5)
+    planner, after = Planner(FAST, 0.02, Budget(2, 21), threads=1), np.array([[0.2, 0.1]])
+    states = state_of(observations, FAST)
+    (chosen,) = planner._search(states, Targets(np.array([current]), after))
+    ends = planner._swim_all(planner._swim_all(states)).positions[:, 0].reshape(21, 21, 2)
+    way = np.hypot(*np.moveaxis(ends - after, -1, 0))
+    assert way[chosen].min() == pytest.approx(way.min(), abs=1e-6)
 
 
 def test_it_swims_round_a_corner_faster_than_by_the_displacement_map():
@@ -149,18 +150,6 @@ def test_what_is_left_to_turn_lengthens_the_way_at_its_price_in_the_reward():
         assert now.item() == passes
         expected = 0.1 + price * 0.8 if passes else straight[0] + price * (turn + (0.8 - turn))
         assert way.item() == pytest.approx(expected, rel=1e-9)
-
-
-def test_a_waypoint_that_is_not_the_last_is_passed_and_not_arrived_at():
-    """The search goes on to the one after it, and takes the sequence that is nearest to that in the end."""
-    _, observations = swum(n_robots=1)
-    planner = Planner(FAST, 0.02, Budget(2, 21), threads=1)
-    states = state_of(observations, FAST)
-    after = np.array([[0.2, 0.1]])
-    (chosen,) = planner._search(states, Targets(np.zeros((1, 2)), after))  # the robot is within the first one
-    ends = planner._swim_all(planner._swim_all(states)).positions[:, 0].reshape(21, 21, 2)
-    way = np.hypot(*np.moveaxis(ends - after, -1, 0))
-    assert way[chosen].min() == pytest.approx(way.min(), abs=1e-6)
 
 
 def test_the_planner_turns_to_either_side_and_keeps_a_heading_that_is_met():

@@ -24,7 +24,6 @@ from seastar_gym.controllers.planner import TIMED_BUDGETS, Budget, Planner, budg
 from seastar_gym.controllers.registry import AGENTS, default_agents, files_of, load_agent, load_agents
 from seastar_gym.controllers.scripted import OpenLoopPolicy, RandomPolicy, scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.many import swim_many
 from seastar_gym.evaluation.swim import swim
 
@@ -146,10 +145,7 @@ def test_agents_are_made_for_their_scene_and_swim(monkeypatch):
     agents = load_agents(["mine", "own_agents:Towards"], fidelity="fast")
     assert list(agents) == ["mine", "own_agents:Towards"]
     assert [type(scene) for scene in scenes] == [Scene] and scenes[0] == Scene.preset("fast")
-    own = agents["own_agents:Towards"]
-    assert own.actions == "pairs" and own.scene == Scene.preset("fast")
-    (done,) = evaluate({"own": own}, [[0.05, 0.0]], fidelity="fast", max_strokes=3)
-    assert done.strokes == 3 and (done.limbs_heated == 2).all()
+    assert agents["own_agents:Towards"].scene == Scene.preset("fast")
     model = a2c()
     monkeypatch.setitem(sys.modules, "a_module", SimpleNamespace(make=lambda env: model))
     assert actions_of(load_agents(["a_module:make"])["a_module:make"], 5) == "joint"

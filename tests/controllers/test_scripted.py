@@ -172,18 +172,10 @@ def test_it_turns_by_the_gait_to_the_side_of_the_heading_and_then_swims():
         assert len(swimmer.shown) == 4
 
 
-class Resting:
-    """Swimmer that rests; it sees observations without headings."""
-
-    def predict(self, observation, state=None, episode_start=None, deterministic=False):
-        assert observation.shape == (196,)
-        return 0, None
-
-
 @pytest.mark.parametrize("asked", [0.5, -0.5])
 def test_a_robot_turns_to_the_side_that_is_asked_for_and_then_swims(asked):
     scene, headings = make_scene(None, "fast", 0.2), HeadingTargets(asked)
-    policy = TurnThenSwim(turning_wave(0.2), Resting(), "pairs", scene, headings, 0.2)
+    policy = TurnThenSwim(turning_wave(0.2), scripted("rest", "pairs"), "pairs", scene, headings, 0.2)
     env = SeastarSwimEnv([[0.3, 0.0]], "joint", "fast", decision_period=0.2, headings=headings)
     done = swim("turn", policy, env, max_strokes=40)
     heated = done.limbs_heated > 0

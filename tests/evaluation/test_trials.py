@@ -1,11 +1,9 @@
 """Disturbances are what they say, and many swims are measured as one is."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from seastar_gym import Scene, ThermalSma
+from seastar_gym import Scene
 from seastar_gym.cli.main import main
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.scripted import scripted
@@ -47,14 +45,6 @@ def test_nothing_disturbed_is_the_task_itself():
         np.testing.assert_array_equal(task.step(commands).commands, commands)
         plain.step(commands)
     np.testing.assert_array_equal(hubs_of(task), plain.simulator.hub_position())
-
-
-def test_nothing_but_waypoints_is_seen_at_rest_in_the_world_beside_cold_wires():
-    scene = replace(FAST, actuator=ThermalSma())
-    seen, at = disturbed(scene=scene, current=1e-3).observe(), Layout.of(scene)
-    np.testing.assert_allclose(seen[:, at.hub_velocity], 0.0, atol=1e-6)
-    np.testing.assert_array_equal(seen[:, at.actuators], 0.0)
-    np.testing.assert_array_equal(seen[:, at.waypoints], disturbed().observe()[:, Layout.of(FAST).waypoints])
 
 
 @pytest.mark.parametrize("mm_per_s", [0.5, 1.5])
