@@ -171,13 +171,6 @@ def test_for_error_picks_the_fastest_setting_that_keeps_the_error(error, any_gai
             assert row.error(classes) > error
 
 
-@pytest.mark.parametrize("robot", [Seastar(nodes_per_limb=n, discretisation="continuum") for n in (8, 10, 19)])
-def test_for_error_of_a_robot_keeps_its_resolution(robot):
-    scene = Scene.for_error(0.02, robot=robot)
-    assert scene.robot == robot
-    assert path_error(scene) <= 0.02
-
-
 TEN, NINE = (Seastar(nodes_per_limb=n, discretisation=kind) for n, kind in ((10, "chapter"), (9, "continuum")))
 
 

@@ -94,15 +94,6 @@ def test_gaits_are_as_kept(golden):
     golden("gaits.txt", "\n".join(lines))
 
 
-def test_episode_start_begins_the_gait_anew_for_that_robot_alone():
-    gait, batch = scripted("pentagon", "pairs"), np.zeros((2, 186), np.float32)
-    _, state = gait.predict(batch, (np.array([48, 49]),))
-    action, state = gait.predict(batch, state, episode_start=np.array([False, True]))
-    rest, first_side = to_actions(np.zeros(5), "pairs", 5), to_actions(straight_gait()[0], "pairs", 5)
-    np.testing.assert_array_equal(action, [rest, first_side])
-    np.testing.assert_array_equal(state[0], [50, 1])
-
-
 def test_random_actions_reach_every_choice_and_are_shares_in_continuous():
     for actions, n_choices in (("limbs", 3), ("joint", 243), ("pairs", 21)):
         found, state = scripted("random", actions).predict(np.zeros((1000, 186), np.float32))
