@@ -127,8 +127,10 @@ def test_a_swim_ends_at_its_last_waypoint():
 @pytest.mark.parametrize(
     "options, sets, words",
     [
-        (["--agents", "rest", "--sets", "nominal", "--fidelity", "fast", "balanced", "--seconds", "20",
-          "--decision-period", "0.5"], 2 * 4, ("path", "fidelity", "success", "0.0 [0.0, 0.0]", "of 0.5 s")),
+        (["--agents", "rest", "--sets", "nominal", "--fidelity", "fast", "balanced", "--seconds", "20"], 2 * 4,
+         ("path", "fidelity", "success", "0.0 [0.0, 0.0]")),
+        (["--agents", "rest", "--sets", "nominal", "--fidelity", "fast", "--seconds", "2", "--decision-period", "0.5"],
+         4, ("decisions", "of 0.5 s")),
         pytest.param(["--agents", "greedy", "pentagon", "--sets", *SETS, "--swims", "4", "--fidelity", "fast"],
                      2 * (4 + 6 + 5), ("success",), marks=pytest.mark.slow),
     ],
