@@ -131,14 +131,10 @@ class Branching:
 
         look: Called with the positions of nodes [m], shape (states * moves, n_nodes, 2), after every decision.
         """
-        return self.each(states, np.broadcast_to(self.moves, (len(states.time), *self.moves.shape)), look)
-
-    def each(self, states: State, moves: Floats, look: Look | None = None) -> State:
-        """States after one move of their own, shape (states, n_moves, n_decisions, n_limbs), as of a call."""
-        n_states, n_moves, n_decisions, n_limbs = moves.shape
+        n_states, n_moves = len(states.time), len(self.moves)
         simulator = self._simulator(n_states * n_moves)
         simulator.set_state(states.of_robots(np.repeat(np.arange(n_states), n_moves)))
-        for commands in np.moveaxis(moves.reshape(-1, n_decisions, n_limbs), 1, 0):
+        for commands in np.moveaxis(np.tile(self.moves, (n_states, 1, 1)), 1, 0):
             simulator.advance(self._duration, commands)
             if look is not None:
                 look(simulator.positions)

@@ -1,11 +1,10 @@
 """Means and their intervals by bootstrap, over swims, episodes, paths, and seeds of trainings."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import bootstrap, trim_mean
 
 Floats = NDArray[np.float64]
 
@@ -45,6 +44,8 @@ def interquartile_mean(values: ArrayLike) -> float:
     >>> interquartile_mean([1.0, 2.0, 3.0, 100.0])
     2.5
     """
+    from scipy.stats import trim_mean  # takes half a second
+
     return float(trim_mean(np.ravel(np.asarray(values, float)), 0.25))
 
 
@@ -64,6 +65,8 @@ def estimate(scores: ArrayLike) -> Estimate:
     if np.ptp(scores, axis=0).max() == 0.0:
         return Estimate(mean, mean, mean)
 
+    from scipy.stats import trim_mean
+
     def of_all(*paths: Floats, axis: int = -1) -> Floats:
         found: Floats = trim_mean(np.concatenate(paths, axis=axis), 0.25, axis=axis)
         return found
@@ -73,25 +76,13 @@ def estimate(scores: ArrayLike) -> Estimate:
 
 def _bootstrapped(samples: tuple[Floats, ...], statistic: Callable[..., Any], **how: Any) -> tuple[float, float]:
     """Ends of the interval of a statistic of samples, each of which is drawn anew."""
+    from scipy.stats import bootstrap
+
     found = bootstrap(
         samples, statistic, confidence_level=CONFIDENCE, n_resamples=RESAMPLES, method="percentile",
         rng=np.random.default_rng(0), **how,
     ).confidence_interval  # fmt: skip
     return float(found.low), float(found.high)
-
-
-def crossed_interval(seeds: Sequence[Floats]) -> tuple[float, float]:
-    """Ends of the interval of the mean that holds for other seeds and other episodes. seeds: Scores of each seed.
-
-    All seeds swim the same episodes, so that a bootstrap draws seeds, and episodes for all of them alike.
-    """
-    most = min(map(len, seeds))
-    values = np.array([of_seed[:most] for of_seed in seeds])
-    rng, (n_seeds, n_episodes) = np.random.default_rng(0), values.shape
-    drawn_seeds = rng.multinomial(n_seeds, np.full(n_seeds, 1.0 / n_seeds), RESAMPLES) / n_seeds
-    drawn_episodes = rng.multinomial(n_episodes, np.full(n_episodes, 1.0 / n_episodes), RESAMPLES) / n_episodes
-    low, high = np.percentile(((drawn_seeds @ values) * drawn_episodes).sum(axis=1), ENDS)
-    return float(low), float(high)
 
 
 def profile(scores: ArrayLike, levels: ArrayLike) -> tuple[Floats, Floats, Floats]:

@@ -19,7 +19,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import t as student
 
 from seastar_gym.identify.covariance import uncertainty_of
 from seastar_gym.identify.measurement import ORIENTATION, Measurement
@@ -278,6 +277,8 @@ class Residuals:
 
 def estimate_of(found: Found, confidence: float) -> Estimate:
     """Estimates with confidence intervals, from the end of a search."""
+    from scipy.stats import t as student  # takes half a second
+
     fit, residuals = found.fit, found.residuals
     assert isinstance(residuals, Residuals)
     names, guess, p = residuals.names, residuals.guess, len(residuals.names)

@@ -9,7 +9,6 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_seed, shown
@@ -175,6 +174,8 @@ class Sweep:
 
     def _drawn(self, index: int) -> Floats:
         """Latin hypercube of a frame, shares of the ranges, shape (samples, n_ranges)."""
+        from scipy.stats import qmc  # takes half a second
+
         if not self.ranges:
             return np.zeros((1, 0))
         generator = np.random.default_rng([self.seed, index])

@@ -4,18 +4,17 @@ Proposals whose process was lost stay "running" in the storage: Optuna's heartbe
 proposals that have been running for too long are put back here: they count as failed, and are proposed once more.
 """
 
+from __future__ import annotations
+
 import hashlib
 import os
 from collections.abc import Iterator
 from datetime import datetime
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import optuna
 import pyarrow as pa
 import pyarrow.parquet
-from optuna.trial import TrialState
-from sqlalchemy.exc import SQLAlchemyError
 
 from seastar_gym.executors import Executor, Outcome, Work, sentence_of
 from seastar_gym.scene.checks import require_choice, require_count, require_number
@@ -25,6 +24,10 @@ from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.result_files import ResultFiles, result_file_of
 from seastar_gym.sweep.run import OnProgress, Progress
 from seastar_gym.sweep.swimming import units_of
+
+if TYPE_CHECKING:
+    import optuna
+    from optuna.trial import TrialState
 
 
 class Search(NamedTuple):
@@ -44,6 +47,9 @@ def study_of(sweep: Sweep, search: Search, storage: str) -> optuna.Study:
 
     It is another study where anything that results depend on is other, such as the file of one of the controllers.
     """
+    import optuna  # takes a second, as sqlalchemy does
+    from sqlalchemy.exc import SQLAlchemyError
+
     first = next(sweep.configurations())
     require_choice("objective", search.objective, tuple(name for name in units_of(first) if name != "status"))
     require_number("stale_after", search.stale_after, "s")
@@ -102,6 +108,8 @@ class Proposals:
 
     def batches(self) -> Iterator[Batch]:
         """Batches of proposals, made as they are asked for, while results are missing."""
+        from optuna.trial import TrialState
+
         while True:
             put_back_stale(self.study, self._search.stale_after, {trial.number for trial in self._ours()})
             missing = self._designs - _count(self.study, TrialState.COMPLETE) - len(self._ours())
@@ -160,9 +168,12 @@ def _count(study: optuna.Study, state: TrialState) -> int:
 
 def _tell(study: optuna.Study, number: int, value: float | None) -> bool:
     """Tell a result, or a failure for None; whether the proposal still waited for it."""
+    from optuna.exceptions import UpdateFinishedTrialError
+    from optuna.trial import TrialState
+
     try:
         study.tell(number, value, TrialState.FAIL if value is None else TrialState.COMPLETE)
-    except (ValueError, optuna.exceptions.UpdateFinishedTrialError):  # another process was faster
+    except (ValueError, UpdateFinishedTrialError):  # another process was faster
         return False
     return True
 
@@ -178,6 +189,8 @@ def put_back(study: optuna.Study, number: int) -> bool:
 
 def put_back_stale(study: optuna.Study, stale_after: float, ours: set[int] | None = None) -> int:
     """Put back proposals that have been running for so long [s], except ours; returns how many."""
+    from optuna.trial import TrialState
+
     found, now = 0, datetime.now()
     for trial in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
         started = trial.datetime_start or now

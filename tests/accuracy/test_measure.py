@@ -48,9 +48,6 @@ def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):
     for each, other in zip(swum, alone, strict=True):
         np.testing.assert_allclose(each, other, rtol=1e-9, atol=1e-12)
     assert shares[-1] == pytest.approx(1.0)
-    simulator = Simulator(scene, drawn.shape[1])
-    simulator.stroke(drawn[0])
-    np.testing.assert_array_equal(swum.hub[0], simulator.hub_position())
 
 
 def swims(hub, heading=None):
@@ -75,15 +72,6 @@ def test_errors_of_paths_and_ends_are_over_the_length_of_the_converged_path_and_
     np.testing.assert_allclose(found.path, [0.02, np.inf])
     assert np.isinf([found.end[1], found.heading[1]]).all()
     assert [measure.rounded_up(error) for error in (np.inf, 0.0123, 0.012)] == [np.inf, 0.013, 0.012]
-
-
-def test_space_and_time_of_the_same_length_bound_the_whole_error():
-    """Of a path of its own, the error of time of a robot that swims too far would be too small."""
-    limit, fine, coarse = (swims([[[length, 0.0]]]) for length in (1.0, 2.0, 2.5))
-    lengths = measure.path_lengths(SCENE, limit.hub)
-    parts = measure.errors(fine, limit, lengths).path + measure.errors(coarse, fine, lengths).path
-    assert measure.errors(coarse, limit, lengths).path == pytest.approx(parts.tolist())
-    assert parts == pytest.approx([1.5])
 
 
 def test_space_and_time_are_errors_against_many_nodes_and_short_steps():

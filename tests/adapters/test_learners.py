@@ -7,52 +7,57 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 import pytest
-import torch
-from sb3_contrib import QRDQN, TRPO, MaskablePPO, RecurrentPPO
-from sb3_contrib.common.maskable.utils import get_action_masks
-from stable_baselines3 import A2C, DQN, PPO, SAC, TD3, HerReplayBuffer
 
+from later import Later
 from seastar_gym import Scene, SmaWires
-from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.learned import load, save
 from seastar_gym.envs.goal import GoalForm
 from seastar_gym.evaluation.swim import swim
 
+adapter = Later("seastar_gym.adapters.stable_baselines3")
+torch = Later("torch")
+
 REPLAY = {"learning_starts": 4, "buffer_size": 100, "batch_size": 4}
+ONCE = {"n_steps": 8, "batch_size": 8, "n_epochs": 1}
 LEARNERS = {
-    "PPO": (PPO, "limbs", {"n_steps": 8, "batch_size": 8, "n_epochs": 1}),
-    "A2C": (A2C, "joint", {"n_steps": 4}),
-    "DQN": (DQN, "pairs", REPLAY),
-    "SAC": (SAC, "continuous", REPLAY),
-    "TD3": (TD3, "continuous", REPLAY),
-    "TRPO": (TRPO, "pairs", {"n_steps": 8, "batch_size": 8}),
-    "QRDQN": (QRDQN, "pairs", REPLAY),
-    "MaskablePPO": (MaskablePPO, "limbs", {"n_steps": 8, "batch_size": 8, "n_epochs": 1}),
-    "RecurrentPPO": (RecurrentPPO, "pairs", {"n_steps": 8, "batch_size": 8, "n_epochs": 1}),
+    "PPO": ("limbs", ONCE),
+    "A2C": ("joint", {"n_steps": 4}),
+    "DQN": ("pairs", REPLAY),
+    "SAC": ("continuous", REPLAY),
+    "TD3": ("continuous", REPLAY),
+    "TRPO": ("pairs", {"n_steps": 8, "batch_size": 8}),
+    "QRDQN": ("pairs", REPLAY),
+    "MaskablePPO": ("limbs", ONCE),
+    "RecurrentPPO": ("pairs", ONCE),
 }
+"""Action mode and arguments of learners."""
 ARGUMENTS = {"fidelity": "fast", "max_episode_steps": 5}
 
 
 def batch(actions, **arguments):
     same_step = {"actions": actions, "autoreset_mode": "SameStep", **arguments}
-    return BatchVecEnv(gym.make_vec("SeastarSwim-v0", 4, vectorization_mode="vector_entry_point", **same_step))
+    return adapter.BatchVecEnv(gym.make_vec("SeastarSwim-v0", 4, vectorization_mode="vector_entry_point", **same_step))
 
 
 def single(actions, **arguments):
     return gym.make("SeastarSwim-v0", actions=actions, **arguments)
 
 
-def learner_of(kind, env, policy="MlpPolicy", **arguments):
+def learner_of(name, env, policy="MlpPolicy", **arguments):
     """A small learner of this kind."""
+    import sb3_contrib
+    import stable_baselines3
+
+    kind = getattr(stable_baselines3, name, None) or getattr(sb3_contrib, name)
     return kind(policy, env, policy_kwargs={"net_arch": [8]}, seed=0, device="cpu", **arguments)
 
 
 @pytest.mark.parametrize("make", [batch, single])
 @pytest.mark.parametrize("name", LEARNERS)
 def test_a_learner_learns_for_an_iteration(name, make):
-    kind, actions, arguments = LEARNERS[name]
-    policy = "MlpLstmPolicy" if kind is RecurrentPPO else "MlpPolicy"
-    learner = learner_of(kind, make(actions, **ARGUMENTS), policy, **arguments)
+    actions, arguments = LEARNERS[name]
+    policy = "MlpLstmPolicy" if name == "RecurrentPPO" else "MlpPolicy"
+    learner = learner_of(name, make(actions, **ARGUMENTS), policy, **arguments)
     before = [weight.detach().clone() for weight in learner.policy.parameters()]
     learner.learn(16)
     assert learner.num_timesteps >= 16
@@ -62,8 +67,10 @@ def test_a_learner_learns_for_an_iteration(name, make):
 
 
 def test_hindsight_changes_goals_and_learns():
+    from stable_baselines3 import HerReplayBuffer
+
     env, replay = GoalForm(single("continuous", **ARGUMENTS)), REPLAY | {"learning_starts": 8}
-    learner = learner_of(SAC, env, "MultiInputPolicy", replay_buffer_class=HerReplayBuffer, **replay).learn(16)
+    learner = learner_of("SAC", env, "MultiInputPolicy", replay_buffer_class=HerReplayBuffer, **replay).learn(16)
     drawn = learner.replay_buffer.sample(64)
     episode_goals = learner.replay_buffer.observations["desired_goal"][:16, 0]
     goals = drawn.observations["desired_goal"].numpy()
@@ -75,9 +82,11 @@ def test_hindsight_changes_goals_and_learns():
 
 def test_a_masked_learner_never_asks_for_what_wires_cannot_follow():
     """Refractory wires that are warm: a command to them would be refused, and counts in info."""
+    from sb3_contrib.common.maskable.utils import get_action_masks
+
     scene = replace(Scene.preset("fast"), actuator=SmaWires(refractory=True))
     env = batch("joint", scene=scene, decision_period=0.2, max_episode_steps=10)
-    learner = learner_of(MaskablePPO, env, n_steps=8, batch_size=8, n_epochs=1).learn(32)
+    learner = learner_of("MaskablePPO", env, **ONCE).learn(32)
     seen, refused, closed = env.reset(), 0, 0
     for _ in range(8):
         masks = get_action_masks(env)

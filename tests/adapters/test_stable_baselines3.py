@@ -4,16 +4,16 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
-from stable_baselines3.common.env_util import make_vec_env
-from stable_baselines3.common.evaluation import evaluate_policy
-from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize, VecVideoRecorder
 
+from later import Later
 from refusals import assert_refused
-from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
+
+adapter = Later("seastar_gym.adapters.stable_baselines3")
+common = Later("stable_baselines3.common.env_util")
+vec_env = Later("stable_baselines3.common.vec_env")
 
 N, LIMIT = 4, 6
 NEAR = np.array([[0.006, 0.0], [0.012, 0.0]])  # straight ahead: reached within the limit, by some actions
@@ -23,15 +23,15 @@ SETTINGS = {"path": NEAR, "waypoint_radius": 0.004, "random_heading": True, "fid
 def make_batch(symmetry=False, **changes):
     settings = {"num_envs": N, "max_episode_steps": LIMIT, "autoreset_mode": AutoresetMode.SAME_STEP, **SETTINGS}
     batch = gym.make_vec("SeastarSwim-v0", vectorization_mode="vector_entry_point", **{**settings, **changes})
-    return BatchVecEnv(VectorSymmetryReduction(batch) if symmetry else batch)
+    return adapter.BatchVecEnv(VectorSymmetryReduction(batch) if symmetry else batch)
 
 
 def make_singles(symmetry=False):
     def make():
         env = gym.make("SeastarSwim-v0", max_episode_steps=LIMIT, **SETTINGS)
-        return Monitor(SymmetryReduction(env) if symmetry else env)
+        return common.Monitor(SymmetryReduction(env) if symmetry else env)
 
-    return DummyVecEnv([make] * N)
+    return vec_env.DummyVecEnv([make] * N)
 
 
 def assert_infos_equal(ours, theirs):
@@ -116,10 +116,9 @@ def test_seeds_and_options_of_the_next_reset_count_once():
 @pytest.mark.parametrize(
     "call, words",
     [
-        (lambda: make_batch(autoreset_mode=AutoresetMode.NEXT_STEP), "needs autoreset_mode=AutoresetMode.SAME_STEP"),
         (lambda: make_batch(autoreset_mode=AutoresetMode.DISABLED), "needs autoreset_mode=AutoresetMode.SAME_STEP"),
         (lambda: make_batch(on_device=True), "needs observations on the processor: make the batch without on_device"),
-        (lambda: make_vec_env("SeastarSwim-v0", 2, vec_env_cls=BatchVecEnv), "gym.make_vec"),
+        (lambda: common.make_vec_env("SeastarSwim-v0", 2, vec_env_cls=adapter.BatchVecEnv), "gym.make_vec"),
         (lambda: make_batch().set_attr("max_episode_steps", 5, indices=0), "for all of them"),
     ],
 )
@@ -153,12 +152,14 @@ def test_attributes_and_methods_are_those_of_the_batch(symmetry):
 
 
 def test_normalisation_goes_on_top_and_evaluation_takes_its_statistics():
+    from stable_baselines3.common.evaluation import evaluate_policy
+
     batch = make_batch(path="pentagon", waypoint_radius=0.01, actions="limbs")
-    assert batch.env_is_wrapped(Monitor, indices=0) == [True]
+    assert batch.env_is_wrapped(common.Monitor, indices=0) == [True]
     returns, lengths = evaluate_policy(scripted("straight"), batch, n_eval_episodes=N, return_episode_rewards=True)
     assert lengths == [LIMIT] * N
     assert np.ptp(returns) > 0.0  # random headings
-    normalised, plain = VecNormalize(make_batch(), training=False), make_batch()
+    normalised, plain = vec_env.VecNormalize(make_batch(), training=False), make_batch()
     normalised.obs_rms.mean[:] = 1.0
     for env in (normalised, plain):
         env.seed(0)
@@ -189,7 +190,7 @@ def test_stable_baselines_records_a_video(tmp_path):
     pytest.importorskip("pygame")
     pytest.importorskip("moviepy")
     batch = make_batch(render_mode="rgb_array", num_envs=2)
-    recorder = VecVideoRecorder(batch, str(tmp_path), lambda step: step == 0, video_length=3)
+    recorder = vec_env.VecVideoRecorder(batch, str(tmp_path), lambda step: step == 0, video_length=3)
     recorder.reset()
     for _ in range(4):
         recorder.step(np.ones(2, int))

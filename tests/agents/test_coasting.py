@@ -7,12 +7,14 @@ from gymnasium.vector import AutoresetMode
 from agents import coasting
 from agents.coasting import CoastingProgress, fit_coasting
 from agents.hyperparameters import Hyperparameters
-from agents.ppo import make_training_env
+from later import Later
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import body_heading
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.simulator import Simulator
+
+ppo = Later("agents.ppo")
 
 PERIOD = 0.2
 SCENE = make_scene(None, "fast", PERIOD)
@@ -42,10 +44,8 @@ def test_it_foretells_where_other_robots_come_to_rest(fitted):
         observations, *_ = env.step(env.action_space.sample())
     simulator.set_state(env.simulator.get_state())
     simulator.advance(2.0)
-    moved, heading = (
-        simulator.hub_position() - env.simulator.hub_position(),
-        body_heading(env.simulator.positions, SCENE.robot),
-    )
+    moved = simulator.hub_position() - env.simulator.hub_position()
+    heading = body_heading(env.simulator.positions, SCENE.robot)
     along = (moved * np.stack([np.cos(heading), np.sin(heading)], axis=1)).sum(axis=1)
     foretold = SCENE.robot.limb_length * fitted(observations)
     assert np.sqrt(np.mean(moved**2)) > 1e-3
@@ -54,8 +54,8 @@ def test_it_foretells_where_other_robots_come_to_rest(fitted):
 
 
 def test_what_is_added_is_the_change_of_the_way_saved(fitted):
-    weights, actions = RewardWeights(), [3, 3, 0, 7, 7, 0, 0, 0, 0, 0, 0]
-    plain, shaped = batch(8), CoastingProgress(batch(8), fitted, weights)
+    actions = [3, 3, 0, 7, 7, 0, 0, 0, 0, 0, 0]
+    plain, shaped = batch(8), CoastingProgress(batch(8), fitted, RewardWeights())
     before, _ = plain.reset(seed=1)
     shaped.reset(seed=1)
     added = np.zeros(8)
@@ -76,13 +76,12 @@ def test_progress_counts_before_the_way_is_swum(fitted):
     env.reset(seed=1)
     observations, *_ = env.step(np.arange(1, 21))
     now = env.gain(observations)
-    hub = env.unwrapped.simulator.hub_position().copy()
+    hubs = [env.unwrapped.simulator.hub_position()]
     for _ in range(8):
         env.step(np.zeros(20, int))
-    came = np.linalg.norm([0.0, 0.3] - hub, axis=1) - np.linalg.norm(
-        [0.0, 0.3] - env.unwrapped.simulator.hub_position(), axis=1
-    )
-    assert np.corrcoef(now, came)[0, 1] > 0.95
+    hubs.append(env.unwrapped.simulator.hub_position())
+    before, after = np.linalg.norm([0.0, 0.3] - np.array(hubs), axis=2)
+    assert np.corrcoef(now, before - after)[0, 1] > 0.95
 
 
 def test_the_last_step_of_an_episode_has_the_environment_s_own_reward(fitted):
@@ -103,7 +102,7 @@ def test_the_last_step_of_an_episode_has_the_environment_s_own_reward(fitted):
 def test_a_training_has_it_where_it_is_asked_for(asked, monkeypatch):
     monkeypatch.setattr(coasting, "ROBOTS", 32)
     hyperparameters = Hyperparameters(num_envs=8, rollout=8, batch_size=32, decision_period=PERIOD, coasting=asked)
-    env = make_training_env(hyperparameters, "random", True, "fast", threads=1)
+    env = ppo.make_training_env(hyperparameters, "random", True, "fast", threads=1)
     assert env.env_is_wrapped(CoastingProgress)[0] == asked
     env.reset()
     _, rewards, _, infos = env.step(np.arange(8))

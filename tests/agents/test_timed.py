@@ -1,35 +1,25 @@
 """Agents that decide several times a second: gaits, evaluation, planner, training and policies."""
 
-from dataclasses import replace
-
-import gymnasium as gym
 import numpy as np
 import pytest
 
-from agents import learner_file
 from agents.hyperparameters import Hyperparameters
-from agents.ppo import make_model, make_training_env, policy_of
+from later import Later
 from refusals import assert_refused
-from seastar_gym import Limited, Numerics, Scene, Simulator, SmaPulse, SmaWires, ThermalSma
-from seastar_gym.cli.evaluate import main as evaluate_main
-from seastar_gym.controllers import checkpoint
+from seastar_gym import Simulator
 from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.learned import LearnedPolicy, load, save
-from seastar_gym.controllers.planner import Budget, Planner, state_of
+from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.controllers.planner import Budget, Planner
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.comparison import evaluate
-from seastar_gym.evaluation.results import as_text
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import lagged_gait, straight_gait, thrifty_gait, timed, turning_wave
 from symmetries import assert_equivariant
 
-FAST, SDIRK3 = Numerics.preset("fast"), Numerics("sdirk3", 1e-2, 1e-6)
-PLUS_MINUS = straight_gait()[0]  # {2+, 5-}
-SMALL = {"num_envs": 8, "rollout": 8, "batch_size": 32, "epochs": 1, "hidden": (8,), "max_episode_time": 5.0}
+ppo = Later("agents.ppo")
 
 
 def speed_and_turn(gait, decision_period, seconds=6, scene=None):
@@ -47,19 +37,6 @@ def speed_and_turn(gait, decision_period, seconds=6, scene=None):
 # Gaits
 
 
-@pytest.mark.parametrize("period, late", [(0.5, 0.5), (0.25, 0.5), (0.2, 0.6), (0.1, 0.6)])
-def test_the_second_pair_lags_and_strokes_begin_every_second(period, late):
-    gait, every = lagged_gait(period), round(1 / period)
-    np.testing.assert_allclose(period * np.flatnonzero(gait.any(axis=1)), [0.0, late])
-    np.testing.assert_array_equal(gait[0], PLUS_MINUS)
-    np.testing.assert_array_equal(gait[round(late / period)], [0, 0, 1, -1, 0])
-    assert len(gait) == every
-    np.testing.assert_allclose(np.unique(np.abs(thrifty_gait(period))), [0.0, 0.6])
-    strokes = timed(np.array([PLUS_MINUS, -PLUS_MINUS]), period)
-    assert strokes.shape == (2 * every, 5) and np.count_nonzero(strokes.any(axis=1)) == 2
-    np.testing.assert_array_equal(strokes[every], -PLUS_MINUS)
-
-
 def test_lagged_pairs_swim_farther_thrifty_ones_with_less_heat_and_the_wave_turns_on_the_spot():
     """7.4 and 7.6 mm/s at "balanced" (lag 0.6 s, and 0.5 s with 0.6 of the heat) against 3.3 mm/s of one pair."""
     together, _ = speed_and_turn(timed(straight_gait(), 0.5), 0.5)
@@ -73,11 +50,7 @@ def test_lagged_pairs_swim_farther_thrifty_ones_with_less_heat_and_the_wave_turn
 
 @pytest.mark.parametrize("gait", ["lagged-pentagon", "pentagon"])
 def test_gaits_in_time_round_the_pentagon(gait):
-    (done,) = evaluate(
-        {"script": scripted(gait, decision_period=0.5)},
-        decision_period=0.5,
-        fidelity="fast",
-    )
+    (done,) = evaluate({"script": scripted(gait, decision_period=0.5)}, decision_period=0.5, fidelity="fast")
     assert done.finished and done.time[-1] == pytest.approx(0.5 * done.strokes)
     assert done.time[-1] < (120 if gait == "lagged-pentagon" else 260)
     assert done.heating_time.sum() == pytest.approx(0.1 * done.limbs_heated.sum())
@@ -96,35 +69,9 @@ def test_gaits_that_do_not_fit_the_decisions_are_refused(name, period):
 
 
 def test_partial_pulses_are_continuous_actions():
-    policy = scripted("thrifty", decision_period=0.5)
-    assert policy.actions == "continuous"
     env = SeastarSwimEnv(actions="continuous", decision_period=0.5, fidelity="fast")
-    done = swim("thrifty", policy, env, max_strokes=4)
+    done = swim("thrifty", scripted("thrifty", decision_period=0.5), env, max_strokes=4)
     np.testing.assert_allclose(done.heating_time, 0.12)
-    random, _ = scripted("random", "continuous").predict(np.zeros((3, 196), np.float32))
-    assert random.shape == (3, 5) and random.dtype == np.float32 and np.abs(random).max() <= 1.0
-
-
-# Search
-
-
-@pytest.mark.parametrize("actuator", [SmaWires(), ThermalSma(), Limited(SmaPulse(), 0.5, 2.0)])
-def test_the_planner_sees_the_state_of_the_wires(actuator):
-    """From the state read off the observations, the same commands go the same way."""
-    scene = Scene(actuator=actuator, numerics=FAST)
-    env = SeastarSwimVectorEnv(3, actions="pairs", scene=scene, decision_period=0.5, random_heading=True, threads=1)
-    observations, _ = env.reset(seed=3)
-    env.action_space.seed(4)
-    for _ in range(4):
-        observations, *_ = env.step(env.action_space.sample())
-    twin = Simulator(scene, 3, threads=1)
-    twin.set_state(state_of(observations, scene))
-    np.testing.assert_allclose(twin.actuators, env.simulator.actuators, atol=1e-5 * max(1.0, twin.actuators.max()))
-    before, commands = env.simulator.hub_position(), np.tile(PLUS_MINUS, (3, 1))
-    twin.advance(0.5, commands)
-    env.simulator.advance(0.5, commands)
-    moved = np.linalg.norm(env.simulator.hub_position() - before, axis=1)
-    np.testing.assert_allclose(np.linalg.norm(twin.hub_position(), axis=1), moved, rtol=1e-3)
 
 
 def test_the_planner_swims_faster_in_time_than_the_lagged_script():
@@ -138,51 +85,18 @@ def test_the_planner_swims_faster_in_time_than_the_lagged_script():
 # Training
 
 
-def learner(**more):
-    hyperparameters = Hyperparameters(**SMALL, **more)
-    env = make_training_env(hyperparameters, "random", random_heading=True, fidelity="fast", threads=1)
-    return make_model(env, hyperparameters, seed=0)
-
-
 def test_discount_and_time_limit_are_those_of_seconds():
     strokes, half = Hyperparameters(), Hyperparameters(decision_period=0.5)
     assert strokes.discount_per_decision == 0.8 and strokes.max_episode_steps == 400
     assert half.discount_per_decision == pytest.approx(0.8**0.5) and half.max_episode_steps == 800
     assert Hyperparameters(decision_period=1.0).discount_per_decision == 0.8
-    for wrong in ({"decision_period": 0.0}, {"decision_period": "a"}, {"max_episode_time": np.nan}):
+    small = Hyperparameters(decision_period=0.5, num_envs=4, rollout=4, batch_size=16, max_episode_time=5.0)
+    env = ppo.make_training_env(small, "random", random_heading=True, fidelity="fast", threads=1)
+    assert env.get_attr("max_episode_steps")[0] == 10
+    assert ppo.make_model(env, small, seed=0).gamma == pytest.approx(0.8**0.5)
+    for wrong in ({"actions": "continuous"}, {"batch_size": 7}, {"hidden": ()}, {"hidden": (2**20,) * 3}):
         with assert_refused(next(iter(wrong))):
             Hyperparameters(**wrong)
-    with assert_refused("actions"):
-        Hyperparameters(actions="continuous")
-
-
-def test_a_timed_policy_survives_the_disk_with_its_decision_period(tmp_path):
-    model = learner(decision_period=0.5)
-    assert model.gamma == pytest.approx(0.8**0.5)
-    assert model.env.get_attr("max_episode_steps")[0] == 10
-    model.learn(64)
-    learner_file.save(model, tmp_path / "model.zip")
-    save(policy_of(model), tmp_path / "policy.safetensors")
-    again = learner_file.resume(tmp_path / "model.zip", model.get_env())
-    assert again.gamma == model.gamma
-    for policy in (load(tmp_path / "policy.safetensors"), checkpoint.load(tmp_path / "model.zip")):
-        assert policy.decision_period == 0.5 and isinstance(policy.scene.actuator, SmaWires)
-        env = gym.make(
-            "SeastarSwim-v0", actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period
-        ).unwrapped
-        assert swim("learned", policy, env, max_strokes=3).strokes == 3
-        with assert_refused("remember differently"):
-            swim("learned", policy, SeastarSwimEnv(actions="pairs"), max_strokes=1)
-        with assert_refused("every 0.5 s"):
-            swim("learned", policy, SeastarSwimEnv(actions="pairs", decision_period=0.2), max_strokes=1)
-
-
-def test_a_description_has_the_decisions_of_its_actuator():
-    text = Description("pairs", True, Scene(), (4,)).to_json()
-    timed = Description("pairs", True, make_scene(None, None, 0.5), (4,), 0.5)
-    assert Description.from_json(timed.to_json()) == timed
-    with assert_refused("decision_period"):
-        Description.from_json(text.replace('"decision_period": null', '"decision_period": 0.5'))
 
 
 def test_a_timed_policy_behind_the_symmetry_is_equivariant():
@@ -192,17 +106,3 @@ def test_a_timed_policy_behind_the_symmetry_is_equivariant():
     policy = LearnedPolicy(description, {name: rng.normal(size=shapes[name]).astype(np.float32) for name in shapes})
     seen = rng.normal(size=(100, 196)).astype(np.float32)
     assert_equivariant(policy, seen, symmetry.memory_mirror(scene.actuator))
-
-
-def test_swims_and_their_tables_are_counted_in_decisions_unless_they_take_a_second(tmp_path, capsys):
-    for period, word in ((1.0, "strokes"), (0.5, "decisions")):
-        env = SeastarSwimEnv([[0.02, 0.0]], decision_period=period, fidelity="fast")
-        done = swim("straight", scripted("straight", decision_period=period), env, max_strokes=30)
-        assert done.counted_in == word and done.result == f"{done.strokes} {word}"
-        assert as_text([done]).split()[0] == word
-        assert replace(done, waypoints=np.ones((7, 2))).result == "1 of 7 waypoints"
-    command = ["--agents", "rest", "--sets", "nominal", "--decision-period", "0.5", "--fidelity", "fast"]
-    command += ["--seconds", "20", "--num-threads", "1", "--out", str(tmp_path / "trials.csv")]
-    assert evaluate_main(command) == 0
-    printed = capsys.readouterr().out
-    assert "decisions" in printed and "of 0.5 s" in printed and "time [s]" in printed and "strokes" not in printed

@@ -8,28 +8,26 @@ from pathlib import Path
 import gymnasium as gym
 import pytest
 import yaml
-from stable_baselines3 import PPO
-from stable_baselines3.common.env_util import make_vec_env
 
 import seastar_gym
 from agents.hyperparameters import Hyperparameters
-from agents.tasks.learning import OWN
 from seastar_gym import TASKS, TIMED
 
 FILE = Path(__file__).parents[2] / "agents" / "rl_zoo3" / "ppo.yml"
 SETTINGS = yaml.safe_load(FILE.read_text(encoding="utf-8"))
 IDS = [name for name in SETTINGS if name.endswith("-v0")]
-OURS = Hyperparameters()
 
 
 def ours(id):
     """Hyperparameters of the project for an id."""
+    from agents.tasks.learning import OWN
+
     if id in TASKS:
         challenge, _, period, *_ = TASKS[id]
         return Hyperparameters(**{"decision_period": period, **OWN[challenge]})
     if id in TIMED:  # the trainings of docs/training.md
         return Hyperparameters(decision_period=TIMED[id], discount=0.9, rollout=32, num_envs=64, gae_lambda=0.95)
-    return OURS
+    return Hyperparameters()
 
 
 @pytest.mark.parametrize("id", IDS)
@@ -48,15 +46,16 @@ def test_the_file_has_the_project_s_hyperparameters(id):
 
 @pytest.mark.parametrize("id", ["SeastarSwim-v0", "SeastarPrey-v0"])
 def test_a_learner_is_made_of_it_and_learns(id):
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.env_util import make_vec_env
+
     told = dict(SETTINGS[id])
     wrapper = getattr(seastar_gym, told.pop("env_wrapper").removeprefix("seastar_gym."))
     env = make_vec_env(id, 2, wrapper_class=wrapper, env_kwargs=told.pop("env_kwargs"))
-    for name in ("n_timesteps", "n_envs"):
+    for name in ("n_timesteps", "n_envs", "policy_kwargs"):
         del told[name]
-    rate = float(told.pop("learning_rate").removeprefix("lin_"))
-    network = {"net_arch": [128, 128]}
-    assert told.pop("policy_kwargs") == f"dict(net_arch={network['net_arch']})"
-    learner = PPO(env=env, learning_rate=rate, policy_kwargs=network, device="cpu", **{**told, "batch_size": 32})
+    told |= {"batch_size": 32, "learning_rate": float(told["learning_rate"].removeprefix("lin_"))}
+    learner = PPO(env=env, device="cpu", **told)
     learner.learn(1)
     assert learner.num_timesteps == 2 * told["n_steps"]
 

@@ -13,12 +13,12 @@ import pytest
 from losing import LOST, Interrupted, Losing, first
 from odd_values import taken
 from refusals import assert_refused, assert_told
-from seastar_gym import Scene, __version__
+from seastar_gym import __version__
 from seastar_gym.benchmark import page
 from seastar_gym.benchmark.command import main
 from seastar_gym.benchmark.results import MOST, Entry, best_means, merged, read, relative, write
 from seastar_gym.command import INTERRUPTED
-from seastar_gym.controllers import GreedyPolicy, load, load_agent, scripted
+from seastar_gym.controllers import GreedyPolicy, load_agent, scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -81,9 +81,7 @@ def test_returns_are_sums_of_rewards_and_who_does_not_arrive_has_the_time_limit(
         total += env.step(np.array([2, 0, 0, 1, 0]))[1]
     assert swum.returns[0] == pytest.approx(total)
     swum = swim_episodes(SHORT, scripted("rest"), [0, 1], max_decisions=4)
-    np.testing.assert_array_equal(SECONDS.of(swum), [4.0, 4.0])
-    np.testing.assert_array_equal(swum.decisions, 4)
-    assert not swum.success.any()
+    assert SECONDS.of(swum).tolist() == [4.0, 4.0] and not swum.success.any()
 
 
 def test_a_task_of_another_measure_without_a_batch_is_swum_on_its_held_out_split(tasks, monkeypatch):
@@ -104,8 +102,6 @@ def test_agents_are_made_for_the_environment_they_swim_in_and_refused_where_they
     greedy.actions, greedy.decision_period = "joint", 0.5
     with assert_refused("It reads observations of 196 numbers, the task shows 186."):
         require_seen(greedy, SeastarSwimEnv(decision_period=0.5, observe_actuators=False))
-    with assert_refused("The policy decides every 1 s, the environment every 2 s"):
-        require_seen(load(), SeastarSwimEnv(decision_period=2.0, scene=Scene()))
 
 
 # Results
@@ -221,13 +217,9 @@ def test_the_command_measures_merges_and_writes_a_page(tasks, tmp_path, capsys):
     assert [one["agent"] for one in facts] == ["straight", "greedy"] and facts[0]["seeds"] == [1000, 1001, 1002, 1003]
 
     both = tmp_path / "both"
-    family = "pair=straight,4+,1-,rest".replace("4+,1-", "lagged-no")  # a policy that is not there
     arguments = ["--tasks", SHORT, "--seeds", "2", "--decisions", "3", "--out", str(both)]
-    assert main(["--agents", family, *arguments]) == 2
-    assert "pair does not swim SeastarShort-v0" in capsys.readouterr().err.replace(family, "pair")
     assert main(["--agents", "two=straight,rest", *arguments, "--merge", str(out / "results.json")]) == 0
-    merged_entries = read(both / "results.json")
-    assert [one.agent for one in merged_entries] == ["straight", "greedy", "two"]
+    assert [one.agent for one in read(both / "results.json")] == ["straight", "greedy", "two"]
     assert "2 to 4 episodes" in (both / "benchmark.md").read_text()
 
 
@@ -304,7 +296,6 @@ def test_an_agent_with_a_bug_or_that_does_not_fit_does_not_cost_the_others_their
     "arguments, words",
     [
         (["--tasks", "CartPole-v1"], "There is no task 'CartPole-v1': choose of SeastarSwim-v0, "),
-        (["--seeds", "0"], "--seeds must be"),
         (["--agents", "rest", "rest"], "Two agents are called rest: name them with LABEL=AGENT."),
         (["--seeds-per-job", "0"], "--seeds-per-job must be"),
         (["--agents"], "There is nothing to show"),

@@ -8,22 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import safetensors.numpy
-import torch
 
 from agents.hyperparameters import Hyperparameters
-from agents.ppo import make_model, make_training_env, policy_of
 from every_part import ACTUATORS, PARTS
+from later import Later
 from refusals import assert_refused
-from seastar_gym import (
-    Miswired,
-    Numerics,
-    Prey,
-    Scene,
-    Seastar,
-    SmaPulse,
-    SmaWires,
-    Water,
-)
+from seastar_gym import Numerics, Scene, Seastar, SmaPulse, SmaWires, Water
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, load, save
 from seastar_gym.envs.commands import command_table
@@ -31,6 +21,9 @@ from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.swim import swim
 from symmetries import assert_equivariant, symmetry_for
+
+ppo = Later("agents.ppo")
+torch = Later("torch")
 
 FAST = Numerics.preset("fast")
 SMALL = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=2, hidden=(16, 8), max_episode_time=10.0)
@@ -60,9 +53,9 @@ def observations(scene=Scene(), n=2000, seed=0):
 @pytest.mark.parametrize("scene", [Scene(numerics=FAST), FOUR_LIMBS])
 def test_a_saved_policy_acts_as_stable_baselines_does(actions, reduced, scene, tmp_path):
     hyperparameters = replace(SMALL, actions=actions, symmetry=reduced)
-    learner = make_model(make_training_env(hyperparameters, "random", True, scene=scene), hyperparameters, seed=0)
-    learner.learn(64)
-    save(policy_of(learner), tmp_path / "policy.safetensors")
+    env = ppo.make_training_env(hyperparameters, "random", True, scene=scene)
+    learner = ppo.make_model(env, hyperparameters, seed=0).learn(64)
+    save(ppo.policy_of(learner), tmp_path / "policy.safetensors")
     policy, n_limbs = load(tmp_path / "policy.safetensors"), scene.robot.n_limbs
     seen = observations(scene)
     shown, elements = symmetry_for(n_limbs).reduce(seen) if reduced else (seen, np.zeros(len(seen), int))
@@ -126,16 +119,6 @@ class Bomb:
         return print, ("boom",)
 
 
-def cut(share):
-    return lambda file: file.write_bytes(file.read_bytes()[: int(share * file.stat().st_size)])
-
-
-def flip(file):
-    data = bytearray(file.read_bytes())
-    data[-100] ^= 1
-    file.write_bytes(bytes(data))
-
-
 def weigh(number):
     """Another number among the weights."""
 
@@ -157,58 +140,44 @@ def zip_pickles(file):
     rewrite(file, file.with_suffix(".pth").read_bytes())
 
 
-NO_LIMBS = Scene().to_dict() | {"robot": Scene().to_dict()["robot"] | {"n_limbs": 0}}
-NOT_ITS = "the weights are not those that its .json file describes"
 NOT_FINITE = "its weights are not all finite numbers of single precision"
 CHANGED = [
     *(({"format": value}, f"its format is {value}") for value in (99, True, 2.5)),
     ({"observation_layout": 1}, "its observation_layout is 1, this version of seastar_gym knows 2"),
-    ({"actions": "waves"}, "actions must be one of"),
     ({"actions": "continuous"}, "actions must be one of"),
-    ({"hidden": [16, 9]}, "its weights have the shapes "),
-    ({"hidden": []}, "its weights have the shapes"),
+    *(({"hidden": widths}, "its weights have the shapes ") for widths in ([16, 9], [])),
     *(({"hidden": widths}, "a width of its hidden layers must be a whole number") for widths in ([0], [10**6 + 1])),
     ({"hidden": "wide"}, "hidden must be a list of widths"),
-    ({"scene": NO_LIMBS}, "n_limbs must be a whole number from 1"),
     ({"scene": {"robot": {"n_arms": 5}}}, "a dict with a version"),
     ({"symmetry": "False"}, "symmetry must be true or false, not 'False'"),
-    ({"decision_period": -1.0}, "decision_period"),
+    ({"decision_period": 0.5}, "decision_period"),
     ({"training": None}, "its training is a NoneType"),
     *(({"training": {"progress": rows}}, "the progress of its training must be rows of three numbers")
       for rows in ([[1, 2]], [[1, 2, 10**400]], {"a": 1})),
     ({"training": {"commands": [3]}}, "the commands of its training must be texts"),
     ({"sha256": 3}, "the weights are not those"),
-    ({"task": "chess"}, "its task must be one of"),
-    *(({"past": past}, "its past must be a whole number from 0 to 1000") for past in (-1, 1001, True)),
     ({"past": 8, "symmetry": False}, "a policy without symmetry has no past"),
-    ({"limb_mirror": 3}, "its limb_mirror must be a list of pairs"),
     ({"limb_mirror": [[0, 1]] * 1001}, "its limb_mirror must be a list of pairs"),
     *(({"limb_mirror": [pair]}, "not an index and a sign") for pair in ([0, 2], [0, 1, 1], [0, 1.0])),
     ({"limb_mirror": [[5, 1]]}, "an index of its limb_mirror must be a whole number from 0 to 0"),
     *(({"limb_mirror": pairs}, "its limb_mirror is no mirror, which undoes itself")
       for pairs in ([[1, 1], [1, 1]], [[1, 1], [0, -1]])),
-    *(({"entries": entries}, "entries must be a tuple of")
-      for entries in (None, 3, "scalar", ["spin"], [["scalar"]])),
-    *(({"stations": stations}, "stations must be a whole number") for stations in (None, 0, 10)),
-    *(({"shows_limbs": shows}, "shows_limbs must be True or False") for shows in (None, 1)),
+    *(({"entries": entries}, "entries must be a tuple of") for entries in ("scalar", [["scalar"]])),
 ]  # fmt: skip
 """Entries of the description, and words of the sentence."""
 TEXTS = [
-    *((text, "") for text in (b"", b"{", b"[]", b"3", b"{}", b'{"sha256": null}', b"\0", b"[" * 100_000)),
-    *((text, "'utf-8' codec can't decode") for text in (b"\xff\xfe{}", "{}".encode("utf-16"))),
+    *((text, "") for text in (b"", b"[]", b"{}", b'{"sha256": null}')),
+    (b"\xff\xfe{}", "'utf-8' codec can't decode"),
     (b"null", "its description is a NoneType"),
     (b'{"a":' * 100_000, "nested too deeply"),
-    (b'{"format": 1e999}', "1e999 is no finite number"),
-    (b'{"format": NaN}', "NaN is no finite number"),
-    (b'{"format": ' + b"9" * 5000 + b"}", ""),
+    *((b'{"format": %s}' % number, "is no finite number") for number in (b"1e999", b"NaN")),
     (b'{"format": 2, "format": 1}', "does not say 'sha256'"),
 ]
 """Texts of a description, and words of the sentence."""
 DAMAGED = {
     **{f"{suffix} missing": (lambda file, suffix=suffix: file.with_suffix(suffix).unlink(),
        f"There is no trained policy at |policy{suffix} is missing") for suffix in (".safetensors", ".json")},
-    **{f"cut at {share}": (cut(share), NOT_ITS) for share in (0.0, 0.0003, 0.5, 0.999)},
-    "a flipped bit": (flip, NOT_ITS),
+    "empty": (lambda file: file.write_bytes(b""), "the weights are not those that its .json file describes"),
     **{str(weight): (weigh(weight), NOT_FINITE) for weight in (np.nan, np.inf, -np.inf)},
     "doubles": (widen, NOT_FINITE), "a zip of pickles": (zip_pickles, ""),
     "a pickle": (lambda file: rewrite(file, pickle.dumps(Bomb())), ""),
@@ -244,19 +213,10 @@ OF_OWN = Description("pairs", False, Scene(actuator=Own()), (3,))
     "call, words",
     [
         (lambda: load("model.pkl"), "A policy is in a file named .safetensors"),
-        (lambda: save(3, "mine.safetensors"), "policy must be a LearnedPolicy"),
-        (
-            lambda: load().predict(np.zeros(150, np.float32)),
-            "robot of 5 limbs: it sees 186 numbers, not ",
-        ),
-        (lambda: LearnedPolicy(3, {}), "description must be a Description"),
-        (lambda: LearnedPolicy(TASK, [1.0]), "weights must be arrays by name"),
+        (lambda: load().predict(np.zeros(150, np.float32)), "robot of 5 limbs: it sees 186 numbers, not "),
         (lambda: LearnedPolicy(TASK, {"0.bias": [1.0]}), "weights must be arrays by name"),
         (lambda: save(random_policy(OF_OWN), "own.safetensors"), "Scene.actuator is a Own, "),
-        (lambda: save(random_policy(OF_OWN), "own.safetensors"), "register_part"),
         (lambda: TASK._replace(limb_mirror=[(0, 1)]).check(), "ts limb_mirror"),
-        (lambda: TASK._replace(entries=("colour",)).check(), "must be a tuple of scalar, pseudoscalar, vector"),
-        (lambda: TASK._replace(shows_limbs=1).check(), "shows_limbs must be True or False"),
         (lambda: TASK._replace(hidden=[8]).check(), "hidden must be a tuple of widths"),
     ],
 )
@@ -341,18 +301,6 @@ def test_a_description_of_a_task_survives_its_text_and_shapes_the_network():
     assert bare.shapes() == {"0.weight": (15, 186), "0.bias": (15,)}
 
 
-def test_a_policy_of_a_task_fits_that_task_with_any_numbers():
-    policy, n_seen = random_policy(TASK), TASK.observation_size
-    policy.require_fit(TASK.scene, "joint", n_seen, Miswired(0.1))
-    for challenge, other in ((None, "waypoints"), (Prey(), "prey"), (Prey(wanted=1), "Prey")):
-        with pytest.raises(ValueError, match=rf"trained for the task miswired, the environment's is {other}\.$"):
-            policy.require_fit(TASK.scene, "joint", n_seen, challenge)
-    with pytest.raises(ValueError, match=rf"sees {n_seen} numbers of miswired, the environment shows 3: another task"):
-        policy.require_fit(TASK.scene, "joint", 3, Miswired())
-    with pytest.raises(ValueError, match=r"sees 186 numbers of waypoints, the environment shows 3: another task"):
-        random_policy(Description("joint", True, Scene(numerics=FAST), (8,))).require_fit(Scene(), "joint", 3)
-
-
 # In an environment
 
 
@@ -373,14 +321,11 @@ def test_another_scene_is_told_but_other_numerics_are_not():
 @pytest.mark.parametrize("robot", [None, Seastar(nodes_per_limb=7), Seastar(nodes_per_limb=19)])
 def test_the_policy_in_the_box_beats_the_script_round_the_pentagon_and_says_how_it_was_made(robot):
     """The script takes 241 strokes; with any nodes per limb."""
-    shipped, facts = load(), json.loads(BUNDLED.with_suffix(".json").read_text(encoding="utf-8"))
+    shipped = load()
     scene = shipped.scene if robot is None else Scene(robot, numerics=FAST)
     done = swim("learned", shipped, SeastarSwimEnv(actions=shipped.actions, scene=scene), max_strokes=300)
     assert done.finished and done.strokes < 200
-    assert Scene.from_dict(facts["scene"]) == shipped.scene
     trained_at = Scene.preset("balanced")  # before it was given numerical damping
     assert shipped.scene == replace(trained_at, numerics=replace(trained_at.numerics, damping=0.0))
-    assert shipped.training["strokes"] > 0 and isinstance(shipped.training["seed"], int)
-    assert shipped.training["commands"][0].startswith("python train.py")
     assert {"seastar_gym", "numpy", "torch", "stable_baselines3"} <= set(shipped.training["versions"])
     assert BUNDLED.stat().st_size < 1_000_000

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from seastar_gym import Body, HeadingTargets, Numerics, RewardWeights, Scene, Seastar, Simulator, ThermalSma
+from every_part import ACTUATORS
+from seastar_gym import Body, HeadingTargets, Numerics, RewardWeights, Scene, Seastar, Simulator
 from seastar_gym.controllers.greedy import waypoints_of
 from seastar_gym.controllers.planner import TIMED_BUDGETS, Budget, Planner, Targets, gait_planner, state_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -16,8 +17,11 @@ FAST = Scene(numerics=Numerics.preset("fast"))
 
 
 def swum(n_robots=3, strokes=4, scene=FAST):
-    """A batch on its way, with its observations."""
-    env = SeastarSwimVectorEnv(n_robots, path="random", random_heading=True, actions="pairs", scene=scene, threads=1)
+    """A batch on its way, with its observations. Where actuators remember, it decides every half second."""
+    env = SeastarSwimVectorEnv(
+        n_robots, path="random", random_heading=True, actions="pairs", scene=scene, threads=1,
+        decision_period=0.5 if scene.actuator.has_memory else None,
+    )  # fmt: skip
     observations, _ = env.reset(seed=3)
     env.action_space.seed(4)
     for _ in range(strokes):
@@ -30,7 +34,8 @@ STATES = {
     "few nodes": (Scene(Seastar(nodes_per_limb=7), numerics=FAST.numerics), 1e-4),
     "more nodes than stations": (Scene(Seastar(nodes_per_limb=19), numerics=FAST.numerics), 1e-2),
     "a body": (Scene(Seastar(4, 5, body=Body.rectangle(0.06, 0.02)), numerics=FAST.numerics), None),
-    "thermal": (Scene(Seastar(nodes_per_limb=10), actuator=ThermalSma(), numerics=FAST.numerics), None),
+    **{name: (Scene(actuator=ACTUATORS[name], numerics=FAST.numerics), 1e-3)
+       for name in ("thermal", "wires", "limited pulse")},
 }  # fmt: skip
 """Scenes, and by how much the way of the next stroke may differ from that of a state that was observed.
 
@@ -56,13 +61,13 @@ def test_an_observation_is_the_whole_state(scene, allowed):
     np.testing.assert_allclose(*speeds, rtol=1e-5)
     for found, waypoints, place in zip(waypoints_of(observations, scene)[0], env.waypoints, hub, strict=True):
         assert np.hypot(*found) == pytest.approx(np.hypot(*(waypoints[0] - place)), rel=1e-5)
-    if allowed is None:
-        np.testing.assert_allclose(twin.kinetic_energy(), env.simulator.kinetic_energy(), rtol=1e-4)
-        return
+    if scene.actuator.has_memory:
+        largest = max(1.0, twin.actuators.max())
+        np.testing.assert_allclose(twin.actuators, env.simulator.actuators, atol=1e-5 * largest)
     commands = np.zeros((3, scene.robot.n_limbs))
     commands[:, :2] = 1.0, -1.0
-    twin.stroke(commands)
-    env.simulator.stroke(commands)
+    for simulator in (twin, env.simulator):
+        simulator.advance(0.5 if scene.actuator.has_memory else 1.0, commands)
     moved = np.linalg.norm(env.simulator.hub_position() - hub, axis=1)
     np.testing.assert_allclose(np.linalg.norm(twin.hub_position(), axis=1), moved, rtol=allowed)
 
@@ -99,15 +104,16 @@ def test_a_search_in_time_compares_robots_that_have_coasted():
     assert ways[chosen] == ways.min() and np.argmin(np.hypot(*(later.positions[:, 0] - goal).T)) != chosen
 
 
-def test_two_strokes_ahead_it_finds_what_an_exhaustive_search_finds():
+@pytest.mark.parametrize("current", [(0.2, 0.1), (0.0, 0.0)])
+def test_two_strokes_ahead_it_finds_what_an_exhaustive_search_finds(current):
+    """Nearest to the last waypoint; one that is not the last, and within which the robot is, is passed."""
     _, observations = swum(n_robots=1)
-    wide = Planner(FAST, budget=Budget(2, 21), threads=1).predict(observations)[0]
-    states, planner = state_of(observations, FAST), Planner(FAST, threads=1)
-    ends = planner._swim_all(planner._swim_all(states))
-    waypoint = 0.1 * observations[0, -4:-2].astype(float)
-    way = np.linalg.norm(ends.positions[:, 0] - waypoint, axis=1)  # far away: the circle is a constant
-    chosen = wide[0] * 21
-    assert way[chosen : chosen + 21].min() == pytest.approx(way.min(), abs=2e-5)
+    planner, after = Planner(FAST, 0.02, Budget(2, 21), threads=1), np.array([[0.2, 0.1]])
+    states = state_of(observations, FAST)
+    (chosen,) = planner._search(states, Targets(np.array([current]), after))
+    ends = planner._swim_all(planner._swim_all(states)).positions[:, 0].reshape(21, 21, 2)
+    way = np.hypot(*np.moveaxis(ends - after, -1, 0))
+    assert way[chosen].min() == pytest.approx(way.min(), abs=1e-6)
 
 
 def test_it_swims_round_a_corner_faster_than_by_the_displacement_map():
@@ -144,18 +150,6 @@ def test_what_is_left_to_turn_lengthens_the_way_at_its_price_in_the_reward():
         assert now.item() == passes
         expected = 0.1 + price * 0.8 if passes else straight[0] + price * (turn + (0.8 - turn))
         assert way.item() == pytest.approx(expected, rel=1e-9)
-
-
-def test_a_waypoint_that_is_not_the_last_is_passed_and_not_arrived_at():
-    """The search goes on to the one after it, and takes the sequence that is nearest to that in the end."""
-    _, observations = swum(n_robots=1)
-    planner = Planner(FAST, 0.02, Budget(2, 21), threads=1)
-    states = state_of(observations, FAST)
-    after = np.array([[0.2, 0.1]])
-    (chosen,) = planner._search(states, Targets(np.zeros((1, 2)), after))  # the robot is within the first one
-    ends = planner._swim_all(planner._swim_all(states)).positions[:, 0].reshape(21, 21, 2)
-    way = np.hypot(*np.moveaxis(ends - after, -1, 0))
-    assert way[chosen].min() == pytest.approx(way.min(), abs=1e-6)
 
 
 def test_the_planner_turns_to_either_side_and_keeps_a_heading_that_is_met():

@@ -134,19 +134,15 @@ def test_a_report_is_as_kept(kept, monkeypatch, tmp_path):
     evil = {"agent": MARKUP, "success_rate": 1.0, "agent_low": MARKUP, "agent_high": MARKUP}
     table = ResultsTable("<Trials>", {"agent": "<agent>", "success_rate": "success"}, [evil])
     remarks = Remarks("<Test>", ["It was <easy>."], ["python <one>", "python two"], curves, [table])
-    for name, path, more, films, current in (
-        ("full", "pentagon", remarks, {MARKUP: "stray &.mp4"}, Vortex(1e-3)),
-        ("curves", SHORT, Remarks(curves=[Curve.of("a", PROGRESS["b"])]), {}, None),
-        (
-            "plain",
-            "pentagon",
-            Remarks(curves=[Curve.of("b", PROGRESS["b"][:1]), Curve.of("c", PROGRESS["b"])]),
-            {},
-            None,
-        ),
+    one, *two = Curve.of("a", PROGRESS["b"]), Curve.of("b", PROGRESS["b"][:1]), Curve.of("c", PROGRESS["b"])
+    full = {"current": Vortex(1e-3), "films": {MARKUP: "stray &.mp4"}}
+    for name, path, more, shown in (
+        ("full", "pentagon", remarks, full),
+        ("curves", SHORT, Remarks(curves=[one]), {}),
+        ("plain", "pentagon", Remarks(curves=two), {}),
     ):
         recorded = list(map(playback_of, done))
-        page.write_report(tmp_path / "report.html", path, done, recorded, 2e-3, more, current=current, films=films)
+        page.write_report(tmp_path / "report.html", path, done, recorded, 2e-3, more, **shown)
         text = (tmp_path / "report.html").read_text(encoding="utf-8")
         *_, swum = text.splitlines()
         assert MARKUP not in text and "<" not in swum and json.loads(swum)["swims"][1]["agent"] == MARKUP
@@ -156,9 +152,10 @@ def test_a_report_is_as_kept(kept, monkeypatch, tmp_path):
 
 
 READ = {
-    "trials.csv": page.trials_table, "progress.csv": lambda file:
-    charts.read_progress(file.parent), "curve": lambda file: Curve.of("a", []),
-}  # fmt: skip
+    "trials.csv": page.trials_table,
+    "progress.csv": lambda file: charts.read_progress(file.parent),
+    "curve": lambda file: Curve.of("a", []),
+}
 """Readers of files that a report shows."""
 
 

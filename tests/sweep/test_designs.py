@@ -15,7 +15,7 @@ from seastar_gym.sweep.axes import Choices, Range
 from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.gait import gait_of
-from seastar_gym.sweep.swimming import REFUSED, UNITS, scene_of, swim, ways
+from seastar_gym.sweep.swimming import REFUSED, UNITS, swim, ways
 
 FAST = Scene.preset("fast")
 LENGTH = Range("robot.limb_length", 0.05, 0.15)
@@ -42,15 +42,9 @@ def test_a_grid_has_every_combination_once():
         assert len(found) == sweep.n_designs == 36
         assert set(found) == set(itertools.product(*(axis.values for axis in axes)))
         assert len(list(sweep.batches())) == sweep.n_batches
-
-
-def test_numbers_of_robots_are_simulated_side_by_side():
-    axes = Choices("robot.limb_length", (0.05, 0.1)), Choices("numerics.step", (2e-3, 5e-3))
-    batches = list(Sweep(FAST, axes).batches())
-    assert [batch.n_robots for batch in batches] == [2, 2]
-    assert [batch.configuration.scene.numerics.step for batch in batches] == [2e-3, 5e-3]
-    scene = scene_of(batches[0], np.ones(2, bool))
-    assert scene.n_robots == 2 and scene.of_robot(1).robot.limb_length == 0.1
+    numbers = Choices("robot.limb_length", (0.05, 0.1)), Choices("numerics.step", (2e-3, 5e-3))
+    batches = [(batch.n_robots, batch.configuration.scene.numerics.step) for batch in Sweep(FAST, numbers).batches()]
+    assert batches == [(2, 2e-3), (2, 5e-3)]
 
 
 def test_what_a_design_does_is_the_same_beside_any_others():
