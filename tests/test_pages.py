@@ -11,7 +11,6 @@ from types import ModuleType
 
 import gymnasium as gym
 import pytest
-from stable_baselines3 import PPO
 
 import seastar_gym
 from seastar_gym import Numerics, Scene
@@ -41,6 +40,8 @@ NOTEBOOK = ROOT / "examples" / "first_hour.ipynb"
 def short_form(monkeypatch, tmp_path):
     """Episodes of LONGEST steps, trainings of one rollout, certificates of one setting, no window, a folder of one's
     own, and no path that outlives the page."""
+    from stable_baselines3 import PPO
+
     make, learn = gym.make, PPO.learn
 
     def make_short(name, **arguments):

@@ -21,11 +21,13 @@ import pytest
 
 pytest.importorskip("tensorboard", reason="train.py writes its log for TensorBoard")
 
-import train
 from fuzz.killed_training import SECONDS
+from later import Later
 from seastar_gym.controllers import learned as policies
 from seastar_gym.controllers.checkpoint import load
 from seastar_gym.evaluation.report.charts import read_progress
+
+train = Later("train")
 
 DRIVER = Path(__file__).with_name("killed_training.py")
 STROKES, BETWEEN = 512, 128

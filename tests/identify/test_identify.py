@@ -8,10 +8,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import norm
-from scipy.stats import t as student
 
 from drawn import drawn
+from later import Later
 from seastar_gym import (
     AlongLimb,
     Attachment,
@@ -41,6 +40,8 @@ from seastar_gym.identify.search import Found
 from seastar_gym.identify.trajectories import batch_of_trajectories, trajectories
 from seastar_gym.scene.per_robot import numbers_of
 from seastar_gym.scene.scene_file import load_scene
+
+stats = Later("scipy.stats")
 
 SCENE = Scene(numerics=Numerics("implicit-midpoint", 0.01))
 
@@ -203,7 +204,7 @@ def test_intervals_are_students_and_what_is_not_told_is_named(golden):
     fit = SimpleNamespace(jac=jacobian, fun=residuals, x=np.array([0.1, -0.2]))
     found = estimate_of(Found(fit, simulated, 1e-3, 1e-5), 0.9)
     covariance = uncertainty_of(jacobian, residuals, np.repeat(data.time, 2)).covariance
-    half = student.ppf(0.95, 4) * np.sqrt(np.diag(covariance))
+    half = stats.t.ppf(0.95, 4) * np.sqrt(np.diag(covariance))
     np.testing.assert_allclose(found.values, [2.0 * math.exp(0.1), 3.0 * math.exp(-0.2)])
     np.testing.assert_allclose([found.lower, found.upper], found.values * np.exp([-half, half]))
     assert found.untold == (("a", "b"),) and found.scene is SCENE and (found.residuals == -0.5).all()
@@ -261,7 +262,7 @@ def coverage(memory: float, n_pictures: int = 400) -> np.ndarray:
             errors[picture] = memory * errors[picture - 1] + np.sqrt(1.0 - memory**2) * rng.normal(size=2)
         wrong = fit @ errors.ravel()
         covariance = uncertainty_of(jacobian, errors.ravel() - jacobian @ wrong, times).covariance
-        held.append(np.abs(wrong) < norm.ppf(0.975) * np.sqrt(np.diag(covariance)))
+        held.append(np.abs(wrong) < stats.norm.ppf(0.975) * np.sqrt(np.diag(covariance)))
     return np.mean(held, axis=0)
 
 
