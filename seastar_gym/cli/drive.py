@@ -8,7 +8,7 @@ before any wire is heated. While the robot swims, a window shows it. Logs, a pic
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, get_args
 
@@ -77,16 +77,17 @@ def simulated(options: argparse.Namespace, arguments: dict[str, Any], paced: boo
 
 @contextmanager
 def opened(options: argparse.Namespace, arguments: dict[str, Any]) -> Iterator[Plant]:
-    """Context of the plant that the options ask for."""
-    if options.plant == "sim":
-        yield simulated(options, arguments, paced=True)
-        return
-    with open_serial(_device(options.plant)) as wires:
-        if options.tracker is None:
-            yield LinePlant(wires)
-            return
-        with open_serial(_device(options.tracker)) as tracker:
-            yield LinePlant(wires, tracker)
+    """Context of the plant that the options ask for; whatever ends it, the wires are stopped."""
+    with ExitStack() as ports:
+        if options.plant == "sim":
+            plant: Plant = simulated(options, arguments, paced=True)
+        else:
+            devices = [options.plant] if options.tracker is None else [options.plant, options.tracker]
+            plant = LinePlant(*[ports.enter_context(open_serial(_device(device))) for device in devices])
+        try:
+            yield plant
+        finally:
+            plant.stop()
 
 
 def _device(text: str) -> str:
