@@ -15,7 +15,7 @@ const float STEADY_RISE = 220;       // [K] above the water that constant heatin
 const float TIME_CONSTANT = 420;     // [ms]
 const uint32_t START = 500;          // [ms] that the board takes to start, for which hot wires have cooled
 const uint32_t OVERTIME = 5;         // [ms] by which a pulse may be too long
-const uint32_t LONGEST_STEP = 100;   // [ms] that pass at once, however far the clock jumps: no jump is a rest
+const uint32_t LONGEST_STEP = 20;    // [ms] between two looks at the clock; if it goes on by more, no wire has rested
 const unsigned int MOST_BYTES = 64;  // that are read at once
 
 struct Wire {
@@ -60,7 +60,7 @@ void stop() {
 
 // Ends pulses that are over, and all of them when nobody was heard.
 void watch() {
-  uint32_t now = millis(), passed = now - ticked, step = passed < LONGEST_STEP ? passed : LONGEST_STEP;
+  uint32_t now = millis(), passed = now - ticked, step = passed > LONGEST_STEP ? 0 : passed;
   heat_clock += step;
   ticked = now;
   bool silent = now - heard > SILENCE;

@@ -39,9 +39,6 @@ class Heated:
         for interval in self.intervals[wire][-1:]:
             interval[1] = min(interval[1], time)
 
-    def is_hot(self, wire, time):
-        return any(begin <= time < end for begin, end in self.intervals[wire][-1:])
-
     def last(self):
         """When the last wire was turned off."""
         return max((each[-1][1] for each in self.intervals.values() if each), default=-math.inf)
@@ -68,18 +65,28 @@ class Heated:
     def broken(self, ended):
         """What of a plant's promises was not kept, in a drive that ended at a time [s]."""
         late, together, hottest = self.last() - ended, self.together(), self.hottest()
-        broken = {f"hot for {late:.3f} s": late > COLD_WITHIN, f"{hottest:.1f} deg C": hottest > Limits().hottest}
-        return [words for words, is_so in {**broken, f"both for {together:.3f} s": together > 0.0}.items() if is_so]
+        kept = {
+            f"hot for {late:.3f} s": late <= COLD_WITHIN,
+            f"{hottest:.1f} deg C": hottest <= Limits().hottest,
+            f"both for {together:.3f} s": together == 0.0,
+        }
+        return [words for words, is_so in kept.items() if not is_so]
 
 
-def drawn_line(rng):
-    """A line of a driver that holds the heat, as hard as it can."""
-    signs = "".join(rng.choice(list("+-0"), 5, p=[0.6, 0.2, 0.2]))
-    return sealed(f"heat {rng.choice([120, 100, 60, 1])} {signs}")
+def greedy(rng):
+    """Lines of a driver that holds the heat as hard as it can, and the time after each [ms]."""
+    lines = [("".join(rng.choice(list("+-0"), 5, p=[0.6, 0.2, 0.2])), int(rng.integers(1, 260))) for _ in range(8)]
+    (signs, _), kind, found = lines[0], rng.integers(3), []
+    if kind == 0:  # the same wires whenever they have rested
+        lines = [(signs, 120 + int(rng.integers(2, 100)))] * 8
+    elif kind == 1:  # both wires of a limb
+        lines = [(signs, int(rng.integers(20, 130))), (signs.translate({43: 45, 45: 43}), 150)] * 4
+    for signs, gap in lines:
+        beats = [(sealed("beat"), 40)] * (gap // 40)
+        found += [(sealed(f"heat {rng.choice([120, 100, 120, 60])} {signs}"), gap % 40), *beats]
+    return found
 
 
 def garbage(rng):
     """Bytes at random, and what is no line."""
-    return bytes(
-        rng.choice([rng.integers(0, 256, 200), np.zeros(3000, int), np.full(700, 10)][rng.integers(3)], 200).tolist()
-    )
+    return bytes([rng.integers(0, 256, 200), np.zeros(200, int), np.full(200, 10)][rng.integers(3)].tolist())

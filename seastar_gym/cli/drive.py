@@ -24,6 +24,7 @@ from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.swim import Swim, swim
 from seastar_gym.evaluation.tasks import require_seen
+from seastar_gym.extras import require_extra
 from seastar_gym.files import write_atomically
 from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.lines import LinePlant, open_serial
@@ -82,18 +83,22 @@ def opened(options: argparse.Namespace, arguments: dict[str, Any]) -> Iterator[P
         if options.plant == "sim":
             plant: Plant = simulated(options, arguments, paced=True)
         else:
-            devices = [options.plant] if options.tracker is None else [options.plant, options.tracker]
-            plant = LinePlant(*[ports.enter_context(open_serial(_device(device))) for device in devices])
+            plant = LinePlant(*[ports.enter_context(open_serial(device)) for device in _devices(options)])
         try:
             yield plant
         finally:
             plant.stop()
 
 
-def _device(text: str) -> str:
-    if not text.startswith(SERIAL) or text == SERIAL:
-        raise ValueError(f"A plant is sim, or {SERIAL}/dev/... of a serial line, not {text}.")
-    return text.removeprefix(SERIAL)
+def _devices(options: argparse.Namespace) -> list[str]:
+    """Serial ports of the wires and of the tracker, where it has one of its own; none of a simulated plant."""
+    if options.plant == "sim":
+        return []
+    ports = [options.plant] if options.tracker is None else [options.plant, options.tracker]
+    for port in ports:
+        if not port.startswith(SERIAL) or port == SERIAL:
+            raise ValueError(f"A plant is sim, or {SERIAL}/dev/... of a serial line, not {port}.")
+    return [port.removeprefix(SERIAL) for port in ports]
 
 
 def plan(options: argparse.Namespace) -> tuple[Policy, Swim, dict[str, Any]]:
@@ -116,8 +121,8 @@ def _swim(name: str, policy: Policy, env: PlantSwim, options: argparse.Namespace
 
 def drive(options: argparse.Namespace) -> int:
     """Plan, ask, drive, and write what came of it; returns the exit code."""
-    if options.plant != "sim":
-        _device(options.plant)
+    if _devices(options) and not options.dry:
+        require_extra("Serial ports", "plant", "serial")
     policy, planned, arguments = plan(options)
     options.out.mkdir(parents=True, exist_ok=True)
     picture = options.out / "plan.png"

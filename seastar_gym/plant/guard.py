@@ -18,6 +18,8 @@ POLL = 0.01
 """Time between looks at a plant [s]."""
 FIRST = 2.0
 """Time within which a robot has to be seen at first [s]."""
+MOST_STOOD = 100
+"""Waits after which a clock that has not moved stands still."""
 ROUNDING = 1e-9
 
 
@@ -82,6 +84,7 @@ class Guard:
         self._clock, self._changed_at = plant.now(), plant.now()
         self._heat = limits.heat(plant.n_limbs, LATENESS)
         self._heat.tick(self._clock)
+        self._stood = 0  # waits in which the clock has not moved
 
     @contextmanager
     def stops(self) -> Iterator[None]:
@@ -91,7 +94,7 @@ class Guard:
         except PlantError as why:
             raise self.refuse(str(why)) from None
         except BaseException as failure:
-            self.refuse(f"The plant was stopped by {type(failure).__name__}: {failure}")
+            self.refuse(f"The drive was ended by a {type(failure).__name__}: all wires are stopped.")
             raise
 
     def now(self) -> float:
@@ -133,7 +136,11 @@ class Guard:
 
     def _wait(self, seconds: float) -> None:
         with self.stops():
+            before = self._clock
             self.plant.wait(seconds)
+            self._stood = 0 if self.now() > before else self._stood + 1
+            if self._stood > MOST_STOOD:
+                raise PlantError("The plant's clock stands still: all wires are stopped.")
 
     def look(self) -> Sighting | None:
         """The newest sighting; PlantError, and stopped wires, if sight is lost or cannot be."""
@@ -174,8 +181,8 @@ class Guard:
 
     def heat(self, limbs: Sequence[int], seconds: float) -> None:
         """Heat wires as `Plant.heat`. PlantError, and stopped wires, for a pulse that the limits do not allow."""
-        self.look()
         with self.stops():
+            self.look()
             if len(limbs) != self.n_limbs or not {*limbs} <= {-1, 0, 1}:
                 raise PlantError(f"Wires are 1, 0 or -1 for {self.n_limbs} limbs, not {shown(limbs)}.")
             signs = np.asarray(limbs)

@@ -18,7 +18,7 @@ LATENESS = 0.03
 OVERTIME = 0.005
 """By how much a pulse may be too long before it is turned off [s]."""
 LONGEST_STEP = 0.1
-"""Time that passes at once at most [s], unless this computer's clock says that more has passed."""
+"""Longest time between two looks that is believed [s], unless this computer's clock says that it has passed."""
 START = 0.5
 """Time that whoever heats or asks takes to start at least [s], for which wires of earlier drives have cooled."""
 WIRE = ThermalSma()
@@ -32,8 +32,8 @@ class Heat:
     wire: Whose thermal numbers wires have. margin: By how much pulses may follow each other sooner [s] where they heat
     than they do here. A wire is taken to cool no sooner than so long after its pulse.
 
-    The clock of heat is that of the plant, but one that goes back stands still, and one that jumps goes on by
-    `LONGEST_STEP`: no jump is a rest.
+    The clock of heat is that of the plant, but it stands still where that goes back, or on by more than `LONGEST_STEP`
+    and than this computer's clock: no jump is a rest.
     """
 
     def __init__(
@@ -52,14 +52,16 @@ class Heat:
         self._heats, self._cools = float(np.min(wire.time_constant)), float(np.max(wire.time_constant))
         self._hottest, self._longest, self._shortest_rest = hottest, longest_pulse, shortest_rest
         self._antagonists, self._margin = antagonists, margin
-        self._rise = np.full((n_limbs, 2), (hottest - self._water) * math.exp(-START / self._cools))
+        self._rise = np.full((n_limbs, 2), min(hottest - self._water, self._steady) * math.exp(-START / self._cools))
         self._left, self._rested = np.zeros((n_limbs, 2)), np.full((n_limbs, 2), shortest_rest)
         self._clock, self._wall, self._passed = math.nan, time.monotonic(), 0.0
 
     def tick(self, now: float) -> None:
         """Say the time of the plant's clock [s]."""
         wall = time.monotonic()
-        step = min(now - self._clock, max(LONGEST_STEP, wall - self._wall))
+        step = now - self._clock
+        if step > LONGEST_STEP:
+            step = min(step, wall - self._wall)
         self._passed += step if step > 0.0 else 0.0  # nothing, where a clock says no number
         self._clock, self._wall = now, wall
 

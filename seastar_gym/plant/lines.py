@@ -196,7 +196,8 @@ class LinePlant:
 
     def _greet(self) -> None:
         """Greet until there are two answers: a plant that begins to hear may say hello by itself."""
-        self._wires.forget()
+        for lines in filter(None, (self._wires, self._tracker)):
+            lines.forget()
         answers = 0
         for _ in range(math.ceil(HELLO / GREETING) + 1):
             self._wires.send(f"hello {VERSION}")

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from faults import LIES, Heated, drawn_line, garbage
+from faults import COLD_WITHIN, LIES, Heated, garbage, greedy
 from seastar_gym.plant import heat
 from seastar_gym.plant.guard import Guard, Limits
 from seastar_gym.plant.lines import LinePlant, Server, sealed
@@ -107,12 +107,12 @@ class Drive:
             return False
         return True
 
-    def say(self, lines, every=0.02):
-        """Something else says lines in the place of the driver."""
-        for line in lines:
+    def say(self, lines):
+        """Something else says lines in the place of the driver; each with the time after it [ms]."""
+        for line, milliseconds in lines:
             with contextlib.suppress(BlockingIOError):
                 self.ends[1].send(line)
-            self.go_on(every)
+            self.go_on(milliseconds / 1000.0)
 
     def close(self):
         for end in self.ends:
@@ -159,11 +159,7 @@ class Drive:
         return now
 
     def clock_jumps(self):
-        jump = self.rng.choice([3600.0, 1.0, -0.05, -3600.0])
-        if self.rng.random() < 0.5:
-            self.tank.shift += jump
-        else:
-            self.shift += jump
+        self.shift += self.rng.choice([3600.0, 1.0, -0.05, -3600.0])
         self.swim(0.2)
         return self.tank.time
 
@@ -176,24 +172,30 @@ class Drive:
         return now
 
     def driver_lies(self):
-        """It is stopped at once, however it goes on."""
-        self.say([LIES[self.rng.integers(len(LIES))]], STEP)
-        return self.tank.time - COLD
+        """It is stopped at once."""
+        self.say([(LIES[self.rng.integers(len(LIES))], 10)])
+        return self.tank.time - COLD_WITHIN
 
     def driver_floods(self):
-        self.say([garbage(self.rng) * 80 for _ in range(10)])
-        return self.tank.time - 0.2
+        self.say([(garbage(self.rng) * 80, 20)] * 10)
+        return self.tank.time - COLD_WITHIN
 
     def driver_holds_the_heat(self):
-        self.say([sealed("hello 1"), *(drawn_line(self.rng) for _ in range(50))], 0.01)
+        self.say([(sealed("hello 1"), 10), *greedy(self.rng)])
         return self.tank.time
 
     def driver_beats_for_ever(self):
-        self.say([sealed("beat") * 2000 for _ in range(3)])
+        self.say([(sealed("beat") * 2000, 20)] * 3)
+        return self.tank.time
+
+    def clock_of_the_plant_jumps(self):
+        """While somebody holds the heat."""
+        for jump in self.rng.choice([3600.0, 1.0, -0.05, -3600.0], 3):
+            self.say([(sealed("hello 1"), 10), *greedy(self.rng)[:12]])
+            self.tank.shift += jump
         return self.tank.time
 
 
-COLD = 0.2
 FAULTS = [name for name in vars(Drive) if name.startswith(("driver_", "plant_", "sight_", "clock_"))]
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from faults import COLD_WITHIN, LIES, Heated, drawn_line, garbage
+from faults import COLD_WITHIN, LIES, Heated, garbage, greedy
 from seastar_gym.plant.guard import LATENESS, Limits
 from seastar_gym.plant.lines import LinePlant, sealed
 from seastar_gym.plant.plant import PlantError
@@ -159,7 +159,7 @@ def flooding(rng):
 
 
 def holding(rng):
-    return [event for _ in range(40) for event in (("say", drawn_line(rng)), ("go", int(rng.integers(1, 40))))]
+    return [event for line, after in [(sealed("hello 1"), 1), *greedy(rng)] for event in (("say", line), ("go", after))]
 
 
 def beating(rng):
@@ -167,11 +167,11 @@ def beating(rng):
 
 
 def restarting(rng):
-    return [("off", 500), ("go", 1), ("say", sealed("hello 1")), *holding(rng)]
+    return [*holding(rng), ("off", 500), *holding(rng)]
 
 
 def jumping(rng):
-    return [("jump", int(rng.choice([3_600_000, 1000, 4_294_960_000]))), *holding(rng)]
+    return [*holding(rng), ("jump", int(rng.choice([3_600_000, 1000, 4_294_960_000]))), ("go", 1), *holding(rng)]
 
 
 FAULTS = [lambda rng: [], lying, flooding, holding, beating, restarting, jumping]
@@ -203,7 +203,7 @@ def test_the_sketch_takes_what_a_guard_asks_for(played):
 def test_no_lie_is_followed(lie, played):
     heated, said = played([("say", sealed("hello 1")), ("go", 5), ("say", sealed("heat 100 +0000")), ("go", 50),
                            ("say", lie), ("go", 200)])  # fmt: skip
-    assert heated.intervals.keys() == {(0, 0)} and heated.last() < 0.15
+    assert heated.intervals.keys() == {(0, 0)} and heated.last() < 0.06
     assert sum("error" in line for _, line in said) >= 1 or b"hello" in lie
 
 
