@@ -9,6 +9,7 @@ import numpy as np
 from seastar_gym import ThermalSma
 from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.lines import sealed
+from seastar_gym.plant.plant import Sighting
 
 COLD_WITHIN = 0.2
 """Time after whatever goes wrong by which wires are cold [s]."""
@@ -71,6 +72,37 @@ class Heated:
             f"both for {together:.3f} s": together == 0.0,
         }
         return [words for words, is_so in kept.items() if not is_so]
+
+
+class Tank:
+    """Wires that are heated as told, and a tracker; the clock may be shifted."""
+
+    n_limbs = 5
+
+    def __init__(self):
+        self.time, self.shift, self.seen_until, self.fails = 0.0, 0.0, np.inf, None
+        self.heated = Heated()
+
+    def now(self):
+        return self.time + self.shift
+
+    def wait(self, seconds):
+        self.time += seconds
+
+    def sight(self):
+        if self.fails is not None:
+            raise self.fails
+        taken_at = np.floor(min(self.time, self.seen_until) * 50.0) / 50.0
+        return Sighting(float(taken_at), self.now(), (0.0, 0.0, 0.0))
+
+    def heat(self, limbs, seconds):
+        for limb, sign in enumerate(limbs):
+            if sign:
+                self.heated.on((limb, int(sign < 0)), self.time, self.time + seconds)
+
+    def stop(self):
+        for wire in self.heated.intervals:
+            self.heated.off(wire, self.time)
 
 
 def greedy(rng):

@@ -11,11 +11,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from faults import COLD_WITHIN, LIES, Heated, garbage, greedy
+from faults import COLD_WITHIN, LIES, Tank, garbage, greedy
 from seastar_gym.plant import heat
 from seastar_gym.plant.guard import Guard, Limits
 from seastar_gym.plant.lines import LinePlant, Server, sealed
-from seastar_gym.plant.plant import PlantError, Sighting
+from seastar_gym.plant.plant import PlantError
 
 STEP = 0.01
 
@@ -24,37 +24,6 @@ STEP = 0.01
 def no_wall_clock(monkeypatch):
     """All time that passes is that of the simulation."""
     monkeypatch.setattr(heat, "time", SimpleNamespace(monotonic=lambda: 0.0))
-
-
-class Tank:
-    """Wires that are heated as told, and a tracker; the clock may be shifted."""
-
-    n_limbs = 5
-
-    def __init__(self):
-        self.time, self.shift, self.seen_until, self.fails = 0.0, 0.0, np.inf, None
-        self.heated = Heated()
-
-    def now(self):
-        return self.time + self.shift
-
-    def wait(self, seconds):
-        self.time += seconds
-
-    def sight(self):
-        if self.fails is not None:
-            raise self.fails
-        taken_at = np.floor(min(self.time, self.seen_until) * 50.0) / 50.0
-        return Sighting(float(taken_at), self.now(), (0.0, 0.0, 0.0))
-
-    def heat(self, limbs, seconds):
-        for limb, sign in enumerate(limbs):
-            if sign:
-                self.heated.on((limb, int(sign < 0)), self.time, self.time + seconds)
-
-    def stop(self):
-        for wire in self.heated.intervals:
-            self.heated.off(wire, self.time)
 
 
 class Far(LinePlant):

@@ -7,47 +7,20 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from faults import Heated
+from faults import Tank
 from refusals import assert_refused
 from seastar_gym import Scene, Simulator, SmaWires, ThermalSma
 from seastar_gym.controllers import scripted
 from seastar_gym.controllers.learned import pretrained
 from seastar_gym.plant import heat
 from seastar_gym.plant.guard import Guard, Limits
-from seastar_gym.plant.plant import PlantError, Sighting
+from seastar_gym.plant.plant import PlantError
 from seastar_gym.plant.simulated import SimulatedPlant
 from seastar_gym.plant.swim import PlantSwim
 
 
-class Wires:
-    """Plant whose clock is set by a test, and whose heat is noted."""
-
-    n_limbs = 5
-
-    def __init__(self):
-        self.time, self.heated = 0.0, Heated()
-
-    def now(self):
-        return self.time
-
-    def wait(self, seconds):
-        self.time += seconds
-
-    def sight(self):
-        return Sighting(self.time, self.time, (0.0, 0.0, 0.0))
-
-    def heat(self, limbs, seconds):
-        for limb, sign in enumerate(limbs):
-            if sign:
-                self.heated.on((limb, int(sign < 0)), self.time, self.time + seconds)
-
-    def stop(self):
-        for wire in self.heated.intervals:
-            self.heated.off(wire, self.time)
-
-
 def guarded(pulse=None, **limits):
-    plant = Wires()
+    plant = Tank()
     guard = Guard(plant, Limits(**limits), pulse)
     guard.begin()
     guard.wait_until(5.0)  # of earlier drives nothing is left
@@ -164,14 +137,14 @@ def test_a_third_pulse_in_a_row_is_masked():
 def test_a_swim_takes_the_numbers_of_the_scene_s_wires():
     scene = Scene(actuator=ThermalSma(steady_rise=450.0)).at("fast")
     with assert_refused("120 deg C", "allows 100 deg C"):
-        PlantSwim(Wires(), scene=scene)
+        PlantSwim(Tank(), scene=scene)
 
 
 @pytest.mark.parametrize(
     "make, words",
     [(lambda: Limits(hottest=20.0), "above the water's 20 deg C"), (lambda: Limits(hottest=np.nan), "Limits.hottest"),
      (lambda: Limits(antagonists=1), "Limits.antagonists"), (lambda: Limits(wire=SmaWires()), "a ThermalSma"),
-     (lambda: PlantSwim(Wires(), Limits(0.3), scene=Scene(actuator=SmaWires(heating_time=0.3))), "134 deg C")],
+     (lambda: PlantSwim(Tank(), Limits(0.3), scene=Scene(actuator=SmaWires(heating_time=0.3))), "134 deg C")],
 )  # fmt: skip
 def test_limits_that_cannot_be_are_refused(make, words):
     with assert_refused(words):
