@@ -130,14 +130,15 @@ def held(rng, milliseconds):
     limits, events, sent = Limits(), [("say", sealed("hello 1")), ("go", 20)], []
     heat, time = limits.heat(5, LATENESS), 0
     while time < milliseconds:
-        heat.tick(time / 1000.0)
         pulse = int(rng.choice([120, 100, 50]))
         free = ~heat.resting(pulse / 1000.0) & (rng.random((5, 2)) < 0.7)
         free[:, 1] &= ~free[:, 0]
         signs = "".join("0+-"[1 * one + 2 * other] for one, other in free)
         heat.heat(free, pulse / 1000.0)
         sent.append((time + rng.integers(0, round(1000 * LATENESS)), sealed(f"heat {pulse} {signs}")))
-        time += int(rng.choice([20, 60, 130]))
+        for _ in range(int(rng.choice([2, 6, 13]))):
+            time += 10
+            heat.tick(time / 1000.0)
     beats = [(at, sealed("beat")) for at in range(0, milliseconds, 50)]
     arrivals, now = sorted(sent + beats), 0
     for at, line in arrivals:
