@@ -14,7 +14,7 @@ from seastar_gym.command import run_command
 ROOT = Path(__file__).resolve().parent.parent
 OF_STUDIES = ("matplotlib", "rich", "tqdm", "tyro")
 OF_EXTRAS = ("h5py", "imageio", "matplotlib", "minari", "onnx", "optuna", "pandas", "PIL", "plotly", "pyarrow",
-             "pygame", "rich", "sqlalchemy", "stable_baselines3", "tensorboard", "tqdm", "tyro")  # fmt: skip
+             "pygame", "rich", "serial", "sqlalchemy", "stable_baselines3", "tensorboard", "tqdm", "tyro")  # fmt: skip
 OF_TRAIN = ("imageio", "plotly", "stable_baselines3", "tensorboard", "torch", "tyro")
 
 
@@ -59,6 +59,11 @@ PICTURE = (
     "try: env = gymnasium.make('SeastarSwim-v0', render_mode='rgb_array'); env.reset(seed=0); env.render()\n"
     "except ImportError as missing: raise SystemExit(str(missing))"
 )
+PORT = (
+    "from seastar_gym.plant.lines import open_serial\n"
+    "try: open_serial('/dev/none')\n"
+    "except ImportError as missing: raise SystemExit(str(missing))"
+)
 SWEEP = "-m", "seastar_gym.cli", "sweep", "robot.limb_length=0.08:0.1:3", "--out", os.devnull
 WITHOUT = [
     ("studies", OF_STUDIES, ("-m", "studies", "--help")),
@@ -69,6 +74,7 @@ WITHOUT = [
     ("search", ("optuna", "sqlalchemy"), (*SWEEP, "--optuna", "2")),
     ("studies", ("matplotlib",), ("-m", "seastar_gym.cli", "identify", "--synthetic", "--picture", "fit.png")),
     ("render", ("pygame",), ("-c", PICTURE)),
+    ("plant", ("serial",), ("-c", PORT)),
 ]  # fmt: skip
 """Extra, modules that are missing without it, and a command that needs them."""
 

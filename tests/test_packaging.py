@@ -25,7 +25,13 @@ ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 NOT_FROM_AN_INDEX = {"seastar_gym", "agents", "studies", "train", "rclpy", "geometry_msgs", "std_msgs"}  # ours, ROS 2's
 # Where the import name does not say it.
-DISTRIBUTION_OF = {"cupy": "cupy-cuda13x", "PIL": "pillow", "pygame": "pygame-ce", "yaml": "pyyaml"}
+DISTRIBUTION_OF = {
+    "cupy": "cupy-cuda13x",
+    "PIL": "pillow",
+    "pygame": "pygame-ce",
+    "serial": "pyserial",
+    "yaml": "pyyaml",
+}
 # Torch's wheels for CUDA name these; its wheels for the CPU do not.
 ONLY_WITH_CUDA = re.compile(r"(nvidia|cuda|triton)\b")
 
@@ -98,7 +104,7 @@ def test_every_extra_is_in_the_table_of_the_guide():
 @pytest.mark.parametrize(
     ("folders", "extras"),
     [
-        (["seastar_gym"], ["render", "studies", "train", "search", "ray", "slurm", "data", "export", "gpu"]),
+        (["seastar_gym"], ["render", "studies", "train", "search", "ray", "slurm", "data", "export", "gpu", "plant"]),
         (["studies"], ["train", "sweep", "test", "data"]),
         (["agents", "train.py"], ["train", "rllib"]),
         (["tests"], ["test", "browser", "ray", "learners"]),

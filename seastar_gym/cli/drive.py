@@ -8,7 +8,7 @@ before any wire is heated. While the robot swims, a window shows it. Logs, a pic
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, get_args
 
@@ -24,6 +24,7 @@ from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.swim import Swim, swim
 from seastar_gym.evaluation.tasks import require_seen
+from seastar_gym.extras import require_extra
 from seastar_gym.files import write_atomically
 from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.lines import LinePlant, open_serial
@@ -77,22 +78,27 @@ def simulated(options: argparse.Namespace, arguments: dict[str, Any], paced: boo
 
 @contextmanager
 def opened(options: argparse.Namespace, arguments: dict[str, Any]) -> Iterator[Plant]:
-    """Context of the plant that the options ask for."""
+    """Context of the plant that the options ask for; whatever ends it, the wires are stopped."""
+    with ExitStack() as ports:
+        if options.plant == "sim":
+            plant: Plant = simulated(options, arguments, paced=True)
+        else:
+            plant = LinePlant(*[ports.enter_context(open_serial(device)) for device in _devices(options)])
+        try:
+            yield plant
+        finally:
+            plant.stop()
+
+
+def _devices(options: argparse.Namespace) -> list[str]:
+    """Serial ports of the wires and of the tracker, where it has one of its own; none of a simulated plant."""
     if options.plant == "sim":
-        yield simulated(options, arguments, paced=True)
-        return
-    with open_serial(_device(options.plant)) as wires:
-        if options.tracker is None:
-            yield LinePlant(wires)
-            return
-        with open_serial(_device(options.tracker)) as tracker:
-            yield LinePlant(wires, tracker)
-
-
-def _device(text: str) -> str:
-    if not text.startswith(SERIAL) or text == SERIAL:
-        raise ValueError(f"A plant is sim, or {SERIAL}/dev/... of a serial line, not {text}.")
-    return text.removeprefix(SERIAL)
+        return []
+    ports = [options.plant] if options.tracker is None else [options.plant, options.tracker]
+    for port in ports:
+        if not port.startswith(SERIAL) or port == SERIAL:
+            raise ValueError(f"A plant is sim, or {SERIAL}/dev/... of a serial line, not {port}.")
+    return [port.removeprefix(SERIAL) for port in ports]
 
 
 def plan(options: argparse.Namespace) -> tuple[Policy, Swim, dict[str, Any]]:
@@ -115,8 +121,8 @@ def _swim(name: str, policy: Policy, env: PlantSwim, options: argparse.Namespace
 
 def drive(options: argparse.Namespace) -> int:
     """Plan, ask, drive, and write what came of it; returns the exit code."""
-    if options.plant != "sim":
-        _device(options.plant)
+    if _devices(options) and not options.dry:
+        require_extra("Serial ports", "plant", "serial")
     policy, planned, arguments = plan(options)
     options.out.mkdir(parents=True, exist_ok=True)
     picture = options.out / "plan.png"

@@ -1,19 +1,25 @@
 """`Guard`: what stands between a policy and wires that burn."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.plant.heat import LATENESS, WIRE, Heat
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
-from seastar_gym.scene.number import check_numbers, not_negative, positive
+from seastar_gym.scene.actuators.thermal import ThermalSma
+from seastar_gym.scene.checks import require_flag, require_kind, shown
+from seastar_gym.scene.number import check_numbers, finite, not_negative, positive
 
 POLL = 0.01
 """Time between looks at a plant [s]."""
 FIRST = 2.0
 """Time within which a robot has to be seen at first [s]."""
+MOST_STOOD = 100
+"""Waits after which a clock that has not moved stands still."""
 ROUNDING = 1e-9
 
 
@@ -25,35 +31,81 @@ class Limits:
     shortest_rest: Shortest time between the end of a wire's pulse and its next [s].
     patience: Time without a new sighting after which sight is lost and wires are stopped [s].
     oldest: Age of a picture beyond which sight is lost, too [s].
+    hottest: Temperature that no wire may pass [deg C], see `Heat`.
+    antagonists: Whether the wires + and - of a limb may be heated at once.
+    wire: Whose thermal numbers wires have; None: the scene's `ThermalSma`, or one of default numbers.
     """
 
     longest_pulse: Annotated[float, positive("s")] = 0.12
     shortest_rest: Annotated[float, not_negative("s")] = 0.1
     patience: Annotated[float, positive("s")] = 0.12
     oldest: Annotated[float, positive("s")] = 0.5
+    hottest: Annotated[float, finite("deg C")] = 100.0
+    antagonists: bool = False
+    wire: ThermalSma | None = None
 
     def __post_init__(self) -> None:
         check_numbers(self, "Limits.")
+        require_flag("Limits.antagonists", self.antagonists)
+        if self.wire is not None:
+            require_kind("Limits.wire", self.wire, ThermalSma, "a ThermalSma")
+        water = np.max((self.wire or WIRE).water_temperature)
+        if self.hottest <= water:
+            raise ValueError(f"Limits.hottest must be above the water's {water:g} deg C, not {self.hottest:g}.")
+
+    def heat(self, n_limbs: int, margin: float = 0.0) -> Heat:
+        """Heat of a robot's wires within these limits. margin: See `Heat`: `LATENESS` for whoever asks a plant.
+
+        A plant itself demands `LATENESS` less of rests, so that it takes what it was asked for in time.
+        """
+        return Heat(
+            n_limbs,
+            self.wire or WIRE,
+            hottest=self.hottest,
+            longest_pulse=self.longest_pulse,
+            shortest_rest=max(self.shortest_rest - LATENESS, 0.0) + margin,
+            antagonists=self.antagonists,
+            margin=margin,
+        )
 
 
 class Guard:
-    """Watches a plant: every pulse and every sighting goes through it, and whatever is wrong stops all wires."""
+    """Watches a plant: every pulse and every sighting goes through it, and whatever is wrong stops all wires.
 
-    def __init__(self, plant: Plant, limits: Limits):
+    pulse: Longest pulse that will be asked for [s]; None: the longest one that the limits allow.
+    """
+
+    def __init__(self, plant: Plant, limits: Limits, pulse: float | None = None):
         self.plant, self.limits, self.n_limbs = plant, limits, plant.n_limbs
+        self._pulse = limits.longest_pulse if pulse is None else pulse
         self.held_back: str | None = None
         """Why the plant was stopped, in one sentence; None while it may be heated."""
         self.newest: Sighting | None = None
         self._clock, self._changed_at = plant.now(), plant.now()
-        self._hot_until = np.full((self.n_limbs, 2), -np.inf)
+        self._heat = limits.heat(plant.n_limbs, LATENESS)
+        self._heat.tick(self._clock)
+        self._stood = 0  # waits in which the clock has not moved
+
+    @contextmanager
+    def stops(self) -> Iterator[None]:
+        """Context that stops all wires, for good until `begin`, whatever ends it but its end."""
+        try:
+            yield
+        except PlantError as why:
+            raise self.refuse(str(why)) from None
+        except BaseException as failure:
+            self.refuse(f"The drive was ended by a {type(failure).__name__}: all wires are stopped.")
+            raise
 
     def now(self) -> float:
-        """Time on the plant's clock [s]. PlantError, and stopped wires, where it has jumped."""
-        time = self.plant.now()
-        if not self._clock <= time:
-            raise self.refuse(f"The plant's clock has jumped by {time - self._clock:.3g} s: all wires are stopped.")
-        self._clock = time
-        return time
+        """Time on the plant's clock [s]. PlantError, and stopped wires, where it has gone back."""
+        with self.stops():
+            time = self.plant.now()
+            self._heat.tick(time)
+            if not self._clock <= time:
+                raise PlantError(f"The plant's clock has jumped by {time - self._clock:.3g} s: all wires are stopped.")
+            self._clock = time
+            return time
 
     def refuse(self, sentence: str) -> PlantError:
         """Stop all wires; returns the error to raise."""
@@ -64,9 +116,10 @@ class Guard:
     def begin(self) -> Sighting:
         """Forget what was, and wait for the robot to be seen. PlantError: it is not."""
         self.held_back = self.newest = None
-        self.plant.stop()
-        self._clock = self.plant.now()
-        until = self._clock + FIRST
+        with self.stops():
+            self.plant.stop()
+            self._clock = self.plant.now()
+        until = self.now() + FIRST
         while True:
             seen, now = self._ask()
             if seen is not None and now - seen.captured_at <= self.limits.oldest:
@@ -74,14 +127,20 @@ class Guard:
                 return seen
             if now > until:
                 raise self.refuse(f"The tracker has not seen the robot for {FIRST:g} s: all wires are stopped.")
-            self.plant.wait(POLL)
+            self._wait(POLL)
 
     def _ask(self) -> tuple[Sighting | None, float]:
         """The newest sighting, and the time now [s]."""
-        try:
+        with self.stops():
             return self.plant.sight(), self.now()
-        except PlantError as broken:
-            raise self.refuse(str(broken)) from None
+
+    def _wait(self, seconds: float) -> None:
+        with self.stops():
+            before = self._clock
+            self.plant.wait(seconds)
+            self._stood = 0 if self.now() > before else self._stood + 1
+            if self._stood > MOST_STOOD:
+                raise PlantError("The plant's clock stands still: all wires are stopped.")
 
     def look(self) -> Sighting | None:
         """The newest sighting; PlantError, and stopped wires, if sight is lost or cannot be."""
@@ -111,22 +170,27 @@ class Guard:
         """Wait until a time [s], looking all the while."""
         self.look()
         while (left := time - self.now()) > ROUNDING:
-            self.plant.wait(min(POLL, left))
+            self._wait(min(POLL, left))
             self.look()
 
     def resting(self) -> NDArray[np.bool_]:
-        """Wires that may not be heated yet, for + and -, shape (n_limbs, 2)."""
-        return np.asarray(self.plant.now() < self._hot_until + self.limits.shortest_rest - ROUNDING)
+        """Wires that may not be heated by a full pulse now, for + and -, shape (n_limbs, 2)."""
+        with self.stops():
+            self._heat.tick(self.plant.now())
+        return self._heat.resting(self._pulse)
 
     def heat(self, limbs: Sequence[int], seconds: float) -> None:
-        """Heat wires as `Plant.heat`. PlantError, and stopped wires, for a pulse that is too long or comes too soon."""
-        self.look()
-        longest = self.limits.longest_pulse
-        if not 0.0 <= seconds <= longest * (1.0 + ROUNDING):
-            raise self.refuse(f"A pulse must be from 0 to {longest:g} s, not {seconds:.3g} s: all wires are stopped.")
-        wires = np.array([[sign > 0, sign < 0] for sign in limbs])
-        if (wires & self.resting()).any():
-            rest = self.limits.shortest_rest
-            raise self.refuse(f"A wire was to be heated within {rest:g} s of its last pulse: all wires are stopped.")
-        self.plant.heat(limbs, seconds)
-        self._hot_until[wires] = self.plant.now() + seconds
+        """Heat wires as `Plant.heat`. PlantError, and stopped wires, for a pulse that the limits do not allow."""
+        with self.stops():
+            self.look()
+            if len(limbs) != self.n_limbs or not {*limbs} <= {-1, 0, 1}:
+                raise PlantError(f"Wires are 1, 0 or -1 for {self.n_limbs} limbs, not {shown(limbs)}.")
+            signs = np.asarray(limbs)
+            wires = np.stack([signs > 0, signs < 0], axis=-1)
+            if why := self._heat.refusal(wires, seconds):
+                raise PlantError(f"{why}: all wires are stopped.")
+            try:
+                self.plant.heat(limbs, seconds)
+            finally:
+                self._heat.tick(self.plant.now())
+                self._heat.heat(wires, seconds)

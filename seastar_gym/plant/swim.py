@@ -1,8 +1,8 @@
 """`PlantSwim`: the environment in which policies drive a plant."""
 
-import contextlib
 import math
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from seastar_gym.envs.tracker import Pictures, Tracker
 from seastar_gym.plant.guard import Guard, Limits
 from seastar_gym.plant.logs import Logs
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
+from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.checks import require_file, require_kind, shown
 from seastar_gym.simulator import StrokeReport
 from seastar_gym.simulator.pauses import pausing
@@ -48,7 +49,14 @@ class PlantTask(SwimTask):
         if plant.n_limbs != self.scene.robot.n_limbs:
             raise ValueError(f"The plant has {plant.n_limbs} limbs, the scene's robot {self.scene.robot.n_limbs}.")
         self._can_be_masked = True
-        self.guard = Guard(plant, limits)
+        if limits.wire is None and isinstance(self.scene.actuator, ThermalSma):
+            limits = replace(limits, wire=self.scene.actuator)
+        if (reached := limits.heat(1).from_cold(self.pulse)) > limits.hottest:
+            raise ValueError(
+                f"A full command heats a cold wire to {reached:.0f} deg C, the guard allows {limits.hottest:g} deg C: "
+                "use an actuator with a shorter heating_time, or other Limits."
+            )
+        self.guard = Guard(plant, limits, self.pulse)
         self._folder = logs
         self.logs: Logs | None = None
         self.stopped = ""
@@ -60,7 +68,8 @@ class PlantTask(SwimTask):
     def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
         """Begin an episode where the robot lies. PlantError: it is not seen."""
         self.stopped, self._late, self.latest, self._noted = "", 0.0, 0.0, -math.inf
-        self._open_logs()
+        with self.stopped_if_interrupted():
+            self._open_logs()
         seen = self._origin = self.guard.begin()
         super().reset(robots, generators, asked)
         self.simulator.reset(heading=seen.pose[2])
@@ -120,7 +129,7 @@ class PlantTask(SwimTask):
         """One decision, on the plant's clock; yields the time since it began [s] after about every time step."""
         n_steps = math.ceil(self.decision_period / self.scene.numerics.step)
         steps = self.simulator.advance_in_parts(self.decision_period, commands, n_steps)
-        with self._stopped_if_interrupted():
+        with self.stopped_if_interrupted():
             self._attempt(lambda: self._begin_decision(commands[0]))
             planned = self._begun + float(self.simulator.time[0])
 
@@ -133,8 +142,9 @@ class PlantTask(SwimTask):
         self._put_where_seen()
         return report
 
-    @contextlib.contextmanager
-    def _stopped_if_interrupted(self) -> Generator[None]:
+    @contextmanager
+    def stopped_if_interrupted(self) -> Iterator[None]:
+        """Context that stops all wires, whatever ends it but its end."""
         try:
             yield
         except BaseException:
@@ -246,13 +256,16 @@ class PlantSwim(SeastarSwimEnv):
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Swim for one decision; returns observation, reward, terminated, truncated and info."""
-        observation, reward, terminated, _, info = super().step(action)
+        with self._plant_task.stopped_if_interrupted():
+            observation, reward, terminated, _, info = super().step(action)
         truncated = bool(info["plant_message"])
         self._running = self._running and not truncated
         return observation, reward, terminated, truncated, info
 
     def close(self) -> None:
         """Stop the plant, and close its logs and the window."""
-        self._plant_task.guard.plant.stop()
-        self._plant_task.close_logs()
-        super().close()
+        try:
+            self._plant_task.guard.plant.stop()
+        finally:
+            self._plant_task.close_logs()
+            super().close()

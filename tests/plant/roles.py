@@ -15,6 +15,7 @@ from seastar_gym.plant.swim import PlantSwim
 
 PULSE = 2.0
 """Length of pulses that go on for long unless somebody stops them [s]."""
+LIMITS = Limits(PULSE, 0.0, hottest=1000.0)
 SCENE = Scene(actuator=SmaWires(heating_time=PULSE)).at("fast")
 
 
@@ -22,7 +23,7 @@ def heat(wires: str, tracker: str, hot: str) -> None:
     """Simulated wires; writes the times at which they are heated [s] into a file."""
     Simulator(SCENE).advance(0.5)  # which compiles
     plant = SimulatedPlant(Simulator(SCENE), Sight(delay=0.05), paced=True)
-    server = Server(plant, FileIO(int(wires), "r+"), FileIO(int(tracker), "w"))
+    server = Server(plant, FileIO(int(wires), "r+"), FileIO(int(tracker), "w"), LIMITS)
     with open(hot, "w", encoding="utf-8") as times:
         print("ready", flush=True)
         while True:
@@ -42,7 +43,7 @@ def drive(wires: str, tracker: str) -> None:
     """Heat all limbs whenever they have rested, as long as the plant goes."""
     Simulator(SCENE).advance(0.5)
     plant = LinePlant(FileIO(int(wires), "r+"), FileIO(int(tracker), "r"))
-    env = PlantSwim(plant, Limits(PULSE, 0.0), scene=SCENE, decision_period=0.5, actions="continuous")
+    env = PlantSwim(plant, LIMITS, scene=SCENE, decision_period=0.5, actions="continuous")
     env.reset()
     while True:
         *_, truncated, info = env.step(np.ones(5, np.float32))

@@ -9,6 +9,7 @@ import threading
 import time
 import tty
 from collections import deque
+from io import FileIO
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,19 +17,22 @@ import numpy as np
 import pytest
 
 from evaluation import made_up
+from faults import LIES
 from refusals import assert_refused, assert_told
 from seastar_gym import DomainRandomization, Scene, Seastar, Sight, Simulator, SmaPulse, SmaWires, Uniform, files
+from seastar_gym.cli import drive as drive_command
 from seastar_gym.cli.drive import report
 from seastar_gym.cli.main import main
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.description import Description
+from seastar_gym.controllers.scripted import OpenLoopPolicy
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.identify.measurement import Measurement
 from seastar_gym.identify.trajectories import trajectory
 from seastar_gym.plant import lines
 from seastar_gym.plant.guard import FIRST, Guard, Limits
-from seastar_gym.plant.lines import LineError, LinePlant, Server, opened, sealed
+from seastar_gym.plant.lines import LineError, LinePlant, Server, open_serial, opened, sealed
 from seastar_gym.plant.logs import nodes_of
 from seastar_gym.plant.plant import PlantError, Sighting
 from seastar_gym.plant.simulated import SimulatedPlant
@@ -106,13 +110,14 @@ def test_whatever_is_wrong_stops_all_wires_for_good(words):
         guard.heat([1, 0, 0, 0, 0], 0.01)
     assert len(plant.pulses) == 1
     guard.begin()
+    guard.wait_until(plant.time + 0.2)
     guard.heat([1, 0, 0, 0, 0], 0.01)
 
 
 def test_pulses_are_as_short_and_wires_rest_as_long_as_they_have_to():
     plant, guard = guarded(longest_pulse=0.1, shortest_rest=0.2)
     guard.heat([1, -1, 0, 0, 0], 0.1)
-    assert guard.resting().sum() == 2 and guard.resting()[0, 0] and guard.resting()[1, 1]
+    assert guard.resting().tolist() == [[True, True], [True, True], *[[False, False]] * 3]
     guard.wait_until(0.25)
     guard.heat([-1, 1, 0, 0, 0], 0.1)  # the other wires
     with pytest.raises(PlantError, match=r"within 0\.2 s of its last pulse"):
@@ -125,6 +130,37 @@ def test_pulses_are_as_short_and_wires_rest_as_long_as_they_have_to():
             guard.heat([1, 0, 0, 0, 0], seconds)
         guard.begin()
     assert len(plant.pulses) == 2 and plant.stops >= 4
+
+
+def test_a_clock_that_stands_still_stops_the_wires(monkeypatch):
+    plant, guard = guarded()
+    monkeypatch.setattr(plant, "wait", lambda _: None)
+    for wait in (lambda: guard.wait_until(plant.time + 0.1), guard.begin):
+        monkeypatch.setattr(plant, "sight", plant.sight if guard.held_back is None else lambda: None)
+        plant.stops = 0
+        with pytest.raises(PlantError, match="clock stands still"):
+            wait()
+        assert plant.stops
+
+
+@pytest.mark.parametrize("error", [OSError(5, "gone"), KeyboardInterrupt(), MemoryError(), OverflowError("inf")])
+@pytest.mark.parametrize("name", ["now", "sight", "wait", "heat"])
+def test_whatever_ends_a_look_or_a_pulse_stops_all_wires_for_good(name, error, monkeypatch):
+    plant, guard = guarded()
+    guard.heat([1, 0, 0, 0, 0], 0.1)
+    plant.stops = 0
+
+    def fail(*_):
+        raise error
+
+    with monkeypatch.context() as patch:
+        patch.setattr(plant, name, fail)
+        with pytest.raises(type(error)):
+            guard.wait_until(plant.time + 0.05), guard.heat([0, 1, 0, 0, 0], 0.1)
+    assert plant.stops >= 1
+    plant.time += 1.0
+    with pytest.raises(PlantError, match=f"by a {type(error).__name__}"):
+        guard.heat([0, 1, 0, 0, 0], 0.1)
 
 
 # Lines
@@ -180,21 +216,31 @@ def test_a_plant_is_heated_and_seen_over_a_line(ends):
     assert theirs.markers.shape == (5, 1, 2)
 
 
-def test_silence_and_bad_lines_stop_the_wires(ends):
+@pytest.mark.parametrize("bad", LIES)
+def test_bad_lines_stop_the_wires(bad, ends):
     plant = simulated()
     far, server = joined(ends, plant)
-    for bad in (b"heat 80 +0000\n", sealed("heat 80 +000"), sealed("heat -1 +0000"), sealed("fly"), b"\xff\n",
-                sealed("heat 999 +0000"), b"x" * 5000):  # fmt: skip
-        far.heat([1, 1, 1, 1, 1], 0.08)
+    far.heat([1, 1, 1, 1, 1], 0.08)
+    server.turn(), plant.wait(0.01)
+    assert plant.heated()[:, 0].all()
+    ends[1].send(bad)
+    server.turn()
+    assert not plant.heated().any()
+    with pytest.raises(PlantError, match=r"The plant has (stopped: .*\.|restarted.*)$") as refused:
+        far.sight()
+    assert "\n" not in str(refused.value)
+    for _ in range(20):
         server.turn(), plant.wait(0.01)
-        assert plant.heated()[:, 0].all()
-        ends[1].send(bad)
-        server.turn()
-        assert not plant.heated().any()
-        with pytest.raises(PlantError, match="The plant has stopped: ") as refused:
-            far.sight()
-        assert str(refused.value).endswith(".") and "\n" not in str(refused.value)
-        server.turn()
+    ends[1].send(b"\n" + sealed("beat"))  # which ends what has no end
+    server.turn(), server.turn()
+    far.heat([0, 1, 0, 0, 0], 0.08)
+    server.turn(), plant.wait(0.01)
+    assert plant.heated().any() == (b"hello 2" not in bad)
+
+
+def test_silence_stops_the_wires(ends):
+    plant = simulated()
+    far, server = joined(ends, plant)
     far.heat([1, 0, 0, 0, 0], 0.08)
     server.turn(), plant.wait(0.005)
     assert plant.heated().any()
@@ -203,18 +249,91 @@ def test_silence_and_bad_lines_stop_the_wires(ends):
     assert not plant.heated().any()
 
 
+def test_a_driver_that_sends_without_end_does_not_keep_the_plant(ends):
+    plant = simulated()
+    plant.heat([1, 0, 0, 0, 0], 0.08)
+    with FileIO("/dev/zero", "r+") as flood:
+        server = Server(plant, flood)
+        server.turn(), server.turn()
+    assert not plant.heated().any()
+
+
+@pytest.mark.parametrize("error", [OSError(5, "gone"), KeyboardInterrupt(), MemoryError(), SystemExit()])
+def test_whatever_ends_a_plant_s_loop_stops_the_wires(error, ends, monkeypatch):
+    plant = simulated()
+    plant.heat([1, 0, 0, 0, 0], 0.08), plant.wait(0.01)
+
+    def fail():
+        raise error
+
+    monkeypatch.setattr(plant, "sight", fail)
+    with pytest.raises(type(error)):
+        lines.serve(plant, ends[0])
+    assert not plant.heated().any()
+    monkeypatch.undo()
+    plant.heat([0, 1, 0, 0, 0], 0.08)
+    lines.serve(plant, ends[0], seconds=0.02)
+    assert not plant.heated().any()
+
+
+def test_a_board_that_restarts_when_its_port_is_opened_is_greeted(ends):
+    """It says hello when it begins to hear; what earlier drives have left on the line is dropped."""
+    ends[0].send(b"garbled" + sealed("hello 1 7") + sealed("error It burns.") + sealed("hello 1 5"))
+    plant, over, servers = simulated(Sight(delay=0.05)), threading.Event(), []
+
+    def board():
+        time.sleep(0.5)
+        ends[0].recv(65536)
+        servers.append(Server(plant, ends[0]))
+        while not over.is_set():
+            servers[0].turn(), time.sleep(0.002)
+
+    thread = threading.Thread(target=board)
+    thread.start()
+    far = LinePlant(ends[1], clock=plant.now)
+    over.set(), thread.join()
+    assert far.n_limbs == 5
+    far.heat([1, 0, 0, 0, 0], 0.08), servers[0].turn(), plant.wait(0.01)
+    assert plant.heated().any()
+    far.sight()
+    restarted = Server(plant, ends[0])
+    with pytest.raises(PlantError, match="has restarted"):
+        far.sight()
+    restarted.turn()
+    assert not plant.heated().any()
+
+
+def test_pulses_that_waited_for_a_busy_plant_are_not_heated(ends):
+    plant = simulated()
+    far, server = joined(ends, plant)
+    far.heat([1, 0, 0, 0, 0], 0.08), plant.wait(0.3), server.turn()
+    assert not plant.heated().any()
+    with pytest.raises(PlantError, match="The plant was busy"):
+        far.sight()
+
+
+@pytest.mark.parametrize("seconds", [np.nan, np.inf, -0.01, 1e300])
+def test_a_line_asks_for_no_pulse_that_cannot_be(seconds, ends):
+    far, _ = joined(ends, simulated())
+    with assert_refused("A pulse must be from 0 to 10 s"):
+        far.heat([1, 0, 0, 0, 0], seconds)
+
+
 @pytest.mark.parametrize(
     "said, words",
     [("hello 2 5", "speaks version 2"), ("sight 1 2 3", "needs numbers"), ("sight 1 2 3 four", "needs numbers"),
      ("sight 1 2 3 4 5 6", "do not suit 5 limbs"), ("error It burns.", "The plant has stopped: It burns."),
-     ("what", "says no 'what'"), ("hello 1 0", "speaks version 1")],
+     *((f"sight {number} 0 0 0", "needs numbers") for number in
+       ("nan", "inf", "1e999", "1_0", "0x1", "9" * 400, "١", "+1", "1e")),
+     ("sight 1 0 0 0 inf 0 0 0 0 0 0 0 0 0", "need to be numbers"), (f"hello 1 {'9' * 5000}", "more than 4096 bytes"),
+     ("what", "says no 'what'"), ("hello 1 0", "speaks version 1"), ("hello 1 5", "has restarted")],
 )  # fmt: skip
 def test_what_a_driver_does_not_understand_is_said_in_a_sentence(said, words, ends):
     far, _ = joined(ends, simulated())
     ends[0].send(sealed(said))
     with pytest.raises(PlantError, match=words) as refused:
         far.sight()
-    assert str(refused.value).endswith(".") or said == "hello 1 0"
+    assert str(refused.value).endswith(".")
 
 
 def test_a_line_that_is_closed_or_full_is_said_to_be(ends, monkeypatch):
@@ -276,6 +395,28 @@ def test_a_plant_that_stops_truncates_the_episode_and_one_that_sees_no_robot_beg
     with pytest.raises(PlantError, match=f"not seen the robot for {FIRST:g} s"):
         PlantSwim(plant, **OPTIONS).reset()
     assert plant.stops >= 2
+
+
+@pytest.mark.parametrize("where", ["sight", "hub_position", "action"])
+def test_whatever_ends_a_step_stops_the_wires(where, monkeypatch):
+    plant = simulated()
+    env = PlantSwim(plant, **OPTIONS)
+    env.reset()
+    plant.heat([1, 0, 0, 0, 0], 0.08), plant.wait(0.01)
+    assert plant.heated().any()
+
+    def fail(*_):
+        raise KeyboardInterrupt
+
+    if where != "action":
+        monkeypatch.setattr(
+            *((plant, "sight") if where == "sight" else (env.unwrapped.simulator, "hub_position")), fail
+        )
+    with pytest.raises((KeyboardInterrupt, ValueError)):
+        env.step(99 if where == "action" else 3)
+    monkeypatch.undo()
+    assert not plant.heated().any()
+    env.close()
 
 
 def test_late_decisions_make_the_clock_wait_and_wires_that_have_to_rest_are_masked():
@@ -396,6 +537,26 @@ def test_a_simulated_drive_is_planned_driven_and_reported(tmp_path, capsys):
     assert measured.commands.tolist() == [[0, 1, 0, 0, -1], [0] * 5] * 2 and len(measured.nodes) == 6
 
 
+def test_an_interrupted_drive_stops_the_wires(tmp_path, monkeypatch):
+    plants, make = [], drive_command.simulated
+
+    def simulated(*arguments, **options):
+        plants.append(make(*arguments, **options))
+        return plants[-1]
+
+    def predict(policy, observation, *_, **__):
+        if not plants[-1].heated().any() and len(plants) > 2:
+            plants[-1].heat([1, 0, 0, 0, 0], 0.1)
+            raise KeyboardInterrupt
+        return np.zeros(5, int), None
+
+    monkeypatch.setattr(drive_command, "simulated", simulated)
+    monkeypatch.setattr(OpenLoopPolicy, "predict", predict)
+    with pytest.raises(KeyboardInterrupt):
+        drive(tmp_path, "--yes")
+    assert not plants[-1].heated().any()
+
+
 def test_the_report_of_a_drive_is_as_kept(golden, tmp_path):
     (tmp_path / "poses.csv").write_text("captured,received,x,y,turn\n0,0.05,0,0,0\n0.03,0.09,0,0,0\n0.13,0.17,0,0,0\n")
     options = SimpleNamespace(out=tmp_path, policy="straight", plant="serial:/dev/ttyACM0", decision_period=0.5)
@@ -440,6 +601,18 @@ def test_a_drive_over_a_serial_line(tank, tmp_path, capsys):
     assert drive(tmp_path / "second", "--yes", "--plant", line, "--seconds", "20") == 1
     killer.join(10.0)
     assert "No new picture for 0.12 s: all wires are stopped." in capsys.readouterr().out
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="There are no pseudo-terminals here.")
+def test_a_port_has_one_driver_and_one_that_is_full_is_no_hang():
+    ours, theirs = os.openpty()
+    with open_serial(os.ttyname(theirs)) as port:
+        with pytest.raises(PlantError, match=r"is driven by another program\.$"):
+            open_serial(os.ttyname(theirs))
+        talk = lines.Lines(port)
+        with pytest.raises(PlantError, match="takes no more lines"):
+            deque((talk.send("beat") for _ in range(100_000)), maxlen=0)
+    os.close(ours), os.close(theirs)
 
 
 @pytest.mark.parametrize(
