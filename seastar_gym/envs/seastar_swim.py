@@ -254,9 +254,11 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     frames_per_stroke: Number of pictures of a decision, at equal intervals; the last shows its end. None means ten per
         second of simulated time, and one at least.
 
+    `path`, `random_heading`, `reward` and `waypoint_radius` can be changed later, as in a curriculum, by
+    `env.unwrapped.path = ...` or `set_attr` of a batch, and hold from the next episode on. Other arguments are refused.
     `scene`, `reward`, `randomization`, `headings` and `sight` may be given as plain data, as written by
-    `Scene.to_dict` and `seastar_gym.scene.serial.to_dict`. `env.spec` stores this form, so
-    `gym.make(EnvSpec.from_json(env.spec.to_json()))` is the same environment.
+    `Scene.to_dict` and `seastar_gym.scene.serial.to_dict`, in any mappings and sequences. `env.spec` stores this form,
+    so `gym.make(EnvSpec.from_json(env.spec.to_json()))` is the same environment.
     """
 
     metadata = {"render_modes": ["human", "rgb_array", "rgb_array_list"], "render_fps": FRAMES_PER_SECOND}

@@ -174,8 +174,8 @@ class Swimming(ABC):
         if name not in self.per_episode:
             known = ", ".join(self.per_episode) or "nothing"
             raise ValueError(
-                f"{name} belongs to what this environment was made of: make another one with the {name} that you want. "
-                f"From the next episode on, {known} can be changed."
+                f"This environment was made with its {name}, so make another one with another {name}: only {known} can "
+                "be changed, from the next episode on."
             )
         made: dict[tuple[int, int], SwimOptions] = {}
         for options, value in zip(self.options_of, values, strict=True):

@@ -84,7 +84,9 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         disable_env_checker: bool | None = None,
         **options: Any,
     ):
-        self._set_batch(num_envs, max_episode_steps, render_mode, autoreset_mode, threads, frames_per_stroke)
+        self._set_batch(
+            num_envs, max_episode_steps, render_mode, autoreset_mode, threads, frames_per_stroke, disable_env_checker
+        )
         require_flag("on_device", on_device)
         self.on_device = bool(on_device)
         task = SwimTask(SwimOptions(*given, **options), num_envs, threads)
@@ -102,6 +104,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         autoreset_mode: AutoresetMode | str,
         threads: int | None = None,
         frames_per_stroke: int | None = None,
+        disable_env_checker: bool | None = None,
     ) -> None:
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
@@ -109,6 +112,8 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
                 "use gym.make for one robot."
             )
         require_count("num_envs", num_envs, 1, MAX_ROBOTS)
+        if disable_env_checker is not None:
+            require_flag("disable_env_checker", disable_env_checker)
         if frames_per_stroke is not None:
             require_count("frames_per_stroke", frames_per_stroke, 1, MOST_ASKED_FRAMES)
         self.num_envs, self.threads, self.frames_per_stroke = num_envs, threads, frames_per_stroke

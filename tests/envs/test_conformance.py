@@ -329,6 +329,77 @@ def test_make_vec_takes_its_own_arguments_for_one_robot_as_for_many(id, forms):
     assert batch.metadata["render_fps"] == singles.metadata["render_fps"]
 
 
+# Arguments that are set later, as in a curriculum
+
+
+LATER = {"path": "figure-eight", "random_heading": True, "waypoint_radius": 0.05, "reward": RewardWeights(100.0, 2.0)}
+"""Arguments of `SeastarSwim-v0` that hold from the next episode on, and another value of each."""
+WAYS = {
+    "unwrapped": lambda env, name, value: setattr(env.unwrapped, name, value),
+    "wrapped": lambda env, name, value: env.set_wrapper_attr(name, value),
+    "a batch": lambda env, name, value: env.set_attr(name, value),
+    "each of a batch": lambda env, name, value: env.set_attr(name, [value] * env.num_envs),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("id", [SWIM, "SeastarPrey-v0"])
+def test_every_argument_that_is_set_later_holds_from_the_next_episode_on_or_is_refused(id, way):
+    """One that is refused changes nothing."""
+
+    def new(**more):
+        make = gym.make_vec if "batch" in way else gym.make
+        return make(id, **{"num_envs": 2} if "batch" in way else {}, fidelity="fast", **more)
+
+    env, twin = new(), new()
+    assert_alike(env.reset(seed=0), twin.reset(seed=0), "the first episode")
+    for name in inspect.signature(type(env.unwrapped)).parameters:
+        if name in LATER or name == "max_episode_steps":
+            continue
+        with assert_refused(name):
+            WAYS[way](env, name, getattr(env.unwrapped, name, None))
+    action = env.action_space.sample()
+    assert_alike(env.step(action), twin.step(action), "what was refused")
+    for name, value in LATER.items() if id == SWIM else ():
+        fresh = new(**{name: value})
+        WAYS[way](env, name, value)
+        np.testing.assert_equal(np.asarray(getattr(env.unwrapped, name)), np.asarray(getattr(fresh.unwrapped, name)))
+        assert_alike(env.step(action), twin.step(action), f"the present episode without {name}")
+        for one in (env, fresh):
+            one.action_space.seed(0)
+        assert_alike(env.reset(seed=1), fresh.reset(seed=1), f"the next episode with {name}")
+        for _ in range(2):
+            action = env.action_space.sample()
+            assert_alike(env.step(action), fresh.step(action), f"the next episode with {name}")
+        with assert_refused():
+            WAYS[way](env, name, "no such thing")
+        env, twin = new(), new()
+        assert_alike(env.reset(seed=0), twin.reset(seed=0), "another first episode")
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_robots_of_a_batch_begin_their_next_episodes_by_what_each_was_asked_for(mode):
+    """In the middle of episodes that end at different times, as single environments do."""
+    batch, singles = both(SWIM, 3, mode, max_episode_steps=3, fidelity="fast", render_mode="rgb_array")
+    values = {"path": ["line", SHORT, "random"], "waypoint_radius": [0.01, 0.0085, 0.02], "random_heading": True,
+              "reward": [RewardWeights(aim=aim) for aim in (0.0, 0.5, 1.0)]}  # fmt: skip
+    for env in (batch, singles):
+        env.reset(seed=0)
+        env.reset(options={"reset_mask": np.array([False, True, False])})
+    singles.action_space.seed(0)
+    for step in range(9):
+        actions = singles.action_space.sample()
+        assert_alike(batch.step(actions), singles.step(actions), f"step {step}")
+        for env in (batch, singles) if step == 0 else ():
+            for name, value in values.items():
+                env.set_attr(name, value)
+        for name in values:
+            np.testing.assert_equal(batch.get_attr(name), singles.get_attr(name))
+    assert_alike(batch.render(), singles.render(), "pictures")
+    batch.set_attr("max_episode_steps", 1)
+    assert not batch.step(actions)[3].all() and batch.reset() and batch.step(actions)[3].all()
+
+
 # Every episode
 
 

@@ -157,7 +157,9 @@ class SeastarTaskVectorEnv(SeastarSwimVectorEnv):
         frames_per_stroke: int | None = None,
         disable_env_checker: bool | None = None,
     ):
-        self._set_batch(num_envs, max_episode_steps, render_mode, autoreset_mode, threads, frames_per_stroke)
+        self._set_batch(
+            num_envs, max_episode_steps, render_mode, autoreset_mode, threads, frames_per_stroke, disable_env_checker
+        )
         self.challenge, self.task, self.split = read_challenge(task), task, split
         options = _options(actions, fidelity, decision_period, sight, action_delay)
         self._begin_with(self.challenge.swimming(options, num_envs, threads, split))
