@@ -116,7 +116,8 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
             require_flag("disable_env_checker", disable_env_checker)
         if frames_per_stroke is not None:
             require_count("frames_per_stroke", frames_per_stroke, 1, MOST_ASKED_FRAMES)
-        self.num_envs, self.threads, self.frames_per_stroke = num_envs, threads, frames_per_stroke
+        self.num_envs, self.threads = num_envs, threads
+        self.frames_per_stroke, self.disable_env_checker = frames_per_stroke, disable_env_checker
         self._limit_episodes(max_episode_steps)
         self.autoreset_mode = _checked_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
