@@ -22,7 +22,7 @@ from seastar_gym.envs.seastar_swim import FRAMES_PER_SECOND, MOST_ASKED_FRAMES, 
 from seastar_gym.envs.swimming import Swimming
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.task_env import arguments_of, checked_options
-from seastar_gym.scene.checks import require_choice, require_count, require_flag, require_seed, shown
+from seastar_gym.scene.checks import is_whole_number, require_choice, require_count, require_flag, require_seed, shown
 from seastar_gym.simulator.simulator import MAX_ROBOTS
 
 Observations = NDArray[np.float32]
@@ -124,7 +124,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         self.render_mode = render_mode
 
     def _limit_episodes(self, decisions: int | None) -> None:
-        if decisions == -1:
+        if is_whole_number(decisions) and decisions == -1:
             decisions = None
         if decisions is not None:
             require_count("max_episode_steps", decisions, 1, LONGEST)
@@ -309,7 +309,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
 
 def checked_seeds(seed: object, n_robots: int) -> list[int | None]:
     """Seeds of all robots: one number and those that follow it, or a sequence with one for each."""
-    if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str | bytes) and np.shape(seed) != ():
+    if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str | bytes) and getattr(seed, "ndim", 1):
         if len(seed) != n_robots:
             raise ValueError(f"seed must be one number or {n_robots} of them, not {len(seed)}.")
         for one in seed:
