@@ -34,7 +34,7 @@ class SwimTask(Swimming):
     """
 
     TERMS: tuple[str, ...] = ("reward_progress", "reward_waypoint", "reward_effort")
-    per_episode = ("path", "random_heading", "reward", "waypoint_radius")
+    per_episode: tuple[str, ...] = ("path", "random_heading", "reward", "waypoint_radius")
     goals_are_waypoints = True
 
     def __init__(self, options: SwimOptions, n_robots: int, threads: int | None, *, effort: bool = False):

@@ -309,7 +309,9 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
 
 def checked_seeds(seed: object, n_robots: int) -> list[int | None]:
     """Seeds of all robots: one number and those that follow it, or a sequence with one for each."""
-    if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str | bytes) and getattr(seed, "ndim", 1):
+    if isinstance(seed, np.ndarray) and seed.ndim > 0:
+        seed = list(seed)
+    if isinstance(seed, Sequence) and not isinstance(seed, str | bytes):
         if len(seed) != n_robots:
             raise ValueError(f"seed must be one number or {n_robots} of them, not {len(seed)}.")
         for one in seed:
