@@ -172,11 +172,9 @@ class Swimming(ABC):
         values: One for each robot. ValueError, and nothing changes: one of them, or the option, cannot be changed.
         """
         if name not in self.per_episode:
-            known = ", ".join(self.per_episode) or "nothing"
-            raise ValueError(
-                f"This environment was made with its {name}, so make another one with another {name}: only {known} can "
-                "be changed, from the next episode on."
-            )
+            known = ", ".join(self.per_episode)
+            others = f", or change {known}, which hold from the next episode on" if known else ""
+            raise ValueError(f"This environment was made with its {name}: make another one with another{others}.")
         made: dict[tuple[int, int], SwimOptions] = {}
         for options, value in zip(self.options_of, values, strict=True):
             if (id(options), id(value)) not in made:
