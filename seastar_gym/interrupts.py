@@ -1,6 +1,6 @@
-"""Ctrl-C while numba is imported, compiles or loads code: it waits until that is done.
+"""Ctrl-C while numba is imported, compiles or loads code, and while scipy or pygame are imported: it waits meanwhile.
 
-An import or a compilation that is broken off would leave numba half taught, and the process without a simulator.
+An import or a compilation that is broken off leaves libraries half there, and the process without a simulator.
 """
 
 import contextlib
