@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
+from seastar_gym.envs.batch_attributes import robot_by_robot
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 
 Info = dict[str, Any]
@@ -143,10 +144,10 @@ class BatchVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Call the batch's method, once; its result, once for every robot asked for. Masks are robot by robot."""
+        """Call the batch's method, once; what every robot asked for has of its result, see `robot_by_robot`."""
         result = getattr(self._owner(method_name), method_name)(*method_args, **method_kwargs)
-        robots = list(self._get_indices(indices))
-        return [result[robot] for robot in robots] if method_name == "action_masks" else [result] * len(robots)
+        of_all = robot_by_robot(method_name, result, self.num_envs)
+        return [of_all[robot] for robot in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: VecEnvIndices = None) -> list[bool]:
         """Whether the batch is wrapped so; a Monitor counts as present, because its statistics are."""

@@ -1,5 +1,6 @@
 """Wrapper that keeps what a batch does, as Minari's `DataCollector` does for one environment."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import gymnasium as gym
@@ -14,9 +15,6 @@ if TYPE_CHECKING:
     _VectorWrapper = gym.vector.VectorWrapper[Any, Any, Any, Any, Any]
 else:
     _VectorWrapper = gym.vector.VectorWrapper
-
-LEFT_OUT = ("solver_message",)
-"""Entries of info that are not kept: texts, for which others have a number."""
 
 
 class Episode(NamedTuple):
@@ -58,7 +56,7 @@ class Recorder(_VectorWrapper):
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin episodes of all robots."""
-        if isinstance(options, dict) and "reset_mask" in options:
+        if isinstance(options, Mapping) and "reset_mask" in options:
             raise ValueError("A recorder begins episodes of all robots: leave reset_mask out.")
         observations, info = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
         self._seeds = checked_seeds(seed, self.num_envs)
@@ -80,9 +78,7 @@ class Recorder(_VectorWrapper):
 
     def _keep(self, row: tuple[Any, ...], info: dict[str, Any]) -> None:
         self._rows.append(row)
-        self._infos.append(
-            {name: values for name, values in info.items() if not name.startswith("_") and name not in LEFT_OUT}
-        )
+        self._infos.append({name: values for name, values in info.items() if not name.startswith("_")})
 
     def episodes(self, only_first: bool = False) -> list[Episode]:
         """Episodes that are finished, in the order in which they ended.

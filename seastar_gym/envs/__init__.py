@@ -6,17 +6,28 @@ asks for headings, and the tasks of `seastar_gym.envs.tasks`.
 
 from typing import TYPE_CHECKING, Any
 
-from gymnasium.envs.registration import register
+from gymnasium.envs.registration import EnvSpec, register, registry
 
 if TYPE_CHECKING:
     from seastar_gym.envs.commands import Actions
 
-_ENTRY_POINTS: dict[str, Any] = {
-    "entry_point": "seastar_gym.envs.seastar_swim:SeastarSwimEnv",
-    "vector_entry_point": "seastar_gym.envs.vector:SeastarSwimVectorEnv",
-}
-register(id="SeastarSwim-v0", max_episode_steps=400, **_ENTRY_POINTS)
-register(id="SeastarSwimContinuous-v0", max_episode_steps=400, kwargs={"actions": "continuous"}, **_ENTRY_POINTS)
+
+def _register(id: str, home: str = "seastar_gym.envs.vector", name: str = "SeastarSwim", **facts: Any) -> None:
+    """Register an id, unless it is, as when this module is loaded again.
+
+    Gymnasium's passive checker is left out: after a first reset that is refused or interrupted, it fails at every step.
+    """
+    single = home.replace("vector", "seastar_swim")
+    facts |= {
+        "entry_point": f"{single}:{name}Env", "vector_entry_point": f"{home}:{name}VectorEnv",
+        "disable_env_checker": True,
+    }  # fmt: skip
+    if registry.get(id) != EnvSpec(id=id, **facts):
+        register(id=id, **facts)
+
+
+_register("SeastarSwim-v0", max_episode_steps=400)
+_register("SeastarSwimContinuous-v0", max_episode_steps=400, kwargs={"actions": "continuous"})
 
 TIMED = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
 """Times between decisions [s] of the timed environments, easy, moderate and hard, by id."""
@@ -24,18 +35,16 @@ TIME_LIMIT = 200.0
 """Time limit of the timed environments [s]."""
 
 for _id, _decision_period in TIMED.items():
-    register(
-        id=_id,
+    _register(
+        _id,
         max_episode_steps=round(TIME_LIMIT / _decision_period),
         kwargs={"decision_period": _decision_period, "actions": "pairs"},
-        **_ENTRY_POINTS,
     )
 
-register(
-    id="SeastarSwimHeading-v0",
+_register(
+    "SeastarSwimHeading-v0",
     max_episode_steps=600,
     kwargs={"decision_period": 0.5, "actions": "pairs", "headings": {"version": 1, "kind": "HeadingTargets"}},
-    **_ENTRY_POINTS,
 )
 
 TASKS: dict[str, tuple[str, "Actions", float, float, float]] = {
@@ -54,10 +63,10 @@ TASKS: dict[str, tuple[str, "Actions", float, float, float]] = {
 """Name of the challenge, actions, time between decisions [s], time limit [s] and reward threshold of tasks, by id."""
 
 for _id, (_task, _actions, _decision_period, _limit, _threshold) in TASKS.items():
-    register(
-        id=_id,
-        entry_point="seastar_gym.envs.tasks.envs:SeastarTaskEnv",
-        vector_entry_point="seastar_gym.envs.tasks.envs:SeastarTaskVectorEnv",
+    _register(
+        _id,
+        "seastar_gym.envs.tasks.envs",
+        "SeastarTask",
         max_episode_steps=round(_limit / _decision_period),
         reward_threshold=_threshold,
         kwargs={"task": _task, "actions": _actions, "decision_period": _decision_period},

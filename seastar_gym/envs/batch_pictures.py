@@ -61,7 +61,8 @@ class BatchPictures:
 
     def _draw(self, robot: int, frame: Frame) -> Picture:
         renderer, body = self._get_renderer(), self._task.simulator.scene.of_robot(robot).robot
-        renderer.reset(self._task.waypoints_of(robot), body, self._task.headings_of(robot))
+        radius = self._task.radius_of(robot)
+        renderer.reset(self._task.waypoints_of(robot), body, self._task.headings_of(robot), radius)
         renderer.camera = self._cameras.get(robot, renderer.camera)
         picture = renderer.draw(frame)
         self._cameras[robot] = renderer.camera
@@ -71,5 +72,5 @@ class BatchPictures:
         if self._renderer is None:
             body = self._task.simulator.scene.of_robot(0).robot
             size = picture_size(self._task.n_robots)
-            self._renderer = Renderer(body, self._task.waypoints_of(0), self._task.waypoint_radius, size)
+            self._renderer = Renderer(body, self._task.waypoints_of(0), self._task.radius_of(0), size)
         return self._renderer

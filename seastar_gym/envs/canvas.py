@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.interrupts import held_back
+
 if TYPE_CHECKING:
     import pygame
 
@@ -168,7 +170,8 @@ def import_pygame() -> Any:
     """The module pygame; ImportError, with the command that installs it, where there is none."""
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     try:
-        import pygame
+        with held_back():
+            import pygame
     except ImportError as missing:
         raise ImportError('Rendering needs pygame-ce: pip install "seastar-gym[render]".') from missing
     return pygame

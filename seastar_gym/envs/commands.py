@@ -21,6 +21,9 @@ Actions: TypeAlias = Literal[Discrete, "continuous"]
 MOST_LIMBS = 8
 """Largest number of limbs for actions="joint", which then has 6,561 actions."""
 
+ROUNDING = 16.0 * float(np.finfo(np.float32).eps)
+"""What rounding of float32 may add to a share of 1, as where learners' actions are scaled: it is clipped."""
+
 LIMB_COMMANDS = np.array([0.0, 1.0, -1.0])
 """Command of a limb for its action 0, 1, 2: leave it alone, actuate + (anti-clockwise), actuate -."""
 
@@ -109,9 +112,10 @@ def _checked_shares(array: NDArray[Any], shape: tuple[int, int]) -> NDArray[np.f
             f'With actions="continuous" the actions of {shape[0]} robot(s) are numbers of shape {shape}, '
             f"not {array.dtype} of shape {array.shape}."
         )
-    if not (np.abs(array) <= 1.0).all():
+    shares = array.astype(np.float64)
+    if not (np.abs(shares) <= 1.0 + ROUNDING).all():
         raise ValueError(f'With actions="continuous" an action is numbers from -1 to 1, not {array.tolist()}.')
-    return array.astype(np.float64)
+    return np.clip(shares, -1.0, 1.0, out=shares)
 
 
 def decisions_in(seconds: float, decision_period: float | None, scene: Scene | None = None) -> int:

@@ -1,7 +1,7 @@
 """Options that all environments share, checked once, and the scene that they mean."""
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path as FilePath
@@ -25,7 +25,7 @@ from seastar_gym.scene.serial import Part, from_dict
 
 Path = str | ArrayLike
 """Path by its name, or waypoints [m], shape (n, 2)."""
-Plain = dict[str, Any]
+Plain = Mapping[str, Any]
 """Part of a scene, or of the task, as plain data, see `seastar_gym.scene.serial`."""
 
 Init = TypeVar("Init", bound=Callable[..., None])
@@ -151,4 +151,4 @@ def scene_at(file: FilePath | None, fidelity: Fidelity) -> Scene | None:
 
 def read(part: Part | Plain, kind: type[Any]) -> Part:
     """Part that was given as an object or in plain form."""
-    return from_dict(part, kind) if isinstance(part, dict) else part
+    return from_dict(part, kind) if isinstance(part, Mapping) else part

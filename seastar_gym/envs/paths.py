@@ -13,7 +13,6 @@ A path of one's own needs no name: environments take arrays of waypoints. With a
     env = gym.make("SeastarSwim-v0", path="zigzag")
 """
 
-import functools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
@@ -69,7 +68,7 @@ def register_path(name: str) -> Callable[[MakePath], MakePath]:
     """Decorator that gives a path a name.
 
     The decorated function gets the episode's random generator and returns the waypoints [m], shape (n, 2). ValueError:
-    another path has the name.
+    another path has the name. The same function of a module, or of a notebook's cell, that runs again is taken instead.
     """
 
     if not isinstance(name, str) or not name:
@@ -77,11 +76,18 @@ def register_path(name: str) -> Callable[[MakePath], MakePath]:
 
     def register(make: MakePath) -> MakePath:
         require_callable("A path", make)
-        if PATHS.setdefault(name, make) is not make:
+        known = PATHS.get(name, make)
+        if known is not make and (_place(known) != _place(make) or "<lambda>" in _place(make)):
             raise ValueError(f"There is a path of the name {name!r} already: give this one another name.")
+        PATHS[name] = make
         return make
 
     return register
+
+
+def _place(function: MakePath) -> str:
+    """Module and name of a function, which it keeps when its module is loaded again."""
+    return f"{getattr(function, '__module__', '')}.{getattr(function, '__qualname__', function)}"
 
 
 def make_path(path: str | ArrayLike, rng: np.random.Generator) -> Waypoints:
@@ -183,16 +189,17 @@ def path_length(start: ArrayLike, waypoints: ArrayLike) -> NDArray[np.float64]:
     return lengths
 
 
-def shortest_way(position: ArrayLike, waypoint: ArrayLike, after: ArrayLike, radius: float) -> NDArray[np.float64]:
+def shortest_way(position: ArrayLike, waypoint: ArrayLike, after: ArrayLike, radius: ArrayLike) -> NDArray[np.float64]:
     """Length [m], shape (...), of the shortest route from position to `after` that comes within `radius` of waypoint.
 
-    position, waypoint, after: Points [m], shape (..., 2). radius: [m]. The route is straight where a straight line
-    comes near enough, and so wherever `after` equals waypoint. Otherwise it touches the circle where it is reflected,
-    at an angle between those of position and `after` that is found by bisection.
+    position, waypoint, after: Points [m], shape (..., 2). radius: [m], shape (...), or one number. The route
+    is straight where a straight line comes near enough, and so wherever `after` equals waypoint. Otherwise it touches
+    the circle where it is reflected, at an angle between those of position and `after` that is found by bisection.
     """
+    radius = np.asarray(radius, dtype=np.float64)
     p, w, n = (np.asarray(point, dtype=np.float64) for point in (position, waypoint, after))
     if _are_few(p, w, n):
-        return _of_each(functools.partial(_way_of_one, radius), p, w, n)
+        return _of_each(_way_of_one, np.broadcast_to(radius, len(p)), p, w, n)
     p_x, p_y, n_x, n_y = p[..., 0] - w[..., 0], p[..., 1] - w[..., 1], n[..., 0] - w[..., 0], n[..., 1] - w[..., 1]
     begin = np.arctan2(p_y, p_x)
     arc = np.remainder(np.arctan2(n_y, n_x) - begin + np.pi, 2.0 * np.pi) - np.pi
@@ -217,7 +224,7 @@ def _are_few(*points: Floats) -> bool:
 
 
 def _of_each(measure: Callable[..., float], *points: Floats) -> Floats:
-    """A measure of points of shape (n, 2) each, one after the other; shape (n,)."""
+    """A measure of points of shape (n, 2), or numbers (n,), one after the other; shape (n,)."""
     return np.array(list(map(measure, *(each.tolist() for each in points))), np.float64)
 
 

@@ -96,12 +96,20 @@ class Renderer:
         self._flow: tuple[Camera, AnyCurrent | None, Flow] | None = None
         self.reset(waypoints, headings=headings)
 
-    def reset(self, waypoints: ArrayLike, robot: Seastar | None = None, headings: ArrayLike | None = None) -> None:
+    def reset(
+        self,
+        waypoints: ArrayLike,
+        robot: Seastar | None = None,
+        headings: ArrayLike | None = None,
+        waypoint_radius: float | None = None,
+    ) -> None:
         """Take a new path [m], shape (n, 2), and fit the view to it.
 
         robot: With as many nodes, and other sizes perhaps. None means the same.
         headings: Asked headings at the waypoints [rad], shape (n,). None draws none.
+        waypoint_radius: [m]. None means the same.
         """
+        self._waypoint_radius = self._waypoint_radius if waypoint_radius is None else waypoint_radius
         self._headings = None if headings is None else np.array(headings, dtype=np.float64)
         self._robot = robot or self._robot
         self._waypoints = np.array(waypoints, dtype=np.float64)

@@ -1,7 +1,7 @@
 """The reward: a sum of named terms, and the route along which progress counts."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,8 +54,18 @@ class RewardWeights:
         return shortest_way(hub, current, following, self.aim * waypoint_radius)
 
 
+class Weights(NamedTuple):
+    """The numbers of the `RewardWeights` of every robot, shape (n_robots,) each, in their order."""
+
+    progress: NDArray[np.float64]
+    waypoint: NDArray[np.float64]
+    effort: NDArray[np.float64]
+    aim: NDArray[np.float64]
+    heading: NDArray[np.float64]
+
+
 def reward_terms(
-    weights: RewardWeights,
+    weights: RewardWeights | Weights,
     progress: NDArray[np.float64],
     waypoints_reached: NDArray[np.int64],
     pulses: NDArray[np.float64],

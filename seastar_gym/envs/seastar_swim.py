@@ -1,5 +1,6 @@
 """`SeastarSwim-v0`: the environment of one robot. Its docstring is the contract that users read."""
 
+from collections import deque
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -9,16 +10,22 @@ from numpy.typing import NDArray
 from seastar_gym.accuracy.info import warn_uncertified
 from seastar_gym.envs.commands import to_commands, unless_strokes
 from seastar_gym.envs.frame import Frame, frames_of
+from seastar_gym.envs.masks import sampling_mask
 from seastar_gym.envs.options import SwimOptions, with_options
 from seastar_gym.envs.rendering import Renderer
 from seastar_gym.envs.swimming import Outcome, Swimming
 from seastar_gym.envs.task import SwimTask
-from seastar_gym.envs.task_env import TaskEnv, checked_options
+from seastar_gym.envs.task_env import TaskEnv, arguments_of, checked_options
 from seastar_gym.scene.checks import require_choice, require_count, require_seed
+from seastar_gym.simulator import SolverStatus
 from seastar_gym.simulator.pauses import completed
 
 FRAMES_PER_SECOND = 10
 """Pictures per second of simulated time, unless another number is asked for."""
+MOST_ASKED_FRAMES = 1_000_000
+"""Largest number of pictures of a decision."""
+MOST_FRAMES = 100
+"""Largest number of pictures that wait for `render`, or those of one decision if they are more; 2 MB each."""
 ROUNDING = 1e-9
 """Fraction of a time that is no time."""
 Observation = NDArray[np.float32]
@@ -75,7 +82,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     `ThermalSma` with a `largest_temperature` while they are that hot. A command to such a wire does nothing and costs
     nothing. With these actuators, `info` has `action_mask` (int8, 1 for actions that are followed as a whole) and
     `masked_limbs` (int, commands of this decision that were not followed). `env.action_masks()` is the mask as
-    booleans, the form of MaskablePPO in sb3-contrib, with any actuator:
+    booleans, the form of MaskablePPO in sb3-contrib, with any actuator; `env.sampling_mask()` is the same in the form
+    of Gymnasium, for `env.action_space.sample(mask=env.sampling_mask())`, None for `"continuous"`:
 
     | `actions`            | shape          | meaning                                            |
     |----------------------|----------------|----------------------------------------------------|
@@ -182,8 +190,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `energy`                 | float      | J    | electric energy of that heat                                     |
     | `energy_per_metre`       | float      | J/m  | energy over the decrease of the route's length, since the reset  |
     | `newton_iterations`      | int        | 1    | Newton iterations of the decision                                |
-    | `solver_status`          | int        | -    | `SolverStatus` of the decision, 0: converged                     |
-    | `solver_message`         | str        | -    | what to do about a status other than 0; empty for 0              |
+    | `solver_status`          | int        | -    | `SolverStatus` of the decision, 0: converged, see below          |
     | `smallest_opening_angle` | float      | rad  | between neighbouring limbs, below 0: they crossed; pi on a body  |
     | `largest_overlap`        | float      | 1    | depth to which limbs press, only with contact, see below         |
     | `reward_progress`        | float      | 1    | term of the reward                                               |
@@ -191,6 +198,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `reward_effort`          | float      | 1    | term of the reward                                               |
     | `reward_heading`         | float      | 1    | term of the reward, only with `headings`                         |
 
+    `SolverStatus(info["solver_status"]).sentence` says what to do about a status other than 0.
     `energy_per_metre` is infinite where the route has not become shorter; heat and energy are NaN for actuators without
     a heating power.
     Errors from `path_error` to `time_error` are those of docs/accuracy.md for the chapter's robot at a fidelity. They
@@ -240,14 +248,17 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     action_delay: Time from a decision to the heating [s], or a distribution of it, drawn at the start of every episode
         and rounded up to 0.01 s. Actuators other than wires need a multiple of the decision period.
     render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
-        `frames_per_stroke` pictures of the decision. "human": a window shows as many;
-        without a display, a warning says so.
+        `frames_per_stroke` pictures of every decision since the last call, the last 100 at most or those of one
+        decision. "human": a window shows as many; without a display, a warning says so. `metadata["render_fps"]` is
+        the rate of these pictures in simulated time: with "rgb_array", decisions per second.
     frames_per_stroke: Number of pictures of a decision, at equal intervals; the last shows its end. None means ten per
         second of simulated time, and one at least.
 
+    `path`, `random_heading`, `reward` and `waypoint_radius` can be changed later, as in a curriculum, by
+    `env.unwrapped.path = ...` or `set_attr` of a batch, and hold from the next episode on. Other arguments are refused.
     `scene`, `reward`, `randomization`, `headings` and `sight` may be given as plain data, as written by
-    `Scene.to_dict` and `seastar_gym.scene.serial.to_dict`. `env.spec` stores this form, so
-    `gym.make(EnvSpec.from_json(env.spec.to_json()))` is the same environment.
+    `Scene.to_dict` and `seastar_gym.scene.serial.to_dict`, in any mappings and sequences. `env.spec` stores this form,
+    so `gym.make(EnvSpec.from_json(env.spec.to_json()))` is the same environment.
     """
 
     metadata = {"render_modes": ["human", "rgb_array", "rgb_array_list"], "render_fps": FRAMES_PER_SECOND}
@@ -262,22 +273,25 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         warn_uncertified(task.scene, task.options.fidelity_of_scene, task.certificate, timed)
         self._begin_with(task, frames_per_stroke)
 
+    _arguments = arguments_of(__init__)
+
     def _set_pictures(self, render_mode: RenderMode | None, frames_per_stroke: int | None) -> None:
         if render_mode is not None:
             require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
         if frames_per_stroke is not None:
-            require_count("frames_per_stroke", frames_per_stroke, 1, 1_000_000)
+            require_count("frames_per_stroke", frames_per_stroke, 1, MOST_ASKED_FRAMES)
         self.render_mode = render_mode
 
     def _begin_with(self, task: Swimming, frames_per_stroke: int | None) -> None:
         self.action_space, self.observation_space = self._set_task(task)
-        of_a_decision = max(1, round(FRAMES_PER_SECOND * task.decision_period))
-        self.frames_per_stroke = of_a_decision if frames_per_stroke is None else frames_per_stroke
-        self.metadata = {**self.metadata, "render_fps": max(1, round(self.frames_per_stroke / task.decision_period))}
+        self.frames_per_stroke = frames_of_a_decision(task) if frames_per_stroke is None else frames_per_stroke
+        fps = render_fps(task, self.render_mode, self.frames_per_stroke)
+        self.metadata = {**self.metadata, "render_fps": fps}
         self._command = np.zeros(self.scene.robot.n_limbs)
         self._trail = np.zeros((0, 2))
-        self._frames: list[NDArray[np.uint8]] = []
+        self._frames: deque[NDArray[np.uint8]] = deque(maxlen=max(MOST_FRAMES, self.frames_per_stroke + 1))
         self._renderer: Renderer | None = None
+        self._is_made = True
 
     @property
     def waypoints(self) -> NDArray[np.float64]:
@@ -297,10 +311,10 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         self._to_the_end(self._task.reset, np.ones(1, bool), [self.np_random], asked)
         self._command = np.zeros_like(self._command)
         self._trail = self.simulator.hub_position()
-        self._frames = []
+        self._frames.clear()
         if self._renderer is not None:
             robot = self.simulator.scene.of_robot(0).robot
-            self._renderer.reset(self.waypoints, robot, self._task.headings_of(0))
+            self._renderer.reset(self.waypoints, robot, self._task.headings_of(0), self._task.radius_of(0))
         self._draw_frame()
         return self._task.observe()[0], _of_one_robot(self._task.first_info())
 
@@ -346,28 +360,35 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         if self.render_mode == "human":
             self._get_renderer().show(self._frame(), fps=self.metadata["render_fps"])
         elif self.render_mode == "rgb_array_list":
+            if len(self._frames) == self._frames.maxlen:
+                gym.logger.warn(f"Nobody calls render(): of its pictures, the last {len(self._frames)} are kept.")
             self._frames.append(self._get_renderer().draw(self._frame()))
 
     def _get_renderer(self) -> Renderer:
         if self._renderer is None:
             robot = self.simulator.scene.of_robot(0).robot
-            radius, headings = self._task.waypoint_radius, self._task.headings_of(0)
+            radius, headings = self._task.radius_of(0), self._task.headings_of(0)
             self._renderer = Renderer(robot, self.waypoints, radius, headings=headings)
         return self._renderer
 
     def render(self) -> NDArray[np.uint8] | list[NDArray[np.uint8]] | None:  # type: ignore[override]
-        """Picture, shape (720, 960, 3); "rgb_array_list": those since the last call; "human": None."""
+        """Picture, shape (720, 960, 3); "rgb_array_list": the last MOST_FRAMES since the last call; "human": None."""
         if self.render_mode is None:
             gym.logger.warn('render() without a render_mode draws nothing: make the environment with "rgb_array".')
             return None
         if self.render_mode == "rgb_array":
             return self._get_renderer().draw(self._frame())
-        frames, self._frames = self._frames, []
+        frames = list(self._frames)
+        self._frames.clear()
         return frames if self.render_mode == "rgb_array_list" else None
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Actions that the wires can follow now, shape (k,), see the table of masks."""
         return self._task.action_masks()[0]
+
+    def sampling_mask(self) -> Any:
+        """`action_masks` in the form that `action_space.sample(mask=...)` takes, see `seastar_gym.envs.masks`."""
+        return sampling_mask(self.action_space, self.action_masks())
 
     def close(self) -> None:
         """Close the window, if there is one, and end the simulator's threads."""
@@ -380,6 +401,27 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         return {**self.__dict__, "_renderer": None}
 
 
+def frames_of_a_decision(task: Swimming) -> int:
+    """Number of pictures of a decision, unless another one is asked for."""
+    return max(1, round(FRAMES_PER_SECOND * task.decision_period))
+
+
+def render_fps(task: Swimming, render_mode: str | None, frames_per_stroke: int) -> float:
+    """Pictures that `render` returns per second of simulated time: with "rgb_array" one for each decision."""
+    fps = float((1 if render_mode == "rgb_array" else frames_per_stroke) / task.decision_period)
+    return int(fps) if fps.is_integer() else fps
+
+
+class _Info(dict[str, Any]):
+    """Info of one robot. For one release, `info["solver_message"]` is the sentence of its status, empty for 0."""
+
+    def __missing__(self, name: str) -> str:
+        if name != "solver_message":
+            raise KeyError(name)
+        return SolverStatus(self["solver_status"]).sentence if self["solver_status"] else ""
+
+
 def _of_one_robot(info: dict[str, NDArray[Any]]) -> dict[str, Any]:
     """Info of robot 0 as plain numbers, its vectors as arrays, copies."""
-    return {name: values[0].copy() if values.ndim > 1 else values.item() for name, values in info.items()}
+    found = {name: values[0].copy() if values.ndim > 1 else values.item() for name, values in info.items()}
+    return _Info(found)

@@ -4,6 +4,7 @@
     env = gym.make(spec)
 """  # fmt: skip
 
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from enum import Enum
 from os import PathLike, fspath
@@ -59,10 +60,10 @@ def _plain(value: Any) -> Any:
             return fspath(value)
         case np.ndarray() | np.generic():
             return value.tolist()
-        case list() | tuple():
-            return [_plain(one) for one in value]
-        case dict():
-            return {name: _plain(one) for name, one in value.items()}
         case None | bool() | int() | float() | str():
             return value
+        case Sequence() if not isinstance(value, bytes):
+            return [_plain(one) for one in value]
+        case Mapping():
+            return {name: _plain(one) for name, one in value.items()}
     raise ValueError(f"The spec of an environment with {value!r} among its arguments cannot be written.")

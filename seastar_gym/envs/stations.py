@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.layout import N_STATIONS
+from seastar_gym.interrupts import held_back
 from seastar_gym.scene import Seastar
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.body_frame import best_fit_heading, root_places
@@ -78,8 +79,9 @@ def weights(n: int, m: int) -> Floats:
 def _spline_weights(n: int, m: int) -> Floats:
     """Weights, shape (m, n), of all points for all values: values = at_values at_points^-1 points."""
     # These take half a second to import, and robots whose nodes stand at all stations do without.
-    from scipy.interpolate import BSpline
-    from scipy.sparse.linalg import splu
+    with held_back():
+        from scipy.interpolate import BSpline
+        from scipy.sparse.linalg import splu
 
     degree, knots = min(3, n - 1), np.linspace(0.0, 1.0, n)[2:-2]
     knots = np.concatenate([np.zeros(degree + 1), knots, np.ones(degree + 1)])

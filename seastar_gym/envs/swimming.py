@@ -13,7 +13,7 @@ is scored:
 import functools
 import operator
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
 from types import ModuleType
 from typing import Any, NamedTuple, Protocol
@@ -36,7 +36,7 @@ from seastar_gym.envs.sight import Lateness, Sees, bounds_of, entries_of, statio
 from seastar_gym.envs.tracker import Tracker
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror, complete
-from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
+from seastar_gym.simulator import Simulator, StrokeReport
 from seastar_gym.simulator.growth import is_watched
 from seastar_gym.simulator.pauses import completed, pausing
 from seastar_gym.simulator.report import report_of_pieces
@@ -96,6 +96,10 @@ class Swimming(ABC):
     """What the numbers of `_task_observation` are, but for asked headings."""
     shows_limbs = True
     """Whether the stations of the limbs and the hub's velocity are observed."""
+    per_episode: tuple[str, ...] = ()
+    """Options that may change from one episode to the next, see `ask`."""
+    goals_are_waypoints = False
+    """Whether an episode is about reaching waypoints, in an observation that tells of them in their places only."""
 
     def __init__(
         self,
@@ -108,6 +112,8 @@ class Swimming(ABC):
     ):
         scene = options.modelled
         self.options = options
+        self.options_of = [options] * n_robots
+        """Options of every robot's next episode."""
         self.decision_period = checked_decision_period(options.decision_period, scene)
         self._tells_errors = True
         self._can_be_masked = can_be_masked(scene.actuator)
@@ -132,7 +138,6 @@ class Swimming(ABC):
         self.waypoint_index = np.zeros(n_robots, np.int64)  # the waypoint to swim to; 0 in tasks without
         self.last_commands = np.zeros((n_robots, scene.robot.n_limbs))
         self._energy = np.zeros(n_robots)  # since the reset [J]
-        self._no_messages = np.full(n_robots, "", dtype=object)
         delay, n_limbs = options.late[ACTION_DELAY], scene.robot.n_limbs
         self._lateness = Lateness(options.late, n_robots)
         is_late = options.sight is not None or bounds_of(delay)[1] > 0.0
@@ -160,6 +165,25 @@ class Swimming(ABC):
     @abstractmethod
     def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
         """Entries of info that belong to the task; arrays over robots."""
+
+    def ask(self, name: str, values: Sequence[Any]) -> None:
+        """Have an option hold from the next episode of every robot on.
+
+        values: One for each robot. ValueError, and nothing changes: one of them, or the option, cannot be changed.
+        """
+        if name not in self.per_episode:
+            known = ", ".join(self.per_episode)
+            others = f", or change {known}, which hold from the next episode on" if known else ""
+            raise ValueError(f"This environment was made with its {name}: make another one with another{others}.")
+        made: dict[tuple[int, int], SwimOptions] = {}
+        for options, value in zip(self.options_of, values, strict=True):
+            if (id(options), id(value)) not in made:
+                made[id(options), id(value)] = replace(options, **{name: value})
+        self.options_of = [made[id(options), id(value)] for options, value in zip(self.options_of, values, strict=True)]
+
+    def radius_of(self, robot: int) -> float:
+        """Radius of a robot's waypoints [m]."""
+        return self.waypoint_radius
 
     def waypoints_of(self, robot: int) -> Floats:
         """Waypoints of a robot's present episode [m], shape (n, 2), a copy; n is 0 in tasks without."""
@@ -205,7 +229,7 @@ class Swimming(ABC):
         headings = np.zeros(self.n_robots)
         for robot in np.flatnonzero(robots):
             self._draw(int(robot), generators[robot], asked)
-            if self.options.random_heading:
+            if self.options_of[robot].random_heading:
                 headings[robot] = generators[robot].uniform(-np.pi, np.pi)
             if self._draws is not None:
                 self._draws.draw(self.drawn, int(robot), generators[robot])
@@ -413,7 +437,6 @@ class Swimming(ABC):
             **({"masked_limbs": (followed != commands).sum(axis=1)} if self._can_be_masked else {}),
             "newton_iterations": report.newton_iterations,
             "solver_status": report.status,
-            "solver_message": self._messages(report.status),
             "smallest_opening_angle": report.smallest_opening_angle,
             **({} if self.scene.contact is None else {"largest_overlap": report.largest_overlap}),
             **score.terms,
@@ -458,15 +481,6 @@ class Swimming(ABC):
             errors = {name: np.where(strong, known.get(name, np.nan), np.nan) for name in self._names_of_errors}
             self._known = scene, strengths.tobytes(), errors
         return self._known[2]
-
-    def _messages(self, status: NDArray[np.int64]) -> NDArray[Any]:
-        """Sentences on what to do about each status, shape (n_robots,); empty where the solver converged."""
-        if not np.count_nonzero(status):
-            return self._no_messages
-        messages = self._no_messages.copy()
-        for robot in status.nonzero()[0]:
-            messages[robot] = SolverStatus(status[robot]).sentence
-        return messages
 
 
 def first_after(ends: list[float]) -> Callable[[float], float | None]:

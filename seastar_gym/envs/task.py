@@ -1,5 +1,6 @@
 """The task behind `SeastarSwim-v0`: robots that swim along waypoints, each on a path of its own."""
 
+from dataclasses import astuple
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -7,8 +8,8 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.headings import EpisodeHeadings
 from seastar_gym.envs.options import Path, SwimOptions
-from seastar_gym.envs.paths import cross_track_error, make_path
-from seastar_gym.envs.reward import reward_terms
+from seastar_gym.envs.paths import cross_track_error, make_path, shortest_way
+from seastar_gym.envs.reward import Weights, reward_terms
 from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
 
 
@@ -33,13 +34,16 @@ class SwimTask(Swimming):
     """
 
     TERMS: tuple[str, ...] = ("reward_progress", "reward_waypoint", "reward_effort")
+    per_episode: tuple[str, ...] = ("path", "random_heading", "reward", "waypoint_radius")
+    goals_are_waypoints = True
 
     def __init__(self, options: SwimOptions, n_robots: int, threads: int | None, *, effort: bool = False):
         self._asked = None if options.headings is None else EpisodeHeadings(options.headings, n_robots)
         if options.headings is not None:
             self.TERMS = (*self.TERMS, "reward_heading")
         super().__init__(options, n_robots, threads, draws=options.randomization, effort=effort)
-        self.reward, self.waypoint_radius = options.reward, options.waypoint_radius
+        self._weights = Weights(*(np.full(n_robots, value) for value in astuple(options.reward)))
+        self._radius = np.full(n_robots, options.waypoint_radius)  # [m]
         self._robots = np.arange(n_robots)
         self.waypoints = np.zeros((n_robots, 1, 2))
         self._way_after = np.zeros((n_robots, 1))  # from waypoint k to the last [m]
@@ -49,10 +53,23 @@ class SwimTask(Swimming):
         self._turn_to_go = np.zeros(n_robots)  # [rad]
 
     def _draw(self, robot: int, rng: np.random.Generator, asked: Path | None) -> None:
-        waypoints = make_path(self.options.path if asked is None else asked, rng)
+        options = self.options_of[robot]
+        waypoints = make_path(options.path if asked is None else asked, rng)
         if self._asked is not None:
             self._asked.begin(robot, self._asked.headings.of_path(waypoints, rng))
         self._set_path(robot, waypoints)
+        self._radius[robot] = options.waypoint_radius
+        for weights, value in zip(self._weights, astuple(options.reward), strict=True):
+            weights[robot] = value
+
+    @property
+    def waypoint_radius(self) -> float:  # type: ignore[override]
+        """Radius of the waypoints of robot 0 [m]."""
+        return self.radius_of(0)
+
+    def radius_of(self, robot: int) -> float:
+        """Radius of a robot's waypoints [m]."""
+        return float(self._radius[robot])
 
     def _begin(self, robots: Flags) -> None:
         self.waypoint_index[robots] = 0
@@ -111,7 +128,7 @@ class SwimTask(Swimming):
         A route through the centre of the current waypoint would pay for corners that need not be swum.
         """
         legs = self._legs
-        return self.reward.way_to_next(hub, legs.current, legs.following, self.waypoint_radius) + legs.beyond
+        return shortest_way(hub, legs.current, legs.following, self._weights.aim * self._radius) + legs.beyond
 
     def _targets(self) -> Floats:
         return self._legs.ends
@@ -126,7 +143,7 @@ class SwimTask(Swimming):
         before = self._way_to_go
         self._way_to_go = self._measure_way_to_go(hub)
         success = self.waypoint_index == self.n_waypoints
-        terms = reward_terms(self.reward, before - self._way_to_go, reached, pulses, self._turned())
+        terms = reward_terms(self._weights, before - self._way_to_go, reached, pulses, self._turned())
         return Score(terms, success, success)
 
     def _turned(self) -> Floats | None:
@@ -150,7 +167,7 @@ class SwimTask(Swimming):
         heading = None if self._asked is None else self.heading()
         reached = np.zeros(self.n_robots, np.int64)
         while True:
-            near = _length(self._legs.current - hub) <= self.waypoint_radius
+            near = _length(self._legs.current - hub) <= self._radius
             if self._asked is not None and heading is not None:
                 near &= self._asked.is_met(self.waypoint_index, heading)
             if not np.count_nonzero(near):

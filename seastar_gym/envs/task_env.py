@@ -1,6 +1,7 @@
 """Common base of the environments of one robot and of a batch: task, action mode, and options of a reset."""
 
-from collections.abc import Callable
+import inspect
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -26,6 +27,10 @@ class TaskEnv(PlainSpec):
     """Base of the environments: their task, and the spaces of one robot."""
 
     actions: Actions
+    _arguments: frozenset[str] = frozenset()
+    """Names of the constructor's arguments, which are attributes, too. Once the environment is made, setting one holds
+    from the next episode on, or is refused, see `Swimming.ask`."""
+    _is_made = False
     _option = "path"
     """Name of the option by which a reset asks for something of the task."""
     _running = False
@@ -39,6 +44,25 @@ class TaskEnv(PlainSpec):
         has_table = isinstance(actions_of_one, spaces.Discrete)
         self.command_table = command_table(self.actions, n_limbs) if has_table else None
         return actions_of_one, spaces.Box(-np.inf, np.inf, (task.layout.size,), np.float32)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if self._is_made and name in self._arguments:
+            self._ask(name, (value,) * self._task.n_robots)
+        else:
+            super().__setattr__(name, value)
+
+    def __getattr__(self, name: str) -> Any:
+        """Arguments that are no attributes otherwise, those of robot 0."""
+        if name not in type(self)._arguments:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        return self._argument(name, 0)
+
+    def _argument(self, name: str, robot: int) -> Any:
+        return getattr(self._task.options_of[robot], name)
+
+    def _ask(self, name: str, values: Sequence[Any]) -> None:
+        """Have an argument hold from the next episode of every robot on. values: One for each robot."""
+        self._task.ask(name, values)
 
     def _to_the_end(self, change: Callable[_P, Result], *args: _P.args, **kwargs: _P.kwargs) -> Result:
         """What a step or reset returns: after an interruption, robots and task disagree, and only a reset helps."""
@@ -99,9 +123,15 @@ class TaskEnv(PlainSpec):
         return self._task.simulator
 
 
-def checked_options(options: dict[str, Any] | None, known: set[str]) -> dict[str, Any]:
+def arguments_of(init: Callable[..., None]) -> frozenset[str]:
+    """Names of the arguments of a constructor, without those that it takes under any name."""
+    named = inspect.signature(init).parameters.values()
+    return frozenset(one.name for one in named if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)) - {"self"}
+
+
+def checked_options(options: Mapping[str, Any] | None, known: set[str]) -> Mapping[str, Any]:
     """Options of a reset. ValueError: an option has a name that is not known, and would be ignored."""
-    if options is not None and not isinstance(options, dict):
+    if options is not None and not isinstance(options, Mapping):
         raise ValueError(f"options must be a dictionary with any of {sorted(known)}, or None, not {shown(options)}.")
     unknown = set(options or {}) - known
     if unknown:

@@ -1,6 +1,6 @@
 """`SeastarSwim-v0` as a native batch: all robots in one simulator, with the bits of one environment each."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -16,16 +16,20 @@ from seastar_gym.envs.batch_info import Info, of_some, with_masks
 from seastar_gym.envs.batch_pictures import BatchPictures, Picture
 from seastar_gym.envs.buffers import Buffers, require_buffers
 from seastar_gym.envs.commands import as_array, to_commands, unless_strokes
+from seastar_gym.envs.masks import sampling_mask
 from seastar_gym.envs.options import SwimOptions, with_options
-from seastar_gym.envs.seastar_swim import FRAMES_PER_SECOND
+from seastar_gym.envs.seastar_swim import FRAMES_PER_SECOND, MOST_ASKED_FRAMES, frames_of_a_decision, render_fps
 from seastar_gym.envs.swimming import Swimming
 from seastar_gym.envs.task import SwimTask
-from seastar_gym.envs.task_env import checked_options
-from seastar_gym.scene.checks import require_choice, require_count, require_flag, require_seed, shown
+from seastar_gym.envs.task_env import arguments_of, checked_options
+from seastar_gym.scene.checks import is_whole_number, require_choice, require_count, require_flag, require_seed, shown
 from seastar_gym.simulator.simulator import MAX_ROBOTS
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
+
+LONGEST = 2**63 - 1
+"""Largest time limit, which is none [decisions]."""
 
 
 class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, Any, Any]):
@@ -37,7 +41,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
 
     ## Arguments besides those of `SeastarSwimEnv`
     num_envs: Number of robots.
-    max_episode_steps: Time limit [decisions], applied here; None for none.
+    max_episode_steps: Time limit [decisions], applied here; None or -1 for none.
     autoreset_mode: When an episode that is over is followed by the next one. NEXT_STEP (default): the next step ignores
         the robot's action and returns the first observation of its next episode with reward 0. SAME_STEP: the step that
         ends an episode returns the first observation of the next one, and puts the last observation and info into
@@ -48,14 +52,17 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         `torch.from_dlpack` takes without a copy. Rewards, flags and info are NumPy arrays. Results are bit-identical.
     render_mode: "rgb_array": `render` returns a picture of every robot, the smaller the more there are;
         `render_robots` draws some of them.
+    frames_per_stroke, disable_env_checker: As for `gym.make`, without effect: a picture shows the end of a decision,
+        and batches have no checker.
 
     ## Memory
     Arrays that a step returns are new, and the environment keeps no reference to them, so a learner may keep them as
     they are. With `step(actions, out=Buffers(...))` observations, rewards and flags are written into the given arrays,
     such as rows of a learner's memory, see `seastar_gym.envs.buffers`.
 
-    `call`, `get_attr` and `set_attr` are those of Gymnasium's `SyncVectorEnv`. They give what each robot has of its own
-    (`waypoints`, `scene`, `np_random`, `render`, ..) robot by robot; everything else is common to all robots.
+    Whatever Gymnasium's `SyncVectorEnv` of `SeastarSwimEnv` takes and gives, this batch takes and gives, but that
+    `call("reset")` and `call("step")` are refused. `call` and `get_attr` give what each robot has of its own (see
+    `OF_EACH_ROBOT` in `batch_attributes`) robot by robot; everything else is common to all robots.
     """
 
     on_device = False
@@ -73,9 +80,13 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
         on_device: bool = False,
+        frames_per_stroke: int | None = None,
+        disable_env_checker: bool | None = None,
         **options: Any,
     ):
-        self._set_batch(num_envs, max_episode_steps, render_mode, autoreset_mode)
+        self._set_batch(
+            num_envs, max_episode_steps, render_mode, autoreset_mode, threads, frames_per_stroke, disable_env_checker
+        )
         require_flag("on_device", on_device)
         self.on_device = bool(on_device)
         task = SwimTask(SwimOptions(*given, **options), num_envs, threads)
@@ -83,12 +94,17 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         warn_uncertified(task.scene, task.options.fidelity_of_scene, task.certificate, timed)
         self._begin_with(task)
 
+    _arguments = arguments_of(__init__)
+
     def _set_batch(
         self,
         num_envs: int,
         max_episode_steps: int | None,
         render_mode: Literal["rgb_array"] | None,
         autoreset_mode: AutoresetMode | str,
+        threads: int | None = None,
+        frames_per_stroke: int | None = None,
+        disable_env_checker: bool | None = None,
     ) -> None:
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
@@ -96,16 +112,30 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
                 "use gym.make for one robot."
             )
         require_count("num_envs", num_envs, 1, MAX_ROBOTS)
-        if max_episode_steps is not None:
-            require_count("max_episode_steps", max_episode_steps, 1, 2**63 - 1)
-        self.num_envs = num_envs
-        self.max_episode_steps = max_episode_steps
+        if disable_env_checker is not None:
+            require_flag("disable_env_checker", disable_env_checker)
+        if frames_per_stroke is not None:
+            require_count("frames_per_stroke", frames_per_stroke, 1, MOST_ASKED_FRAMES)
+        self.num_envs, self.threads = num_envs, threads
+        self.frames_per_stroke, self.disable_env_checker = frames_per_stroke, disable_env_checker
+        self._limit_episodes(max_episode_steps)
         self.autoreset_mode = _checked_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
 
+    def _limit_episodes(self, decisions: int | None) -> None:
+        if is_whole_number(decisions) and decisions == -1:
+            decisions = None
+        if decisions is not None:
+            require_count("max_episode_steps", decisions, 1, LONGEST)
+        object.__setattr__(self, "max_episode_steps", decisions)
+
     def _begin_with(self, task: Swimming) -> None:
         num_envs = self.num_envs
+        if self.frames_per_stroke is None:
+            self.frames_per_stroke = frames_of_a_decision(task)
+        fps = render_fps(task, self.render_mode, self.frames_per_stroke)
+        self.metadata = {**self.metadata, "render_fps": fps}
         self.single_action_space, self.single_observation_space = self._set_task(task)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -113,8 +143,9 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         self._commands = np.zeros((num_envs, task.scene.robot.n_limbs))
         self._pictures = BatchPictures(self._task)
         self._own_attributes: dict[str, tuple[Any, ...]] = {}
-        self._elapsed = np.zeros(num_envs, np.int64)
+        self._elapsed, self._limits = np.zeros(num_envs, np.int64), np.full(num_envs, LONGEST)
         self._needs_reset = np.ones(num_envs, bool)
+        self._is_made = True
 
     @property
     def waypoints(self) -> tuple[NDArray[np.float64], ...]:
@@ -128,11 +159,11 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
 
     @np_random.setter  # type: ignore[override]
     def np_random(self, generators: Iterable[np.random.Generator]) -> None:
-        self._generators = list(generators)
+        self._generators, self._seeds = list(generators), [-1] * self.num_envs
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
-        """Seed of the random generator of every robot."""
+        """Seed of the random generator of every robot, -1 where the generator was given."""
         return tuple(self._seeds)
 
     def reset(
@@ -150,7 +181,8 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
             if seeds[robot] is not None:
                 self._generators[robot], self._seeds[robot] = seeding.np_random(seeds[robot])
         self._to_the_end(self._begin_episodes, mask, chosen.get(self._option))
-        return self._observe(), with_masks(self._task.first_info(), mask)
+        first = self._task.first_info()
+        return self._observe(), with_masks({name: of_some(values, mask) for name, values in first.items()}, mask)
 
     def _checked_mask(self, mask: Any) -> Flags:
         if mask is None:
@@ -164,7 +196,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
 
     def _begin_episodes(self, mask: Flags, asked: Any = None) -> None:
         self._task.reset(mask, self._generators, asked)
-        self._elapsed[mask] = 0
+        self._elapsed[mask], self._limits[mask] = 0, self.max_episode_steps or LONGEST
         self._needs_reset[mask] = False
         self._commands[mask] = 0.0
         if self.render_mode is not None:
@@ -204,8 +236,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
             self._pictures.follow()
         self._elapsed += 1
         terminated = outcome.terminated & ~resting
-        out_of_time = self.max_episode_steps is not None and self._elapsed >= self.max_episode_steps
-        truncated = np.asarray(out_of_time & ~resting) & np.ones(self.num_envs, bool)
+        truncated = (self._elapsed >= self._limits) & ~resting
         reward = np.where(resting, 0.0, outcome.reward)
         if resting.any():
             self._begin_episodes(resting)
@@ -223,8 +254,15 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         """Actions that every robot's wires can follow now, shape (num_envs, k), see `seastar_gym.envs.masks`."""
         return self._task.action_masks()
 
-    def close_extras(self) -> None:
-        """End the simulator's threads; a step after that starts them again."""
+    def sampling_mask(self) -> tuple[Any, ...]:
+        """`action_masks` in the form that `single_action_space.sample(mask=...)` takes, for every robot."""
+        return tuple(sampling_mask(self.single_action_space, mask) for mask in self.action_masks())
+
+    def close_extras(self, **ignored: Any) -> None:
+        """End the simulator's threads; a step after that starts them again.
+
+        ignored: Arguments of other batches, such as `terminate` and `timeout`: the threads are at rest.
+        """
         self.simulator.close()
 
     def render(self) -> tuple[Picture, ...] | None:
@@ -236,6 +274,10 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         if self.render_mode is None:
             gym.logger.warn('render() without a render_mode draws nothing: make the batch with "rgb_array".')
             return None
+        if not self._running:
+            raise gym.error.ResetNeeded(
+                "The episodes have not begun or were interrupted: call reset() before render()."
+            )
         return self._pictures.draw(robots, self._commands)
 
     def _begin_next_episodes(
@@ -266,8 +308,10 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
 
 
 def checked_seeds(seed: object, n_robots: int) -> list[int | None]:
-    """Seeds of all robots: one number and those that follow it, or a list with one for each."""
-    if isinstance(seed, list):
+    """Seeds of all robots: one number and those that follow it, or a sequence with one for each."""
+    if isinstance(seed, np.ndarray) and seed.ndim > 0:
+        seed = list(seed)
+    if isinstance(seed, Sequence) and not isinstance(seed, str | bytes):
         if len(seed) != n_robots:
             raise ValueError(f"seed must be one number or {n_robots} of them, not {len(seed)}.")
         for one in seed:

@@ -14,11 +14,12 @@ from seastar_gym.envs.paths import cross_track_error, path_length
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.rollout import MOST_DECISIONS, Episodes, Info, rollout
 from seastar_gym.scene.checks import require_callable, require_count, require_kind
+from seastar_gym.simulator import SolverStatus
 
 Floats = NDArray[np.float64]
 TIME_LIMIT = 400.0
 """Time after which a swim that is evaluated ends, unless another limit is given [s]."""
-RECORDED = ("hub_position", "waypoint_index", "time", "limbs_heated", "heating_time", "energy", "solver_message")
+RECORDED = ("hub_position", "waypoint_index", "time", "limbs_heated", "heating_time", "energy", "solver_status")
 """Entries of info that make a `Swim`."""
 
 
@@ -164,6 +165,7 @@ def swims_of(agent: str, found: Episodes) -> list[Swim]:
 def _swim_of(agent: str, found: Episodes, robot: int) -> Swim:
     end = found.decisions[robot] + 1
     of = {name: values[:end, robot].copy() for name, values in found.entries.items()}
+    status = SolverStatus(of["solver_status"][-1])
     return Swim(
         agent=agent,
         waypoints=found.waypoints[robot],
@@ -173,5 +175,5 @@ def _swim_of(agent: str, found: Episodes, robot: int) -> Swim:
         limbs_heated=of["limbs_heated"][1:],
         heating_time=of["heating_time"][1:],
         energy=of["energy"][1:],
-        solver_message=str(of["solver_message"][-1]) or None,
+        solver_message=None if status is SolverStatus.CONVERGED else status.sentence,
     )

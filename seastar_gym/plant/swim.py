@@ -17,6 +17,7 @@ from seastar_gym.envs.seastar_swim import Observation, RenderMode, SeastarSwimEn
 from seastar_gym.envs.sight import Sight
 from seastar_gym.envs.swimming import Flags, Floats
 from seastar_gym.envs.task import SwimTask
+from seastar_gym.envs.task_env import arguments_of
 from seastar_gym.envs.tracker import Pictures, Tracker
 from seastar_gym.plant.guard import Guard, Limits
 from seastar_gym.plant.logs import Logs
@@ -32,6 +33,8 @@ class PlantTask(SwimTask):
 
     plant: What is driven. limits: Of its guard. logs: Folder of logs; None: none.
     """
+
+    per_episode = ("path", "reward", "waypoint_radius")
 
     def __init__(self, plant: Plant, limits: Limits, options: SwimOptions, logs: Path | None):
         sight = Sight() if options.sight is None else options.sight
@@ -241,8 +244,11 @@ class PlantSwim(SeastarSwimEnv):
         if logs is not None:
             require_file("logs", logs)
         folder = None if logs is None else Path(logs)
+        self.plant, self.limits, self.logs = plant, limits, logs
         self._plant_task = PlantTask(plant, limits, SwimOptions(**options), folder)
         self._begin_with(self._plant_task, frames_per_stroke)
+
+    _arguments = arguments_of(__init__) | arguments_of(SwimOptions.__init__)
 
     @property
     def stopped(self) -> str:

@@ -11,13 +11,13 @@ when it is written. Reading constructs parts of registered classes only: it eval
 
 import inspect
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache, partial, wraps
 from typing import Any, ClassVar, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 
-from seastar_gym.scene.checks import as_typed, is_finite_number, require_few, shown
+from seastar_gym.scene.checks import as_typed, is_finite_number, require_few, require_unmasked, shown
 from seastar_gym.scene.number import PerRobot, Unnamed
 
 VERSION = 1
@@ -124,8 +124,8 @@ def _written_items(values: tuple[Any, ...], where: str) -> list[Any]:
 
 
 def from_dict(data: object, kind: type[Part]) -> Part:
-    """Part of the plain data that `to_dict` returned. ValueError for anything else."""
-    if not isinstance(data, dict) or "version" not in data:
+    """Part of the plain data that `to_dict` returned, in any mappings and sequences. ValueError for anything else."""
+    if not isinstance(data, Mapping) or "version" not in data:
         raise ValueError(f"A plain {kind.__name__} is a dict with a version, as to_dict writes it, not {shown(data)}.")
     version = data["version"]
     if type(version) is not int or version != VERSION:
@@ -139,6 +139,9 @@ def from_dict(data: object, kind: type[Part]) -> Part:
 def _read(value: object, where: str, depth: int = 0) -> Any:
     if depth > DEEPEST:
         raise ValueError(f"{where.split('.')[0]} is nested too deeply: more than {DEEPEST} levels.")
+    require_unmasked(where, value)
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
     match value:
         case None | bool() | str():
             return value
@@ -146,12 +149,12 @@ def _read(value: object, where: str, depth: int = 0) -> Any:
             return value
         case list() if set(map(type, value)) <= {int, float} and all(map(is_finite_number, value)):
             return tuple(value)  # of numbers, as many as there are robots
-        case list():
+        case Sequence() if not isinstance(value, bytes | bytearray | memoryview):
             require_few(where, value, MOST_ENTRIES)
             return tuple(_read(one, f"{where}[{k}]", depth + 1) for k, one in enumerate(value))
         case {"kind": str(kind), **fields} if kind in KINDS:
             return _read_part(kind, fields, where, depth)
-        case {"kind": str(kind), "items": list(items), **others} if kind in COLLECTIONS and not others:
+        case {"kind": str(kind), "items": [*items], **others} if kind in COLLECTIONS and not others:
             return _made(COLLECTIONS[kind], where, _read(items, where, depth + 1))
         case {"kind": kind}:
             raise ValueError(

@@ -29,6 +29,7 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache, Use
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 
+from seastar_gym.interrupts import held_back, let_through
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.ownership import ForeignFolderError, is_own, opened_by_owner, own_folder
 from seastar_gym.simd.pipeline import EntryCompiler, KernelCompiler
@@ -177,7 +178,8 @@ def _alone(path: Path) -> Iterator[None]:
                 with contextlib.suppress(BlockingIOError):
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                     break
-                time.sleep(0.05)
+                with let_through():
+                    time.sleep(0.05)
         yield
 
 
@@ -240,7 +242,8 @@ class EntryPoint(CPUDispatcher):
 
     def compile(self, sig):
         try:
-            return super().compile(sig)
+            with held_back():
+                return super().compile(sig)
         finally:
             if isinstance(self._cache, _DigestCache):
                 self._cache.end_turn()
@@ -262,7 +265,8 @@ def kept_code(name: str, make: Callable[[], bytes]) -> bytes:
             code = _sound(path)  # another process may have left it meanwhile
             if code is None:
                 _say_that_it_compiles("once: later runs find the code")
-                code = make()
+                with held_back():
+                    code = make()
                 _leave(path, code)
     return code
 

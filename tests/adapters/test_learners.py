@@ -96,6 +96,15 @@ def test_a_masked_learner_never_asks_for_what_wires_cannot_follow():
     assert closed > 0 and refused == 0
 
 
+def test_gymnasiums_torch_wrapper_takes_the_batch_and_every_entry_of_its_info():
+    pytest.importorskip("array_api_compat")  # which the wrapper needs, and the extra `learners` has
+    env = gym.wrappers.vector.NumpyToTorch(gym.make_vec("SeastarPrey-v0", 2, fidelity="fast", max_episode_steps=2))
+    env.reset(seed=0)
+    for _ in range(3):
+        observations, *_, info = env.step(torch.zeros(2, dtype=torch.int64))
+    assert all(isinstance(value, torch.Tensor) for value in [observations, *info.values()])
+
+
 # Loops and learners of examples/ learn for an iteration each on the native batch.
 
 

@@ -26,9 +26,9 @@ def make_batch(symmetry=False, **changes):
     return adapter.BatchVecEnv(VectorSymmetryReduction(batch) if symmetry else batch)
 
 
-def make_singles(symmetry=False):
+def make_singles(symmetry=False, **changes):
     def make():
-        env = gym.make("SeastarSwim-v0", max_episode_steps=LIMIT, **SETTINGS)
+        env = gym.make("SeastarSwim-v0", max_episode_steps=LIMIT, **SETTINGS, **changes)
         return common.Monitor(SymmetryReduction(env) if symmetry else env)
 
     return vec_env.DummyVecEnv([make] * N)
@@ -149,6 +149,18 @@ def test_attributes_and_methods_are_those_of_the_batch(symmetry):
     assert batch.env_is_wrapped(gym.vector.VectorObservationWrapper) == [False] * N
     batch.close()
     assert batch.env.unwrapped.closed
+
+
+def test_methods_give_every_robot_its_own_as_of_single_environments():
+    batch, singles = make_batch(render_mode="rgb_array"), make_singles(render_mode="rgb_array")
+    for env in (batch, singles):
+        env.seed(3)
+        env.reset()
+    for name in ("render", "privileged_observations", "action_masks", "sampling_mask"):
+        found, expected = batch.env_method(name, indices=[2, 0]), singles.env_method(name, indices=[2, 0])
+        assert type(found) is type(expected) and len(found) == 2
+        np.testing.assert_array_equal(found, expected)
+    assert batch.metadata["render_fps"] == 1
 
 
 def test_normalisation_goes_on_top_and_evaluation_takes_its_statistics():

@@ -1,5 +1,6 @@
 """Actions mean what the table in the environment's docstring says, and what is no action is refused."""
 
+import copy
 import itertools
 
 import gymnasium as gym
@@ -8,10 +9,10 @@ import pytest
 from gymnasium import spaces
 
 from refusals import assert_refused
-from seastar_gym import RewardWeights
+from seastar_gym import RewardWeights, SymmetryReduction
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import LIMB_COMMANDS, action_space, command_table, to_commands
-from seastar_gym.envs.goal import GoalForm
+from seastar_gym.envs.goal import SERVED, GoalForm
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import weights
@@ -141,3 +142,66 @@ def test_the_reward_is_that_of_the_goal_of_the_decision_and_goals_move_on():
     achieved = np.array([[0.0, 0.0], [0.0, 0.09], [0.3, 0.11]])
     desired = np.array([[0.0, 0.0], [0.0, 0.0], [0.3, 0.0]])
     np.testing.assert_array_equal(env.compute_reward(achieved, desired, [{}] * 3), [0.0, 0.0, -1.0])
+
+
+def put(env, place, heading) -> None:
+    """Put the robot, at rest, where its hub is at a place [m] and its limb 1 looks in a direction [rad]."""
+    simulator, (c, s) = env.unwrapped.simulator, (np.cos(heading), np.sin(heading))
+    nodes = env.unwrapped.scene.robot.nodes() @ np.array([[c, s], [-s, c]]) + place
+    state = simulator.get_state()
+    simulator.set_state(state._replace(positions=nodes[None], velocities=np.zeros_like(state.velocities)))
+
+
+@pytest.mark.parametrize("id", SERVED)
+def test_a_goal_pays_where_the_waypoint_counts_is_nowhere_else_in_the_observation_and_can_be_changed(id):
+    """Robots are put on the waypoint and beside it, and look the way that is asked for and the other one."""
+    env = GoalForm(gym.make(id, fidelity="fast"))
+    observed, _ = env.reset(seed=0)
+    rest = np.zeros_like(env.action_space.sample())
+    goals, achieved, rewards, infos = [], [], [], []
+    for beside in (0.05, 0.0, 0.05, 0.0):
+        for turned in (3.0, 0.0):
+            task, k = env.unwrapped._task, int(env.unwrapped._task.waypoint_index[0])
+            asked = task.headings_of(0)
+            put(env, env.unwrapped.waypoints[k] + [beside, 0.0], turned + (0.0 if asked is None else asked[k]))
+            twin = copy.deepcopy(env)
+            twin.unwrapped._task.move_waypoints(np.array([[0.3, 0.1]]))
+            if asked is not None:
+                twin.unwrapped._task._asked._asked[0] += 1.0
+            goals.append(observed["desired_goal"])
+            observed, reward, *_, info = env.step(rest)
+            elsewhere = twin.step(rest)[0]
+            np.testing.assert_array_equal(observed["observation"], elsewhere["observation"])
+            assert np.abs(observed["desired_goal"] - elsewhere["desired_goal"]).max() > 0.1
+            counts = beside == 0.0 and (turned == 0.0 or asked is None)
+            assert (reward == 0.0) == (info["waypoint_index"] > k) == counts
+            achieved.append(observed["achieved_goal"]), rewards.append(reward), infos.append(info)
+    for given in (infos, np.array(infos, dtype=object), infos[0], {}, None):
+        np.testing.assert_array_equal(env.compute_reward(achieved, goals, given), rewards)
+    assert not env.compute_reward(achieved, achieved, infos).any() and -1.0 in rewards and 0.0 in rewards
+
+
+@pytest.mark.parametrize("id", sorted(id for id in gym.registry if id.startswith("Seastar") and id not in SERVED))
+def test_what_has_more_than_waypoints_has_no_goal_form(id):
+    with assert_refused("GoalForm"):
+        GoalForm(gym.make(id, fidelity="fast"))
+
+
+def test_a_goal_form_stands_below_what_changes_observations_and_before_its_first_reset_is_no_step():
+    with assert_refused("put SymmetryReduction around it"):
+        GoalForm(SymmetryReduction(gym.make("SeastarSwim-v0", fidelity="fast")))
+    with pytest.raises(gym.error.ResetNeeded):
+        GoalForm(gym.make("SeastarSwim-v0", fidelity="fast").unwrapped).step(STRAIGHT)
+
+
+# Learners scale their actions, to the rounding of their floats.
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_share_beyond_one_by_rounding_is_one_and_by_more_is_refused(sign):
+    for share in (1, 1.0, np.float32(1.0000001), np.float32(1.0) + np.finfo(np.float32).eps, 1.0000004, np.float16(1)):
+        assert to_commands("continuous", 1, [[sign * share]], 1).tolist() == [[sign]]
+    assert abs(to_commands("continuous", 1, [[sign * 0.9999999]], 1)[0, 0]) < 1.0
+    for share in (1.00001, 1.01, np.inf, np.nan, np.float16(1.001)):
+        with assert_refused("numbers from -1 to 1"):
+            to_commands("continuous", 1, [[sign * share]], 1)

@@ -121,8 +121,7 @@ def test_the_reward_and_info_are_those_of_the_tables():
 @pytest.mark.parametrize("one, batch", [(SeastarSwimEnv, SeastarSwimVectorEnv), (SeastarTaskEnv, SeastarTaskVectorEnv)])
 def test_the_arguments_are_those_of_the_constructors(one, batch):
     assert arguments(one) == list(inspect.signature(one).parameters)
-    missing = {"frames_per_stroke"}  # a batch draws the ends of strokes
-    assert {*arguments(one), *arguments(batch)} - missing == set(inspect.signature(batch).parameters)
+    assert {*arguments(one), *arguments(batch)} == set(inspect.signature(batch).parameters)
     assert one is SeastarTaskEnv or all(f'"{name}"' in section("Arguments") for name in PATHS)
 
 

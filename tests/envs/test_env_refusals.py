@@ -1,11 +1,15 @@
 """Helpers of environments refuse in a sentence what they could not use, and take what is just allowed."""
 
 import copy
+import importlib
+import subprocess
+import sys
 
 import gymnasium as gym
 import numpy as np
 import pytest
 
+import seastar_gym.envs
 from refusals import assert_refused
 from seastar_gym import (
     Body,
@@ -27,7 +31,7 @@ from seastar_gym.envs.goal import GoalForm
 from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import SwimOptions
-from seastar_gym.envs.paths import FARTHEST, make_path, register_path
+from seastar_gym.envs.paths import FARTHEST, PATHS, make_path, register_path
 from seastar_gym.envs.randomization import LogUniform, Normal
 from seastar_gym.envs.rendering import Renderer
 from seastar_gym.envs.reward import RewardWeights
@@ -332,3 +336,53 @@ def test_resets_that_mean_nothing_are_refused_and_the_episode_goes_on():
             np.testing.assert_array_equal(one, other)
     with pytest.raises(gym.error.ResetNeeded, match="first reset"):
         SeastarSwimVectorEnv(3, fidelity="fast").reset(options={"reset_mask": np.array([True, False, True])})
+
+
+REFUSED_FIRST = """
+import gymnasium as gym, numpy as np, seastar_gym
+for id in [id for id in gym.registry if id.startswith("Seastar")]:
+    for make in (gym.make, gym.make_vec):
+        env, other = (make(id, fidelity="fast") for _ in range(2))
+        for refused in ({"seed": -1}, {"seed": "1"}, {"options": {"no": 1}}, {"options": [1]},
+                        {"options": {env.unwrapped._option: [[np.nan, 0.0]]}}):
+            try:
+                env.reset(**refused)
+            except ValueError as sentence:
+                assert str(sentence).endswith("."), sentence
+            else:
+                raise AssertionError((id, refused))
+            try:
+                env.step(env.action_space.sample())
+            except gym.error.ResetNeeded:
+                pass
+        action = env.action_space.sample()
+        for one in (env, other):
+            one.reset(seed=0)
+        for _ in range(2):
+            np.testing.assert_array_equal(env.step(action)[0], other.step(action)[0])
+"""
+
+
+def test_resets_that_are_refused_before_the_first_success_cost_nothing():
+    """By `gym.make` and `gym.make_vec`, of every id, in a process of its own."""
+    done = subprocess.run([sys.executable, "-c", REFUSED_FIRST], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_modules_and_names_of_paths_are_registered_again_without_a_word(recwarn):
+    """As a notebook does that loads modules or runs its cells again."""
+    registered = dict(gym.registry)
+    for module in (seastar_gym.envs, seastar_gym):
+        importlib.reload(module)
+    assert not recwarn and gym.registry == registered
+
+    def zigzag(rng):
+        return LEG
+
+    try:
+        register_path("zigzag")(zigzag)
+        register_path("zigzag")(type(zigzag)(zigzag.__code__, globals(), "zigzag"))
+        with assert_refused("zigzag"):
+            register_path("zigzag")(path)
+    finally:
+        PATHS.pop("zigzag", None)

@@ -22,7 +22,7 @@ from seastar_gym import (
     Uniform,
 )
 from seastar_gym.accuracy import chapters_certificate, timed_certificate
-from seastar_gym.envs import rendering
+from seastar_gym.envs import rendering, seastar_swim
 from seastar_gym.envs.paths import cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -120,7 +120,7 @@ def test_a_reset_tells_of_a_stroke_that_has_not_happened(scene, angle):
     info = env.reset(seed=0)[1]
     of_a_stroke = [*info][[*info].index("is_success") :]
     assert info["smallest_opening_angle"] == pytest.approx(angle) and info["is_success"] is False
-    assert len(of_a_stroke) == 11 and not any(info[name] for name in of_a_stroke if "angle" not in name)
+    assert len(of_a_stroke) == 10 and not any(info[name] for name in of_a_stroke if "angle" not in name)
     angle_then = env.step([0, 1, 0, 2, 0][: env.scene.robot.n_limbs])[4]["smallest_opening_angle"]
     assert (angle_then == np.pi) == (scene is not None)
 
@@ -249,9 +249,14 @@ def test_a_solver_that_gives_up_ends_the_episode_with_a_status_and_a_sentence(st
     env, fresh = fast(), fast()
     env.reset(seed=0), fresh.reset(seed=0)
     break_robot(env, status)
-    *_, terminated, truncated, info = env.step(STRAIGHT)
-    assert terminated is True and truncated is False and info["is_success"] is False
-    assert SolverStatus(info["solver_status"]) is status and info["solver_message"] == status.sentence
+    observation, reward, terminated, truncated, info = env.step(STRAIGHT)
+    assert terminated is True and truncated is False
+    assert SolverStatus(info["solver_status"]) is status
+    assert info["solver_message"] == status.sentence and "solver_message" not in info
+    assert info["is_success"] is False
+    assert np.isfinite(observation).all() and np.isfinite(reward)
+    no_numbers = ("energy_per_metre",)  # a robot that makes no way has no energy per metre of it
+    assert all(np.isfinite(value).all() for name, value in info.items() if name not in no_numbers)
     with pytest.raises(gym.error.ResetNeeded):
         env.step(STRAIGHT)
     env.reset(seed=0)
@@ -283,6 +288,19 @@ def test_being_watched_changes_no_bit(render_mode, dummy_window, monkeypatch):
             assert pictures == [None] and shown
     watched.close()
     watched.close()
+
+
+def test_pictures_that_nobody_takes_are_kept_up_to_a_bound_which_is_said(monkeypatch):
+    pytest.importorskip("pygame")
+    monkeypatch.setattr(seastar_swim, "MOST_FRAMES", 4)
+    env = fast(render_mode="rgb_array_list", frames_per_stroke=2)
+    env.reset(seed=0)
+    env.step(STRAIGHT)
+    with pytest.warns(UserWarning, match="last 4 are kept"):
+        env.step(STRAIGHT)
+    kept = env.render()
+    env.step(STRAIGHT)
+    assert len(kept) == 4 and len(env.render()) == 2 and np.any(kept[0] != kept[-1])
 
 
 def test_rendering_without_a_mode_warns_and_draws_nothing():

@@ -1,14 +1,26 @@
 """Decisions within a stroke: the timed environments, their actions, masks, heat and pictures."""
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
 from own_actuators import Triangle
-from seastar_gym import Limited, Numerics, RewardWeights, Scene, Seastar, SmaPulse, SmaWires, ThermalSma
+from seastar_gym import (
+    Limited,
+    Numerics,
+    RewardWeights,
+    Scene,
+    Seastar,
+    SmaPulse,
+    SmaWires,
+    SymmetryReduction,
+    ThermalSma,
+)
 from seastar_gym.accuracy.info import NAMES
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.masks import action_masks
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
 
 FAST = Numerics.preset("fast")
 MODES = ("limbs", "joint", "pairs", "continuous")
@@ -138,14 +150,21 @@ def test_a_masked_command_does_nothing_costs_nothing_and_is_counted(scene):
     assert info["masked_limbs"] == 2 and its_info["masked_limbs"] == 0
 
 
-def test_a_masked_policy_never_loses_a_command_and_wires_that_always_follow_have_no_mask_in_info():
-    """The mask of info is that of Gymnasium's `sample`."""
-    env = SeastarSwimEnv(actions="pairs", scene=REFRACTORY, decision_period=0.2)
-    _, info = env.reset(seed=0)
-    env.action_space.seed(0)
+@pytest.mark.parametrize("actions", ["limbs", "joint", "pairs"])
+def test_a_masked_policy_never_loses_a_command_and_wires_that_always_follow_have_no_mask_in_info(actions):
+    """The masks are those of Gymnasium's `sample`, for one robot and for each of a batch."""
+    arguments = {"actions": actions, "scene": REFRACTORY, "decision_period": 0.2}
+    env, batch = SeastarSwimEnv(**arguments), SeastarSwimVectorEnv(2, **arguments)
+    one, space = SymmetryReduction(env), batch.single_action_space
+    one.reset(seed=0), batch.reset(seed=0)
+    env.action_space.seed(0), space.seed(0)
     for _ in range(20):
-        info = env.step(env.action_space.sample(mask=info["action_mask"]))[4]
-        assert info["masked_limbs"] == 0
+        info = one.step(env.action_space.sample(mask=one.sampling_mask()))[4]
+        infos = batch.step(np.array([space.sample(mask=mask) for mask in batch.sampling_mask()]))[4]
+        assert info["masked_limbs"] == 0 and not infos["masked_limbs"].any()
+    assert not env.action_masks().all() and SeastarSwimEnv(actions="continuous").sampling_mask() is None
+    if actions != "limbs":
+        np.testing.assert_array_equal(one.sampling_mask(), one.action_masks().astype(np.int8))
     for arguments in ({}, {"decision_period": 0.5}, {"scene": Scene(actuator=ThermalSma())}):
         env = SeastarSwimEnv(**arguments)
         assert not {"action_mask", "masked_limbs"} & set(env.reset(seed=0)[1])
@@ -159,6 +178,10 @@ def test_a_second_has_ten_pictures_of_commands_and_warm_wires():
     for period, frames, fps in ((1.0, 10, 10), (0.5, 5, 10), (0.1, 1, 10), (0.02, 1, 50)):
         env = SeastarSwimEnv(decision_period=period, fidelity="fast")
         assert env.frames_per_stroke == frames and env.metadata["render_fps"] == fps
+    for mode, frames, fps in (("rgb_array", 5, 10 / 3), ("rgb_array_list", 6, 20)):
+        kind = {"decision_period": 0.3, "fidelity": "fast", "render_mode": mode, "frames_per_stroke": frames}
+        makers = (gym.make, gym.make_vec) if mode == "rgb_array" else (gym.make,)
+        assert all(make("SeastarSwim-v0", **kind).metadata["render_fps"] == fps for make in makers)
     warm, cold = (SeastarSwimEnv(actions="pairs", fidelity="fast", decision_period=period) for period in (0.5, 1.0))
     for env in (warm, cold):
         env.reset(seed=0)

@@ -102,7 +102,7 @@ def test_attributes_are_set_as_in_single_environments_and_what_is_common_is_refu
     assert batch.max_episode_steps == 3 and batch.call("get_attr", "actions") == (("limbs",) * 3,) * 3
     with assert_refused("max_episode_steps", "the same for all"):
         batch.set_attr("max_episode_steps", [3, 4, 3])
-    for name in ("reset", "step", "close"):
+    for name in ("reset", "step"):
         with assert_refused(f"use {name}()"):
             batch.call(name)
     with pytest.raises(AttributeError, match="no_such_thing"):

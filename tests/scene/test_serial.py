@@ -5,7 +5,9 @@ import dataclasses
 import inspect
 import json
 import math
+from collections import OrderedDict, UserDict, UserList, deque
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -34,6 +36,7 @@ from seastar_gym import (
     Water,
     register_part,
 )
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.scene.actuators.pulse import HeatingAndCooling
 from seastar_gym.scene.per_robot import numbers_of
@@ -89,6 +92,44 @@ OF_ENVIRONMENTS = [
 def test_what_an_environment_is_told_comes_back_in_its_order(part):
     read = from_dict(json.loads(json.dumps(to_dict(part), sort_keys=True)), type(part))
     assert read == part and repr(read) == repr(part)
+
+
+def carried(value, mapping, sequence):
+    """Plain data in other mappings and sequences."""
+    if isinstance(value, dict):
+        return mapping({name: carried(one, mapping, sequence) for name, one in value.items()})
+    return sequence([carried(one, mapping, sequence) for one in value]) if isinstance(value, list) else value
+
+
+def by_omegaconf(data):
+    return pytest.importorskip("omegaconf").OmegaConf.create(data)
+
+
+FORMS = {
+    "read-only": lambda data: carried(data, MappingProxyType, tuple),
+    "queues": lambda data: carried(data, OrderedDict, deque),
+    "users' own": lambda data: carried(data, UserDict, UserList),
+    "OmegaConf": by_omegaconf,
+}
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
+def test_any_mapping_and_sequence_is_plain_data_of_scenes_and_of_what_environments_are_told(form):
+    for scene in (Scene.preset("fast"), Scene(Seastar(youngs_modulus=EACH), fluid=Water(current=WAVES))):
+        assert Scene.from_dict(form(scene.to_dict())) == scene
+    for part in OF_ENVIRONMENTS:
+        assert from_dict(form(to_dict(part)), type(part)) == part
+    path = [[0.1, 0.0], [0.2, 0.1]]
+    options = SwimOptions(path=form({"path": path})["path"], sight=form(to_dict(Sight())))
+    np.testing.assert_array_equal(options.path, path)
+    assert options.sight == Sight()
+
+
+def test_arrays_are_sequences_of_plain_data_unless_entries_are_masked():
+    angles = {"version": 1, "kind": "HeadingTargets", "target": np.array([0.1, 0.2])}
+    assert from_dict(angles, HeadingTargets) == HeadingTargets((0.1, 0.2))
+    with assert_refused("masked"):
+        from_dict({**angles, "target": np.ma.array([0.1, 0.2], mask=[True, False])}, HeadingTargets)
 
 
 # Parts of one's own
@@ -203,6 +244,7 @@ def test_what_is_no_scene_is_refused(refused):
         ("robot", {"density": {"kind": "per robot", "items": [[1.0]]}}, ("density",)),
         ("robot", {"density": {"kind": "mapping", "items": [3]}}, ("Scene.robot.density is no dict",)),
         ("robot", {"density": {"kind": "mapping", "items": [[{"kind": "mapping", "items": []}, 1]]}}, ("no dict",)),
+        ("robot", {"density": {1.0, 2.0}}, ("Scene.robot.density", "{1.0, 2.0}")),
         ("robot", {"limbs": [{"kind": "SmaPulse"}]}, ("limbs must be a tuple of Limb",)),
         ("fluid", {"current": {**PLAIN["fluid"]["current"], "velocities": [[["1", "2"]] * 2] * 2}}, ("velocities",)),
         ("actuator", {"actuator": PLAIN["actuator"]}, ("Limited follows an actuator without memory",)),

@@ -17,8 +17,7 @@ import numpy as np
 import pytest
 
 from seastar_gym import DomainRandomization, Scene, Seastar, Simulator, SmaPulse, ThermalSma, Uniform
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.interrupts import held_back, let_through
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Numerics
 from seastar_gym.simd.lanes import N_LANES
@@ -300,23 +299,27 @@ def test_ctrl_c_leaves_all_robots_where_their_clock_says(threads):
 RANDOM = DomainRandomization({"robot.youngs_modulus": Uniform(0.5e6, 2e6)})
 
 
-def make(kind: str) -> SeastarSwimEnv | SeastarSwimVectorEnv:
+def make(kind: str) -> gym.Env | gym.vector.VectorEnv:
     if kind == "batch":
-        return SeastarSwimVectorEnv(3 * N_LANES, fidelity="fast", threads=2, randomization=RANDOM)
-    return SeastarSwimEnv(fidelity="fast", render_mode=None if kind == "one" else kind, randomization=RANDOM)
+        return gym.make_vec("SeastarSwim-v0", 3 * N_LANES, fidelity="fast", threads=2, randomization=RANDOM)
+    render_mode = None if kind == "one" else kind
+    return gym.make("SeastarSwim-v0", fidelity="fast", render_mode=render_mode, randomization=RANDOM)
 
 
+@pytest.mark.parametrize("first", [True, False], ids=["before the first success", "later"])
 @pytest.mark.parametrize("kind", ["one", "rgb_array_list", "batch"])
 @pytest.mark.parametrize("what", ["step", "reset", "set_scene"])
 def test_an_interrupted_environment_asks_for_a_reset_which_cures_it_and_a_refused_step_for_nothing(
-    monkeypatch, kind, what
+    monkeypatch, kind, what, first
 ):
     env, fresh = make(kind), make(kind)
     action = env.action_space.sample()
-    env.reset(seed=0)
-    with pytest.raises(ValueError, match="7"):
-        env.step(np.full_like(action, 7))
-    env.step(action)
+    if what == "step" or not first:
+        env.reset(seed=0)
+    if not first:
+        with pytest.raises(ValueError, match="7"):
+            env.step(np.full_like(action, 7))
+        env.step(action)
     if what == "step":
         with interrupted(env.unwrapped.simulator, Kernel(monkeypatch, before=interrupt, nth=1)):
             env.step(action)
@@ -326,6 +329,137 @@ def test_an_interrupted_environment_asks_for_a_reset_which_cures_it_and_a_refuse
         env.step(action)
     np.testing.assert_array_equal(env.reset(seed=1)[0], fresh.reset(seed=1)[0])
     np.testing.assert_array_equal(env.step(action)[0], fresh.step(action)[0])
+
+
+# Ctrl-C while numba is imported, compiles or loads code
+
+
+@contextlib.contextmanager
+def handled_by(handler):
+    before = signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+        assert signal.getsignal(signal.SIGINT) is handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.parametrize("ends", [contextlib.nullcontext, lambda: pytest.raises(MemoryError)], ids=["well", "badly"])
+@pytest.mark.parametrize("depth", [1, 3])
+def test_ctrl_c_waits_for_the_end_of_what_holds_it_back_and_goes_to_whoever_handles_it_then(depth, ends):
+    told = []
+    with handled_by(lambda number, frame: told.append(number)), ends(), contextlib.ExitStack() as held:
+        for _ in range(depth):
+            held.enter_context(held_back())
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+        assert not told
+        if ends is not contextlib.nullcontext:
+            raise MemoryError
+    assert told == [signal.SIGINT]
+    with handled_by(signal.default_int_handler):
+        with pytest.raises(KeyboardInterrupt), held_back():
+            signal.raise_signal(signal.SIGINT)
+        with held_back(), pytest.raises(KeyboardInterrupt), let_through():  # while it waits for another process
+            signal.raise_signal(signal.SIGINT)
+    with handled_by(signal.SIG_IGN), held_back():
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_what_another_thread_compiles_holds_back_no_ctrl_c_of_the_main_one():
+    begun, go_on, done = threading.Event(), threading.Event(), threading.Event()
+
+    def compile_there():
+        with held_back():
+            begun.set()
+            assert go_on.wait(60.0)
+        done.set()
+
+    thread = threading.Thread(target=compile_there)
+    thread.start()
+    assert begun.wait(60.0)
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+    go_on.set()
+    thread.join()
+    assert done.is_set()
+
+
+INTERRUPTED_AT_FIRST = """
+import time
+import gymnasium as gym, seastar_gym
+begun, env = time.monotonic(), None
+try:
+    print("begun", flush=True)
+    env = gym.make("SeastarSwim-v0", fidelity="fast")
+    env.reset(seed=0)
+    env.step([1, 0, 0, 2, 0])
+    print(time.monotonic() - begun, flush=True)
+    time.sleep(60.0)
+except KeyboardInterrupt:
+    env = env or gym.make("SeastarSwim-v0", fidelity="fast")
+    env.reset(seed=0)
+    print(env.step([1, 0, 0, 2, 0])[1], flush=True)
+"""
+
+
+def interrupted_at_first(after: float | None, cache) -> list[float]:
+    """What a process prints that makes its first environment and is interrupted after a time [s], None: at its end."""
+    command, variables = [sys.executable, "-c", INTERRUPTED_AT_FIRST], {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, env=variables, text=True) as process:
+        assert process.stdout.readline() == "begun\n"
+        took = [process.stdout.readline()] if after is None else time.sleep(after) or []
+        process.send_signal(signal.SIGINT)
+        return [float(line) for line in [*took, *process.communicate(timeout=500.0)[0].split()]]
+
+
+INTERRUPTED_AT_AN_IMPORT = """
+import signal, sys
+import gymnasium as gym, seastar_gym
+library, left, env = sys.argv[1], [int(sys.argv[2])], None
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        left[0] -= name.partition(".")[0] == library
+        if left[0] == 0:
+            left[0] = -1
+            signal.raise_signal(signal.SIGINT)
+
+def swim():
+    global env
+    env = env or gym.make("SeastarSwim-v0", fidelity="fast", render_mode="rgb_array")
+    env.reset(seed=0)
+    env.render()
+    env.step([1, 0, 0, 2, 0])
+
+sys.meta_path.insert(0, Finder())
+try:
+    swim()
+except KeyboardInterrupt:
+    swim()
+    print("swims")
+"""
+
+
+@pytest.mark.parametrize("library, nth", [("numba", 1), ("numba", 120), ("scipy", 1), ("scipy", 100), ("pygame", 10)])
+def test_the_first_environment_can_be_interrupted_in_the_middle_of_an_import(library, nth):
+    if library == "pygame":
+        pytest.importorskip("pygame")
+    command = [sys.executable, "-c", INTERRUPTED_AT_AN_IMPORT, library, str(nth)]
+    assert subprocess.run(command, capture_output=True, text=True, check=False).stdout == "swims\n"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Ctrl-C is sent otherwise on Windows")
+def test_the_first_environment_can_be_interrupted_at_any_time(tmp_path):
+    """While numba is imported, compiles, loads and runs code: the next reset works, and swims the same."""
+    rng = np.random.default_rng(0)
+    compiling, reward = interrupted_at_first(None, tmp_path / "warm")
+    loading, again = interrupted_at_first(None, tmp_path / "warm")
+    assert again == reward and loading < compiling
+    for k in range(8):
+        warm = k > 1
+        after = rng.uniform(0.0, loading if warm else compiling)
+        assert interrupted_at_first(after, tmp_path / ("warm" if warm else f"cold {k}"))[-1:] == [reward]
 
 
 # Threads and processes

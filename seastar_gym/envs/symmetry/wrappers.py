@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from seastar_gym.envs.masks import sampling_mask
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.symmetry.group import memory_mirror, symmetry_of
 from seastar_gym.envs.symmetry.symmetry import FrameStack, Symmetry
@@ -97,6 +98,10 @@ class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstru
         inner: Any = self.unwrapped
         return self._symmetry.carry_masks(inner.action_masks(), self._element)
 
+    def sampling_mask(self) -> Any:
+        """`action_masks` in the form that `action_space.sample(mask=...)` takes."""
+        return sampling_mask(self.action_space, self.action_masks())
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; the observation is reduced."""
         observation, info = self.env.reset(seed=seed, options=options)
@@ -136,6 +141,10 @@ class VectorSymmetryReduction(_VectorWrapper):
         """Actions on the last reduced observations that the wires can follow, shape (num_envs, k)."""
         inner: Any = self.unwrapped
         return self._symmetry.carry_masks(inner.action_masks(), self._elements)
+
+    def sampling_mask(self) -> tuple[Any, ...]:
+        """`action_masks` in the form that `single_action_space.sample(mask=...)` takes, for every robot."""
+        return tuple(sampling_mask(self.single_action_space, mask) for mask in self.action_masks())
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None

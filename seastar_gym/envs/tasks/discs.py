@@ -9,8 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
+
+from seastar_gym.interrupts import held_back
+
+with held_back():
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import dijkstra
 
 Floats = NDArray[np.float64]
 

@@ -8,6 +8,7 @@ from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.options import Plain, SwimOptions, read
 from seastar_gym.envs.seastar_swim import RenderMode, SeastarSwimEnv
 from seastar_gym.envs.sight import Drawn, Sight
+from seastar_gym.envs.task_env import arguments_of
 from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.fail_blind import FailBlind
 from seastar_gym.envs.tasks.miswired import Miswired
@@ -120,9 +121,11 @@ class SeastarTaskEnv(SeastarSwimEnv):
         action_delay: Drawn | Plain = 0.0,
     ):
         self._set_pictures(render_mode, frames_per_stroke)
-        self.challenge = read_challenge(task)
+        self.challenge, self.task, self.split = read_challenge(task), task, split
         options = _options(actions, fidelity, decision_period, sight, action_delay)
         self._begin_with(self.challenge.swimming(options, 1, 1, split), frames_per_stroke)
+
+    _arguments = arguments_of(__init__)
 
 
 class SeastarTaskVectorEnv(SeastarSwimVectorEnv):
@@ -132,7 +135,7 @@ class SeastarTaskVectorEnv(SeastarSwimVectorEnv):
     takes one number for all robots, or one for each.
 
     ## Arguments besides those of `SeastarTaskEnv`
-    num_envs, max_episode_steps, autoreset_mode, threads: See `SeastarSwimVectorEnv`.
+    num_envs, max_episode_steps, autoreset_mode, threads, disable_env_checker: See `SeastarSwimVectorEnv`.
     """
 
     _option = "instance"
@@ -151,8 +154,14 @@ class SeastarTaskVectorEnv(SeastarSwimVectorEnv):
         threads: int | None = None,
         sight: Sight | Plain | None = None,
         action_delay: Drawn | Plain = 0.0,
+        frames_per_stroke: int | None = None,
+        disable_env_checker: bool | None = None,
     ):
-        self._set_batch(num_envs, max_episode_steps, render_mode, autoreset_mode)
-        self.challenge = read_challenge(task)
+        self._set_batch(
+            num_envs, max_episode_steps, render_mode, autoreset_mode, threads, frames_per_stroke, disable_env_checker
+        )
+        self.challenge, self.task, self.split = read_challenge(task), task, split
         options = _options(actions, fidelity, decision_period, sight, action_delay)
         self._begin_with(self.challenge.swimming(options, num_envs, threads, split))
+
+    _arguments = arguments_of(__init__)

@@ -100,6 +100,7 @@ class FailBlindTask(Numbered, SwimTask):
     observes_commands = True
     entries: tuple[Entry, ...] = ("vector", "pseudoscalar")
     shows_limbs = False
+    goals_are_waypoints = False
 
     def __init__(self, config: FailBlind, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
         self.config = config

@@ -204,6 +204,7 @@ class ObstTrapTask(Numbered, SwimTask):
     """Task of robots that swim around discs."""
 
     TERMS = (*SwimTask.TERMS, "reward_touch")
+    goals_are_waypoints = False
     entries: tuple[Entry, ...] = ("vector", "scalar") * SEEN
 
     def __init__(self, config: ObstTrap, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
