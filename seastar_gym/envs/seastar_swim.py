@@ -17,7 +17,6 @@ from seastar_gym.envs.swimming import Outcome, Swimming
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.task_env import TaskEnv, arguments_of, checked_options
 from seastar_gym.scene.checks import require_choice, require_count, require_seed
-from seastar_gym.simulator import SolverStatus
 from seastar_gym.simulator.pauses import completed
 
 FRAMES_PER_SECOND = 10
@@ -412,16 +411,6 @@ def render_fps(task: Swimming, render_mode: str | None, frames_per_stroke: int) 
     return int(fps) if fps.is_integer() else fps
 
 
-class _Info(dict[str, Any]):
-    """Info of one robot. For one release, `info["solver_message"]` is the sentence of its status, empty for 0."""
-
-    def __missing__(self, name: str) -> str:
-        if name != "solver_message":
-            raise KeyError(name)
-        return SolverStatus(self["solver_status"]).sentence if self["solver_status"] else ""
-
-
 def _of_one_robot(info: dict[str, NDArray[Any]]) -> dict[str, Any]:
     """Info of robot 0 as plain numbers, its vectors as arrays, copies."""
-    found = {name: values[0].copy() if values.ndim > 1 else values.item() for name, values in info.items()}
-    return _Info(found)
+    return {name: values[0].copy() if values.ndim > 1 else values.item() for name, values in info.items()}
