@@ -7,10 +7,11 @@ import pytest
 
 from seastar_gym import Limited, MeasuredCurve, Numerics, RewardWeights, Scene, Seastar, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.accuracy import timed_certificate
-from seastar_gym.accuracy.info import IN_TIME, NAMES
+from seastar_gym.accuracy.info import IN_TIME
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.masks import action_masks
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
 
 FAST = Numerics.preset("fast")
 MODES = ("limbs", "joint", "pairs", "continuous")
@@ -65,7 +66,9 @@ def test_errors_of_timed_commands_are_promised_to_wires(fidelity, period):
 def test_other_robots_and_wires_and_times_that_were_not_measured_are_promised_nothing(scene, period):
     fidelity = "fast" if scene is None else None
     env = SeastarSwimEnv(scene=scene, fidelity=fidelity, decision_period=period)
-    assert not set(NAMES) & set(env.reset(seed=0)[1])
+    batch = SeastarSwimVectorEnv(2, scene=scene, fidelity=fidelity, decision_period=period)
+    for info in (env.reset(seed=0)[1], batch.reset(seed=0)[1], batch.step(np.zeros((2, 5), int))[4]):
+        assert all(np.isnan(info[name]).all() for name in IN_TIME) and "batch_real_time_factor" not in info
 
 
 # Heat
