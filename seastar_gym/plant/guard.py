@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
 from seastar_gym.plant.plausibility import Motion, Plausibility
 from seastar_gym.scene import Seastar
-from seastar_gym.scene.number import check_numbers, not_negative, positive
+from seastar_gym.scene.number import not_negative, positive
 
 POLL = 0.01
 """Time between looks at a plant [s]."""
@@ -33,10 +33,6 @@ class Limits(Motion):
     shortest_rest: Annotated[float, not_negative("s")] = 0.1
     patience: Annotated[float, positive("s")] = 0.12
     oldest: Annotated[float, positive("s")] = 0.5
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "Limits.")
-        self.check_tank()
 
 
 class Guard:

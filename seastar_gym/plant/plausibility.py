@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.plant.plant import PlantError, Sighting
 from seastar_gym.scene.checks import is_finite_number, shown
-from seastar_gym.scene.number import positive
+from seastar_gym.scene.number import check_numbers, positive
 
 WINDOW = 0.5
 """Time over which a picture is compared with those before it [s]."""
@@ -51,8 +51,8 @@ class Motion:
     tank: tuple[tuple[float, float], tuple[float, float]] | None = None
     still: Annotated[float, positive("s")] = 0.5
 
-    def check_tank(self) -> None:
-        """ValueError for a tank that is not two corners."""
+    def __post_init__(self) -> None:
+        check_numbers(self, "Limits.")
         match self.tank:
             case None:
                 return
