@@ -19,7 +19,7 @@ NAMES = (*IN_TIME, "batch_real_time_factor")
 def errors_in_info(
     scene: Scene, certificate: Certificate | None = None, decision_period: float | None = None
 ) -> dict[str, float]:
-    """Measured errors and speed of a scene by their names in `info`; NaN for scenes not measured, nothing in time.
+    """Measured errors and speed of a scene by their names in `info`; NaN for scenes not measured.
 
     certificate: Where they stand, the package's own if None. decision_period: Time between decisions [s]. None means
     strokes.
@@ -27,7 +27,7 @@ def errors_in_info(
     known = _certificate(certificate, decision_period)
     setting = None if known is None else known.of(scene)
     if known is None or setting is None:
-        return dict.fromkeys(NAMES, math.nan) if decision_period is None else {}
+        return dict.fromkeys(NAMES if decision_period is None else IN_TIME, math.nan)
     gaits = known.repeated(known.actions)
     others = [name for name in known.actions if name not in gaits]
     found = {
@@ -84,8 +84,11 @@ def warn_uncertified(
             f"{shown(scene.numerics)}, so errors in info are NaN: Certificate.for_error chooses what it has."
         )
     else:
-        remedy = "info has no errors: error_bars=True estimates them as the robot swims"
+        remedy = "error_bars=True estimates them as the robot swims"
         if decision_period is None:
-            remedy = "errors in info are NaN: seastar certify measures them"
-        told = f'Errors of this scene were not measured: fidelity="{fidelity}" promises nothing for it, and {remedy}.'
+            remedy = "seastar certify measures them"
+        told = (
+            f'Errors of this scene were not measured: fidelity="{fidelity}" promises nothing for it, and errors in '
+            f"info are NaN: {remedy}."
+        )
     warnings.warn(told, stacklevel=3)

@@ -143,7 +143,9 @@ def drive(options: argparse.Namespace) -> int:
     draw_traces([planned, swum], RADIUS, options.out / "driven.png", current)
     text = report(options, planned, swum, env)
     write_atomically(options.out / "report.md", text)
-    print(f"Driven: {swum.result}. {env.stopped or 'The guard had nothing to stop.'} Written: {options.out}.")
+    guarded = env.stopped or "The guard had nothing to stop."
+    dropped = f" {env.dropped_pictures} pictures were dropped, where no robot can be." if env.dropped_pictures else ""
+    print(f"Driven: {swum.result}. {guarded}{dropped} Written: {options.out}.")
     return STOPPED if env.stopped else 0
 
 
@@ -166,6 +168,7 @@ def report(options: argparse.Namespace, planned: Swim, swum: Swim, env: PlantSwi
         "decisions": f"{swum.strokes}, every {options.decision_period:g} s, at most {1e3 * env.latest:.0f} ms late",
         "heat": f"{swum.heating_time.sum():.2f} s, summed over wires",
         "sightings": f"{len(poses)}, at most {1e3 * gaps.max(initial=0.0):.0f} ms apart",
+        "pictures dropped": f"{env.dropped_pictures}, where no robot can be",
         "delay of sight": f"{1e3 * np.median(delays):.0f} ms, median; at most {1e3 * delays.max():.0f} ms",
     }
     table = "".join(f"| {name} | {value} |\n" for name, value in rows.items())

@@ -80,7 +80,9 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         n_places=len(at_nodes),
         n_points=n_free if on_body is None else n_free + on_body.coefficients.n_arms,
         stretching=stretched,
-        bending=with_joints(bending.coefficients(mesh, gregory=continuum), [limb.joint_stiffness for limb in limbs]),
+        bending=with_joints(
+            bending.coefficients(mesh, continuum, held_edges(scene)), [limb.joint_stiffness for limb in limbs]
+        ),
         hub=hub.coefficients(hub_angles, turning=robot.hub_hinge == "turning"),
         clamp=clamp.coefficients(mesh, [limb.direction for limb in limbs]) if continuum else None,
         along=limb_actuation(scene, index, mesh.natural_turn),
@@ -103,6 +105,13 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         scales=scales.coefficients(mesh, stretched, robot.density, water.density, C_d, mass, scene.held_nodes),
         body=None if on_body is None else on_body.coefficients,
     )
+
+
+def held_edges(scene: Scene) -> list[int]:
+    """Limbs whose root edge is held, by the hub and node 1, and no more of which is."""
+    robot, held = scene.robot, set(scene.held_nodes)
+    roots = [1 + limb * (robot.nodes_per_limb - 1) for limb in range(robot.n_limbs)]
+    return [limb for limb, root in enumerate(roots) if {0, root} <= held and root + 1 not in held]
 
 
 def limb_actuation(scene: Scene, index: int, natural_turn: list[float]) -> along.Along | None:

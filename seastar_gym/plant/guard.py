@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from seastar_gym.plant.heat import LATENESS, WIRE, Heat
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
+from seastar_gym.plant.plausibility import Motion, Plausibility
+from seastar_gym.scene import Seastar
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.checks import require_flag, require_kind, shown
-from seastar_gym.scene.number import check_numbers, finite, not_negative, positive
+from seastar_gym.scene.number import finite, not_negative, positive
 
 POLL = 0.01
 """Time between looks at a plant [s]."""
@@ -24,8 +26,8 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class Limits:
-    """What a guard allows.
+class Limits(Motion):
+    """What a guard allows, besides the `Motion` that it takes for possible.
 
     longest_pulse: Longest pulse [s].
     shortest_rest: Shortest time between the end of a wire's pulse and its next [s].
@@ -45,7 +47,7 @@ class Limits:
     wire: ThermalSma | None = None
 
     def __post_init__(self) -> None:
-        check_numbers(self, "Limits.")
+        super().__post_init__()
         require_flag("Limits.antagonists", self.antagonists)
         if self.wire is not None:
             require_kind("Limits.wire", self.wire, ThermalSma, "a ThermalSma")
@@ -73,14 +75,17 @@ class Guard:
     """Watches a plant: every pulse and every sighting goes through it, and whatever is wrong stops all wires.
 
     pulse: Longest pulse that will be asked for [s]; None: the longest one that the limits allow.
+    span: Distance of the farthest point of the robot from its hub, at rest [m].
     """
 
-    def __init__(self, plant: Plant, limits: Limits, pulse: float | None = None):
+    def __init__(self, plant: Plant, limits: Limits, pulse: float | None = None, span: float = Seastar().limb_length):
         self.plant, self.limits, self.n_limbs = plant, limits, plant.n_limbs
         self._pulse = limits.longest_pulse if pulse is None else pulse
         self.held_back: str | None = None
         """Why the plant was stopped, in one sentence; None while it may be heated."""
         self.newest: Sighting | None = None
+        self.plausibility = Plausibility(limits, self.n_limbs, span)
+        self._judged_at = -np.inf  # when the last picture was taken that was looked at [s]
         self._clock, self._changed_at = plant.now(), plant.now()
         self._heat = limits.heat(plant.n_limbs, LATENESS)
         self._heat.tick(self._clock)
@@ -116,15 +121,18 @@ class Guard:
     def begin(self) -> Sighting:
         """Forget what was, and wait for the robot to be seen. PlantError: it is not."""
         self.held_back = self.newest = None
+        self._judged_at = -np.inf
+        self.plausibility.begin()
         with self.stops():
             self.plant.stop()
             self._clock = self.plant.now()
         until = self.now() + FIRST
         while True:
             seen, now = self._ask()
-            if seen is not None and now - seen.captured_at <= self.limits.oldest:
+            if seen is not None and not now - seen.captured_at > self.limits.oldest:
                 self._take(seen, now)
-                return seen
+            if self.newest is not None:
+                return self.newest
             if now > until:
                 raise self.refuse(f"The tracker has not seen the robot for {FIRST:g} s: all wires are stopped.")
             self._wait(POLL)
@@ -147,24 +155,33 @@ class Guard:
         if self.held_back is not None:
             raise PlantError(self.held_back)
         seen, now = self._ask()
-        if seen is not None and (self.newest is None or seen.captured_at != self.newest.captured_at):
+        if seen is not None:
             self._take(seen, now)
         if self.newest is not None and now - self._changed_at > self.limits.patience:
             raise self.refuse(f"No new picture for {self.limits.patience:g} s: all wires are stopped.")
         return self.newest
 
     def _take(self, seen: Sighting, now: float) -> None:
-        """Take a new sighting; refuse one that cannot be."""
-        if not np.isfinite([seen.captured_at, *seen.pose]).all():
-            raise self.refuse("A sighting has numbers that are not finite: all wires are stopped.")
-        if self.newest is not None and seen.captured_at < self.newest.captured_at:
-            raise self.refuse("The tracker's clock has gone back: all wires are stopped.")
+        """Take a new sighting; drop or refuse one that cannot be."""
+        with self.stops():
+            self._judge(seen, now)
+
+    def _judge(self, seen: Sighting, now: float) -> None:
+        if seen.captured_at == self._judged_at:
+            return
+        if seen.captured_at < self._judged_at:
+            raise PlantError("The tracker's clock has gone back: all wires are stopped.")
         if seen.captured_at > now + POLL:
-            raise self.refuse("A picture was taken in the future: the tracker's clock is not that of the plant.")
+            raise PlantError("A picture was taken in the future: the tracker's clock is not that of the plant.")
         if now - seen.captured_at > self.limits.oldest:
             age = now - seen.captured_at
-            raise self.refuse(f"The newest picture is {age:.3g} s old: all wires are stopped.")
-        self.newest, self._changed_at = seen, now
+            raise PlantError(f"The newest picture is {age:.3g} s old: all wires are stopped.")
+        self._judged_at = seen.captured_at
+        can_be = self.plausibility.take(seen)
+        if can_be:
+            self.newest = seen
+        if can_be or self.plausibility.is_first_dropped:
+            self._changed_at = now
 
     def wait_until(self, time: float) -> None:
         """Wait until a time [s], looking all the while."""
@@ -194,3 +211,4 @@ class Guard:
             finally:
                 self._heat.tick(self.plant.now())
                 self._heat.heat(wires, seconds)
+                self.plausibility.heated(limbs, seconds, self.plant.now())

@@ -174,9 +174,9 @@ def sighting_of(words: list[str], seen_at: float, n_limbs: int) -> Sighting:
 
 
 def line_of(seen: Sighting) -> str:
-    """Line of a sighting."""
+    """Line of a sighting, with digits that tell a hub that hardly moves from a tracker that is frozen."""
     numbers = [*seen.pose, *([] if seen.markers is None else seen.markers.ravel().tolist())]
-    return " ".join(["sight", f"{seen.captured_at:.6f}", *(f"{number:.6f}" for number in numbers)])
+    return " ".join(["sight", f"{seen.captured_at:.6f}", *(f"{number:.9g}" for number in numbers)])
 
 
 class LinePlant:

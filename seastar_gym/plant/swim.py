@@ -14,7 +14,7 @@ from seastar_gym.envs.lag import Lag
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.pictures import lengths_of
 from seastar_gym.envs.seastar_swim import Observation, RenderMode, SeastarSwimEnv
-from seastar_gym.envs.sight import Sight
+from seastar_gym.envs.sight import Sight, bounds_of
 from seastar_gym.envs.swimming import Flags, Floats
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.task_env import arguments_of
@@ -22,10 +22,17 @@ from seastar_gym.envs.tracker import Pictures, Tracker
 from seastar_gym.plant.guard import Guard, Limits
 from seastar_gym.plant.logs import Logs
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
+from seastar_gym.plant.plausibility import NOISES
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.checks import require_file, require_kind, shown
 from seastar_gym.simulator import StrokeReport
 from seastar_gym.simulator.pauses import pausing
+
+
+def limits_for(limits: Limits, sight: Sight) -> Limits:
+    """Limits that do not drop what a camera with these errors sees of a robot that lies still."""
+    blur, turn_blur = (NOISES * bounds_of(value)[1] for value in (sight.noise, sight.turn_noise))
+    return replace(limits, blur=max(limits.blur, blur), turn_blur=max(limits.turn_blur, turn_blur))
 
 
 class PlantTask(SwimTask):
@@ -59,7 +66,8 @@ class PlantTask(SwimTask):
                 f"A full command heats a cold wire to {reached:.0f} deg C, the guard allows {limits.hottest:g} deg C: "
                 "use an actuator with a shorter heating_time, or other Limits."
             )
-        self.guard = Guard(plant, limits, self.pulse)
+        span = float(np.linalg.norm(self.simulator.positions[0] - self.simulator.hub_position()[0], axis=-1).max())
+        self.guard = Guard(plant, limits_for(limits, sight), self.pulse, span)
         self._folder = logs
         self.logs: Logs | None = None
         self.stopped = ""
@@ -204,9 +212,10 @@ class PlantTask(SwimTask):
         )
 
     def facts(self, hub: Floats | None = None) -> dict[str, NDArray[Any]]:
-        """What is known of the robot now, how late the last decision was [s], and why the plant was stopped."""
+        """What is known of the robot now, and what `PlantSwim` adds to `info`."""
         late, message = np.array([self._late]), np.array([self.stopped], dtype=object)
-        return {**super().facts(hub), "late": late, "plant_message": message}
+        dropped = np.array([self.guard.plausibility.n_dropped])
+        return {**super().facts(hub), "late": late, "dropped_pictures": dropped, "plant_message": message}
 
 
 class PlantSwim(SeastarSwimEnv):
@@ -216,9 +225,10 @@ class PlantSwim(SeastarSwimEnv):
     hub was seen when the episode began, the axes are those of the tank. Places in rewards and in `info` are those
     that were seen last. Decisions come on the plant's clock: a step returns when the next decision is due.
 
-    `info` has `late`, how late the last decision was [s], for which the episode's clock waits, and `plant_message`. The
-    guard ends an episode with `truncated` and a sentence in `plant_message`: then all wires are stopped. Wires that
-    have to rest are masked, as refractory ones are.
+    `info` has `late`, how late the last decision was [s], for which the episode's clock waits, `dropped_pictures`, how
+    many pictures of the episode were dropped because no robot can be there, and `plant_message`. The guard ends an
+    episode with `truncated` and a sentence in `plant_message`: then all wires are stopped. Wires that have to rest are
+    masked, as refractory ones are.
 
     ## Arguments besides those of `SeastarSwimEnv`
     plant: What is driven, see `seastar_gym.plant.plant`.
@@ -259,6 +269,11 @@ class PlantSwim(SeastarSwimEnv):
     def latest(self) -> float:
         """How late the latest decision of the episode was, but for the first [s]."""
         return self._plant_task.latest
+
+    @property
+    def dropped_pictures(self) -> int:
+        """Number of pictures of the episode that were dropped, because no robot can be there."""
+        return self._plant_task.guard.plausibility.n_dropped
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Swim for one decision; returns observation, reward, terminated, truncated and info."""

@@ -51,7 +51,9 @@ class Scene:
     fluid: Fluid around the robot. None means vacuum.
     actuator: Actuator that turns the limbs at the hub.
     numerics: Settings of time stepping. Without any, they are those of the fidelity "balanced".
-    held_nodes: Indices of nodes that do not move. Holding the hub and a limb's first node clamps the limb.
+    held_nodes: Indices of nodes that do not move. Holding the hub and a limb's first node clamps the limb at the hub,
+        and keeps the hub from turning; limbs of two edges, the chapter's, and those with more nodes held are clamped
+        in the middle of the last edge that is held.
     loads: Constant forces on nodes, (node, F_x, F_y) [N] each.
     limb_strengths: Factors by which the rotations of the limbs are reduced, from 0 (no rotation) to 1 (full), one per
         limb. () means full rotation.

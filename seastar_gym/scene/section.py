@@ -17,7 +17,8 @@ from seastar_gym.scene.serial import register_part
 BROADSIDE = ((0.1, 2.23), (0.2, 1.98), (0.5, 1.70), (1.0, 1.51), (2.0, 1.36), (5.0, 1.21), (10.0, 1.14))
 """Added mass of rectangles over that of the circle about their height, by height over width.
 
-After DNV-RP-C205, within 3 % of a potential flow (tests/scene/test_section.py); 1 for a thin plate.
+After DNV-RP-C205, within 2 % of potential flow (tests/scene/test_section.py). Above the table it tends to 1, as of a
+thin plate. Below it, a long body with blunt ends has a source and a sink, and grows by 4/pi^2 with the logarithm.
 """
 
 
@@ -165,6 +166,8 @@ AnySection: TypeAlias = Disc | Strip | Tube | Section
 def broadside(height_over_width: float) -> float:
     """Added mass of a rectangle that moves along its width, over that of the circle about its height, see BROADSIDE."""
     ratios, coefficients = zip(*BROADSIDE, strict=True)
+    if height_over_width < ratios[0]:
+        return coefficients[0] + 4.0 / math.pi**2 * math.log(ratios[0] / height_over_width)
     if height_over_width > ratios[-1]:
         return float(1.0 + (coefficients[-1] - 1.0) * ratios[-1] / height_over_width)
     return float(np.interp(math.log(height_over_width), np.log(ratios), coefficients))

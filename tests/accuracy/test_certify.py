@@ -298,7 +298,7 @@ def test_where_nothing_is_promised_a_warning_says_what_to_do(certificate):
         SeastarSwimEnv(scene=SCENE, fidelity="fast")
     assert told[0].filename == __file__  # where the environment is made
     timed = {"fidelity": "fast", "decision_period": 0.2}
-    with pytest.warns(UserWarning, match=r"info has no errors: error_bars=True"):
+    with pytest.warns(UserWarning, match=r"errors in info are NaN: error_bars=True"):
         gym.make("SeastarSwim-v0", scene=replace(SCENE, actuator=SmaWires()), **timed)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

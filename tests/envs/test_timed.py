@@ -16,7 +16,7 @@ from seastar_gym import (
     SymmetryReduction,
     ThermalSma,
 )
-from seastar_gym.accuracy.info import NAMES
+from seastar_gym.accuracy.info import IN_TIME
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.masks import action_masks
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -52,7 +52,9 @@ def test_a_decision_is_a_stroke_unless_another_period_is_asked_for():
 def test_other_robots_and_wires_and_times_that_were_not_measured_are_promised_nothing(scene, period):
     fidelity = "fast" if scene is None else None
     env = SeastarSwimEnv(scene=scene, fidelity=fidelity, decision_period=period)
-    assert not set(NAMES) & set(env.reset(seed=0)[1])
+    batch = SeastarSwimVectorEnv(2, scene=scene, fidelity=fidelity, decision_period=period)
+    for info in (env.reset(seed=0)[1], batch.reset(seed=0)[1], batch.step(np.zeros((2, 5), int))[4]):
+        assert all(np.isnan(info[name]).all() for name in IN_TIME) and "batch_real_time_factor" not in info
 
 
 # Heat

@@ -107,16 +107,32 @@ def test_clamped_limbs_bend_as_the_extensible_elastica(told):
     told("elastica", rows)
 
 
-@pytest.mark.parametrize(("discretisation", "clamp"), [("chapter", 1.0 / 2.0), ("continuum", 5.0 / 12.0)])
-def test_a_limb_held_by_hub_and_root_node_is_clamped_within_the_held_edge(discretisation, clamp):
-    """The hinge at the root node bends from there; against an elastica from that place, the error is of order 2."""
-    robots, errors = [Seastar(nodes_per_limb=n, discretisation=discretisation) for n in (20, 40, 80)], []
+@pytest.mark.parametrize(
+    ("discretisation", "n_limbs", "clamp"), [("chapter", 5, 0.5), ("continuum", 5, 0.0), ("continuum", 1, 0.0)]
+)
+def test_a_limb_held_by_hub_and_root_node_is_clamped_at_the_hub_or_in_the_middle_of_the_edge(
+    discretisation, n_limbs, clamp
+):
+    """Against an elastica from that place, the error is of order 2, or a little better."""
+    robots, errors = [Seastar(n_limbs, n, discretisation=discretisation) for n in (20, 40, 80)], []
     EI, EA = known.stiffness(robots[0])
     for robot in robots:
         held = clamp * robot.edge_length
         expected = known.elastica_tip(EI / 0.1**2, EI, 0.1 - held, EA) + [held, 0.0]
         errors.append(np.hypot(*(loaded_tip(robot, 1.0, (0, 1)) - expected)))
-    assert order(errors, robots) == pytest.approx(2.0, abs=0.1)
+    assert 1.9 < order(errors, robots) < 2.5
+    assert clamp > 0.0 or errors[0] < 3e-3 * expected[1]
+
+
+def test_a_held_root_edge_keeps_the_hub_from_turning():
+    """The other limb, loaded in the same way, is a cantilever, too."""
+    robot = Seastar(2, 12)
+    EI, EA = known.stiffness(robot)
+    loads = ((robot.n_nodes - 1, 0.0, 0.3 * EI / 0.1**2),)
+    simulator = Simulator(Scene(robot, Water(), known.pause(8.0), TO_REST, held_nodes=(0, 1), loads=loads))
+    known.let_pass(simulator)
+    expected = known.elastica_tip(loads[0][2], EI, 0.1, EA) * [-1.0, 1.0]
+    assert np.hypot(*(simulator.positions[0, -1] - expected)) < 5e-3 * expected[1]
 
 
 # Natural frequencies of clamped limbs

@@ -55,7 +55,7 @@ def ring(water: Water, robot: Seastar, time: float) -> tuple[np.ndarray, np.ndar
     )  # fmt: skip
     simulator = Simulator(scene)
     edges = robot.nodes_per_limb - 1
-    free = np.arange(1, edges + 1) / edges - 5.0 / 12.0 / edges  # from the clamp, see first_frequency
+    free = np.arange(1, edges + 1) / edges  # from the clamp at the hub
     simulator.v[0, 3 : 2 * edges + 2 : 2] = (1e-3 * free**2)[:, None]
     simulator.v[0, 3] = 0.0
     times, tips = [], []

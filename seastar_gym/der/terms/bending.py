@@ -5,6 +5,7 @@ With t = tan(phi/2): d kappa/d phi = (1 + t^2)/dl and d^2 kappa/d phi^2 = t (1 +
 (13.13) lacks the length of (13.3), so its units do not close: a hub hinge has the energy of (13.3) too.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -34,15 +35,24 @@ GREGORY = (5.0 / 12.0, 13.0 / 12.0)
 """Weights of the quadrature of curvature at the root and at node 1 of a limb, of second order and a tiny constant."""
 
 
-def coefficients(mesh: Mesh, gregory: bool = False) -> Bending:
+HELD_EDGE = (1.0 / 240.0, 15.0 / 8.0, 5.0 / 8.0)
+"""Weights at the root and at nodes 1 and 2 of a limb whose root edge is held. The edge, which cannot turn, holds the
+hub by a clamp a hundred times as stiff; the limb bends at the nodes, with weights of order 3 from the hub on."""
+
+
+def coefficients(mesh: Mesh, gregory: bool = False, held_edges: Sequence[int] = ()) -> Bending:
     """Bending stiffnesses and natural moments, with cross sections at the nodes.
 
     gregory: Whether the first two hinges of a limb have Gregory's weights, and the first is the clamp of a rigid hub,
         as in the continuum's discretisation. Otherwise the first is a hub hinge.
+    held_edges: Limbs whose root edges are held: with Gregory's weights, they are clamped at the hub.
     """
     n_edges = mesh.nodes_per_limb - 1
     EI = mesh.at_nodes.EI[:, :-1].ravel()
-    dl = mesh.l * np.tile(hinge_weights(n_edges, gregory), mesh.n_limbs)
+    weights = np.tile(hinge_weights(n_edges, gregory), (mesh.n_limbs, 1))
+    if gregory and n_edges > 2:
+        weights[list(held_edges), :3] = HELD_EDGE
+    dl = mesh.l * weights.ravel()
     EI_over_dl, dl_over_EI = EI / dl, dl / EI
     EI_kappa_bar = 2.0 * EI_over_dl * np.tan(0.5 * np.repeat(mesh.natural_turn, n_edges))
     roots = n_edges * np.arange(mesh.n_limbs)
