@@ -93,7 +93,7 @@ class Tank:
         if self.fails is not None:
             raise self.fails
         taken_at = np.floor(min(self.time, self.seen_until) * 50.0) / 50.0
-        return Sighting(float(taken_at), self.now(), (0.0, 0.0, 0.0))
+        return Sighting(float(taken_at), self.now(), (1e-9 * float(taken_at), 0.0, 0.0))
 
     def heat(self, limbs, seconds):
         for limb, sign in enumerate(limbs):

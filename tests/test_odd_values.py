@@ -73,7 +73,7 @@ def test_a_million_entries_are_refused_before_each_is_looked_at(name):
     begin = time.process_time()
     with assert_refused("entries", "are the most"):
         MILLIONS[name]()
-    assert time.process_time() - begin < 1.5
+    assert time.process_time() - begin < 6.0
 
 
 def test_a_million_robots_are_read_and_long_gaits_known_without_a_table_for_each_command():

@@ -208,7 +208,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     it in about 95 % of strokes (docs/numerics.md); NaN after a failure.
     `energy_growth` is 1 in the first 20 strokes; a value well above 1 means that the time stepping adds energy
     (docs/numerics.md). The chapter's scene at a fidelity has no such entry.
-    `largest_overlap` is over the distance at which limbs touch: 1 where centre lines meet, a warning beyond 0.5.
+    `largest_overlap`, at the ends of time steps, is over the distance at which limbs touch: 1 where centre lines meet.
     With `randomization`, `info` also has the drawn numbers, by name.
 
     ## Starting state

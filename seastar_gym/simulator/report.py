@@ -62,8 +62,8 @@ class StrokeReport(NamedTuple):
     smallest_opening_angle: Smallest angle between neighbouring limbs at the hub [rad]. Below zero, limbs crossed. With
         a body it is pi.
     largest_overlap: Largest depth to which limbs pressed each other or a body at the ends of time steps, over the
-        distance at which they touch: 1 where centre lines meet. Where contact pushed within a step at whose end
-        surfaces are apart, the depth that it pushed by; 0 where it did not push. See scene/contact.py.
+        distance at which they touch: 1 where centre lines meet. 0 where surfaces are apart at the ends of all steps,
+        also if contact pushed them apart within a step. See scene/contact.py.
     error_estimate: Estimate of the hub's error, of space and time [m]: a bound that holds in about 95 % of strokes, see
         error_bars.py. NaN without `error_bars`.
     heating_time: Time for which wires were heated, summed over limbs [s]; NaN if the actuator does not say it.

@@ -7,6 +7,7 @@ class Towards:
     """Swims straight on, in the action mode "pairs"."""
 
     actions = "pairs"
+    batched = True
 
     def __init__(self, env):
         self.scene = env.scene

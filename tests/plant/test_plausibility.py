@@ -96,7 +96,7 @@ LIES = {
 
 def guarded(*arguments, **options):
     plant = Seen(*arguments, **options)
-    guard = Guard(plant, Limits())
+    guard = Guard(plant, Limits(hottest=1e4))
     guard.begin()
     return plant, guard
 

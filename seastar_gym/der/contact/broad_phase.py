@@ -49,8 +49,6 @@ def freeze_contact(rods, work, stage, q_0):
     store(work.contact.missed, 0, 0.0)
     store(work.contact.solves, 0, 0.0)
     store(work.contact.own, 0, 0.0)
-    touched, pressed = load(work.contact.touching, 0), load(work.contact.pressed, 0)
-    store(work.contact.pressed, 0, select(touched > pressed, touched, pressed))
     for pair in range(rods.contact.n_pairs):
         right = int(load_number(rods.contact.pairs, 2 * pair))
         left = int(load_number(rods.contact.pairs, 2 * pair + 1))

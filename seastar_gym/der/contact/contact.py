@@ -111,8 +111,7 @@ class ContactWork(NamedTuple):
         limbs' edges. slots: SLOT_ROWS of each.
     solves: Iterations of the conjugate gradients in this stage, see coupled.py.
     missed: 1 for robots whose pairs did not all fit into their share, or whose step was not found.
-    touching: Largest depth that pushes, over the distance at which limbs touch; 0 for robots that do not touch.
-    pressed: Largest of these of the stages of a step before this one.
+    touching: 1 for robots that touch.
     ends: Positions at which contact is looked for [m]. seen: These positions along the gap between two limbs and
         across it.
     force: Forces of contact [N].
@@ -126,7 +125,6 @@ class ContactWork(NamedTuple):
     solves: np.ndarray
     missed: np.ndarray
     touching: np.ndarray
-    pressed: np.ndarray
     ends: np.ndarray
     seen: np.ndarray
     force: np.ndarray
@@ -222,7 +220,6 @@ def memory(contact: Contact | None, n_limbs: int, edges: int, n_points: int) -> 
         solves=rows(1),
         missed=rows(1),
         touching=rows(1),
-        pressed=rows(1),
         ends=rows(),
         seen=rows(),
         force=rows(),
@@ -280,14 +277,6 @@ def stiffness_at(rods, i, k):
         if k >= rods.n_nodes:
             return 2.0 * load(rods.contact.stiffness, i)
     return load(rods.contact.stiffness, i)
-
-
-@kernel
-def own_thickness(rods, i, k, thickness):
-    """Part of the thickness of node i and an edge that ends at k that is of limbs [m], and not of a body."""
-    if rods.body is not None and (i >= rods.n_nodes or k >= rods.n_nodes):
-        return thickness - load(rods.contact.rim, 0)
-    return thickness
 
 
 @kernel
@@ -380,9 +369,7 @@ def add_contact(rods, work, stage, convex, energy):
         k = select(depth > 0.0, load(work.contact.slots, row + STIFFNESS), 0.0)
         twice = add_product(twice, k * depth, depth)
         store(work.contact.slots, row + PRESSED, lead * k)
-        i, _, head = members(rods, work, slot)
-        own = own_thickness(rods, i, head, load(work.contact.slots, row + THICKNESS))
-        touching = select((depth > 0.0) & (depth > touching * own), depth / own, touching)
+        touching = select(depth > 0.0, 1.0, touching)
         add_gap_gradient(rods, work, slot, k * depth, work.contact.force)
     store(work.contact.touching, 0, touching)
     push_body_at_roots(rods, work, convex, work.contact.force)
@@ -395,16 +382,6 @@ def contact_force(work, node):
     if work.contact is None:
         return splat(0.0), splat(0.0)
     return load(work.contact.force, 2 * node), load(work.contact.force, 2 * node + 1)
-
-
-@kernel
-def take_depth_pushed(work):
-    """Largest depth that pushed since this was last asked for, over the distance at which limbs touch, 1 at most."""
-    pressed, touching = load(work.contact.pressed, 0), load(work.contact.touching, 0)
-    store(work.contact.pressed, 0, 0.0)
-    store(work.contact.touching, 0, 0.0)
-    pushed = select(touching > pressed, touching, pressed)
-    return select(pushed < 1.0, pushed, 1.0)
 
 
 @kernel

@@ -3,7 +3,7 @@
 import numpy as np
 
 from seastar_gym.der.contact.broad_phase import across_gap, thickness_of_pair
-from seastar_gym.der.contact.contact import SLOT_ROWS, THICKNESS, edge_ends, members, n_listed, own_thickness
+from seastar_gym.der.contact.contact import SLOT_ROWS, THICKNESS, edge_ends, members, n_listed
 from seastar_gym.der.contact.near_body import height_over_body
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.star import corner_place, tail_node
@@ -184,3 +184,11 @@ def deepest_overlap(rods, work, q):
             depth = thickness - sqrt(squared)
             deepest = select(deeper, depth / own_thickness(rods, i, k, thickness), deepest)
     return deepest
+
+
+@kernel
+def own_thickness(rods, i, k, thickness):
+    """Part of the thickness of node i and an edge that ends at k that is of limbs [m], and not of a body."""
+    if rods.body is not None and (i >= rods.n_nodes or k >= rods.n_nodes):
+        return thickness - load(rods.contact.rim, 0)
+    return thickness

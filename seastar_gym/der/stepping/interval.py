@@ -1,6 +1,5 @@
 """An interval between two corners of a time grid, covered by steps that every robot halves and doubles for itself."""
 
-from seastar_gym.der.contact.contact import take_depth_pushed
 from seastar_gym.der.contact.crossing import deepest_overlap
 from seastar_gym.der.geometry import edge_geometry, half_angle
 from seastar_gym.der.star import tail_node
@@ -43,14 +42,10 @@ def note_hub_angles(rods, q, robots, report):
 
 @kernel
 def note_overlap(rods, work, q, robots, report):
-    """Keep the largest overlap at the ends of the steps of the robots in the mask, in scenes with contact.
-
-    Of those that are free again at the end of a step in which they were pushed, the depth that pushed them.
-    """
+    """Keep the largest overlap at the ends of the steps of the robots in the mask, in scenes with contact."""
     if rods.contact is None:
         return
-    largest, now, pushed = load(report, LARGEST_OVERLAP), deepest_overlap(rods, work, q), take_depth_pushed(work)
-    now = select(now > 0.0, now, pushed)
+    largest, now = load(report, LARGEST_OVERLAP), deepest_overlap(rods, work, q)
     store(report, LARGEST_OVERLAP, select(robots & (now > largest), now, largest))
 
 
