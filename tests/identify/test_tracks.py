@@ -266,6 +266,7 @@ LOST = np.array([[[np.nan, np.nan]], [[0.0, 0.0]]])
 NOTHING = Track(np.zeros(1), {"a": np.zeros((1, 2)), "b": np.zeros((1, 2))}, {})
 HORIZON = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, -1.0, 0.0]])
 REFUSED = [
+    (read_pose, "time,x,y,theta\n0,0,0,\n0.1,0,0,90\n", "begins at 90 rad, beyond a full turn: it may be in degrees."),
     (lambda file: read_deeplabcut(file, 30.0), SEVERAL, "has the individuals a, b: name one"),
     (lambda file: read_deeplabcut(file, 30.0, "c"), SEVERAL, "has the individuals a, b: name one"),
     (lambda file: read_deeplabcut(file, 30.0, "a"), DEEPLABCUT, "names no individuals: leave --individual out"),
@@ -339,6 +340,11 @@ def test_files_of_a_tracker_end_in_a_fit(tmp_path, capsys):
     assert main(["track2csv", str(file), *given, "--out", str(tmp_path / "track.csv")]) == 0
     said = capsys.readouterr().out
     assert said.startswith(f"{tmp_path / 'track.csv'}: 75 pictures in 2.96 s, ") and "% of their points not" in said
+    assert "mm of the robot's shape" in said
+    for wrong in (["--nodes", "mid=hub", "one=tip2", f"two={n}"], ["--metres-per-pixel", "0.5"]):
+        plain = given[:4] + given[6:] if wrong[0] != "--nodes" else given
+        assert main(["track2csv", str(file), *plain, *wrong, "--out", str(tmp_path / "track.csv")]) == 2
+        assert "from its shape" in capsys.readouterr().err
     estimate = identify(scene, list(truth), Measurement.from_csv(tmp_path / "track.csv", tmp_path / "commands.csv"))
     assert ((estimate.lower < list(truth.values())) & (list(truth.values()) < estimate.upper)).all()
     assert estimate.root_mean_square < 1e-3 and (estimate.upper < 1.1 * estimate.lower).all()
@@ -353,7 +359,7 @@ def converted(tmp_path, text, *given):
 def test_trackers_poses_and_markers_become_nodes_and_the_hub_s_orientation(tmp_path, golden):
     for name, text, given in (
         ("pose_turned", POSE, ["--from", "pose"]), ("pose_aligned", POSE, ["--from", "pose", "--aligned"]),
-        ("any_node", MOTIVE, ["--from", "motive", "--nodes", "Seastar:Marker 001=tip1", "Seastar=hub"]),
+        ("any_node", MOTIVE, ["--from", "motive", "--aligned", "--nodes", "Seastar:Marker 001=tip1", "Seastar=hub"]),
     ):  # fmt: skip
         code, csv = converted(tmp_path, text, *given)
         assert code == 0

@@ -22,7 +22,7 @@ from seastar_gym.identify.tracks.motive import read_motive
 from seastar_gym.identify.tracks.plane import in_metres, read_homography, scaled
 from seastar_gym.identify.tracks.pose import read_pose
 from seastar_gym.identify.tracks.sleap import read_sleap
-from seastar_gym.identify.tracks.track import Track, from_rest, seen_nodes
+from seastar_gym.identify.tracks.track import Track, from_rest, misfit, seen_nodes
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.scene_file import load_scene
@@ -107,14 +107,17 @@ def convert(options: Options) -> str:
     scene = load_scene(options.scene)
     require_number("--rest", options.rest, "s", zero_allowed=True)
     track = metres(READERS[options.format](options), options)
+    told = ""
     seen = seen_nodes(track, assigned(options.nodes, track, scene))
     if not options.aligned:
         seen = from_rest(seen, track.time, options.rest, scene)
+        off = misfit(seen, track.time, options.rest, scene)
+        told = f" At rest they are within {1e3 * off:.2g} mm of the robot's shape."
     Measurement(track.time, *seen, np.zeros((1, scene.robot.n_limbs)))  # refuses what identify would
     write_trajectory(options.out, track.time, *seen)
     lost = np.isnan(seen.positions).any(axis=2).mean()
     n, lasted = len(track.time), np.ptp(track.time)
-    return f"{options.out}: {n} pictures in {lasted:.4g} s, {100.0 * lost:.1f} % of their points not seen."
+    return f"{options.out}: {n} pictures in {lasted:.4g} s, {100.0 * lost:.1f} % of their points not seen.{told}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -18,6 +18,8 @@ NOT_SEEN = ("", "nan", "none")
 """Fields of a file of what was not seen."""
 FARTHEST = 1e6
 """Largest coordinate [m], [mm] or [pixel], and largest angle [rad], that can be."""
+MISFIT = 0.2
+"""Largest distance of a robot at rest from its shape, over the length of a limb."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,7 @@ class Track:
             require_possible(f"the place of {name}", places)
         for name, angles in self.orientations.items():
             require_possible(f"the orientation of {name}", angles)
+            require_radians(name, angles)
 
 
 def require_possible(what: str, numbers: Floats, largest: float = FARTHEST) -> None:
@@ -47,6 +50,15 @@ def require_possible(what: str, numbers: Floats, largest: float = FARTHEST) -> N
     if beyond.any():
         picture = int(beyond.argmax())
         raise ValueError(f"In picture {picture + 1}, {what} is {numbers[picture]}: nothing is beyond {largest:g}.")
+
+
+def require_radians(name: str, angles: Floats) -> None:
+    """Refuse orientations that begin beyond a full turn."""
+    known = angles[np.isfinite(angles)]
+    if known.size and abs(known[0]) > 2.0 * np.pi:
+        raise ValueError(
+            f"The orientation of {name} begins at {known[0]:.4g} rad, beyond a full turn: it may be in degrees."
+        )
 
 
 class Seen(NamedTuple):
@@ -105,6 +117,23 @@ def from_rest(seen: Seen, time: Floats, rest: float, scene: Scene) -> Seen:
     begin = places[at_nodes].mean(axis=0) - shape[nodes[at_nodes]].mean(axis=0) @ back.T
     origin = np.where(np.array(seen.nodes)[:, None] == ORIENTATION, 0.0, begin)
     return seen._replace(positions=(seen.positions - origin) @ back)
+
+
+def misfit(seen: Seen, time: Floats, rest: float, scene: Scene) -> float:
+    """Distance of the robot at rest from its shape, in the root mean square over its nodes [m].
+
+    ValueError where it is no small share of a limb.
+    """
+    nodes = np.array(seen.nodes)
+    still = seen.positions[time <= time[0] + rest][:, nodes != ORIENTATION]
+    off = np.hypot(*(still - scene.robot.nodes()[nodes[nodes != ORIENTATION]]).T)
+    found, length = float(np.sqrt(np.nanmean(off**2))), scene.robot.limb_length
+    if found > MISFIT * length:
+        raise ValueError(
+            f"The robot at rest is {1e3 * found:.3g} mm from its shape, whose limbs are {1e3 * length:.3g} mm long: "
+            "check which point is which node, the size of a pixel, and whether the picture is mirrored."
+        )
+    return found
 
 
 def _turn(places: Floats, nodes: NDArray[np.intp], scene: Scene) -> float:
