@@ -113,7 +113,9 @@ def search(
     for strokes in STAGES:
         part = beginning(measurement, strokes * period, period, largest_delay)
         if part is not None and np.isfinite(part.positions).sum() > 4 * len(start):
-            x = least(residuals_of(part), x, bound, prior=np.fmax(noise, tiny), **ROUGHLY, **robust).x
+            some = residuals_of(part)
+            x = x if np.isfinite(some(x)).all() else start  # what fits less may be impossible for longer
+            x = least(some, x, bound, prior=np.fmax(noise, tiny), **ROUGHLY, **robust).x
     whole = residuals_of(measurement)
     found = Found(least(whole, x if np.isfinite(whole(x)).all() else start, bound), whole, noise, tiny)
     if found.ratio > SUSPICIOUS:
