@@ -1,15 +1,16 @@
-"""Model cards: what a bundled policy is, how it was trained and how it swims, as Markdown beside its file.
+"""Model cards: what a policy is, how it was trained and how it swims, as Markdown beside its file.
 
     python -m agents.cards
+    python -m agents.cards --policies runs/FOLDER/policy.safetensors
 
-measures every bundled policy and writes its card anew; `python train.py --publish` does so for its own.
+measures every bundled policy, or a trained one, and writes its card anew. `python train.py --publish` does so, too.
 """
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 import tyro
@@ -20,13 +21,17 @@ from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 from seastar_gym.evaluation.swim import TIME_LIMIT, Swim
 from seastar_gym.files import write_atomically
+from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 
 HELD_OUT_PATHS = 64
 """Number of random paths that a card counts, those on which `train.py --publish` compares policies."""
 FIDELITIES: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
-CHEAP: tuple[Fidelity, ...] = ("fast", "balanced")
+OWN = "its own"
+"""Name of the fidelity of a robot that is not the chapter's: that of its scene."""
+CHEAP = ("fast", "balanced", OWN)
 """Fidelities at which held-out paths are swum."""
+CHAPTERS = "the chapter's robot"
 UNKNOWN = "not recorded"
 
 
@@ -37,22 +42,30 @@ class Swims(NamedTuple):
     held_out: list[Swim]
 
 
-def measure(policy: LearnedPolicy, threads: int | None = None) -> dict[Fidelity, Swims]:
-    """Swims of a policy at every fidelity, with its own time between decisions."""
+def scenes_of(policy: LearnedPolicy) -> dict[str, Scene]:
+    """Scenes in which a policy is measured, by name: the chapter's at every fidelity, or a robot of one's own as it was
+    trained."""
     period = policy.description.decision_period
+    chapters = {fidelity: make_scene(None, fidelity, period) for fidelity in get_args(Fidelity)}
+    if any(replace(scene, numerics=policy.scene.numerics) == policy.scene for scene in chapters.values()):
+        return {fidelity: chapters[fidelity] for fidelity in FIDELITIES}
+    return {OWN: policy.scene}
+
+
+def measure(policy: LearnedPolicy, threads: int | None = None) -> dict[str, Swims]:
+    """Swims of a policy in every scene of `scenes_of`, with its own time between decisions."""
     found = {}
-    for fidelity in FIDELITIES:
-        scene = make_scene(None, fidelity, period)
-        how: dict[str, Any] = {"threads": threads, "decision_period": period}
+    for name, scene in scenes_of(policy).items():
+        how: dict[str, Any] = {"threads": threads, "decision_period": policy.description.decision_period}
         (pentagon,) = swim_many("learned", policy, "pentagon", 1, scene, **how)
         held_out = list[Swim]()
-        if fidelity in CHEAP:
+        if name in CHEAP:
             held_out = swim_many("learned", policy, "random", HELD_OUT_PATHS, scene, seed=HELD_OUT_SEED, **how)
-        found[fidelity] = Swims(pentagon, held_out)
+        found[name] = Swims(pentagon, held_out)
     return found
 
 
-def card(policy: LearnedPolicy, file: Path, sha256: str, swims: Mapping[Fidelity, Swims]) -> str:
+def card(policy: LearnedPolicy, file: Path, sha256: str, swims: Mapping[str, Swims]) -> str:
     """The card, as Markdown. sha256: Of the weights, which tells what the card is about."""
     about, scene = policy.description, policy.scene
     decides = "stroke by stroke, every 1 s" if about.decision_period is None else f"every {about.decision_period:g} s"
@@ -61,9 +74,12 @@ def card(policy: LearnedPolicy, file: Path, sha256: str, swims: Mapping[Fidelity
     many, choices = about.distributions
     choice = f"one of {choices} commands" if many == 1 else f"one of {choices} commands for each limb"
     symmetric = "In a turned or mirrored world it swims the turned or mirrored way. " * about.symmetry
+    robot, licence, seen = CHAPTERS, "| licence | MIT, as the package |\n", "; docs/results.md has swims\n  with them"
+    if OWN in swims:
+        robot, licence, seen = f"a robot of {scene.robot.n_limbs} limbs, which {file.stem}.json describes,", "", ""
     return f"""# Model card: {file.stem}
 
-A policy that swims the chapter's robot along waypoints. It decides {decides}, and takes {choice}.
+A policy that swims {robot} along waypoints. It decides {decides}, and takes {choice}.
 {symmetric}It was trained in simulation, on random paths, and no real robot has swum by it.
 
 | | |
@@ -73,8 +89,7 @@ A policy that swims the chapter's robot along waypoints. It decides {decides}, a
 | network | layers of {layers} neurons with tanh, which numpy runs |
 | environment | `actions="{about.actions}"`; {type(scene.robot).__name__} with {scene.robot.n_limbs} limbs, \
 {type(scene.actuator).__name__} |
-| licence | MIT, as the package |
-
+{licence}
 ## Training
 
 {training_facts(policy.training)}
@@ -90,10 +105,9 @@ paths that no training draws. A swim ends after {TIME_LIMIT:g} s. Energy is per 
 
 ## Limits
 
-* It knows the chapter's robot, with its drag, its mass and its actuators. In other physics the order of policies can be
+* It knows this robot, with its drag, its mass and its actuators. In other physics the order of policies can be
   another one (docs/training.md).
-* It sees the whole state, without noise. It was not trained on noise, currents or weak limbs; docs/results.md has swims
-  with them.
+* It sees the whole state, without noise. It was not trained on noise, currents or weak limbs{seen}.
 * It sees two waypoints, 0.1 to 0.2 m apart in its training, and does not plan beyond them.
 """
 
@@ -121,7 +135,7 @@ def training_facts(training: Mapping[str, Any]) -> str:
     return "\n".join(f"* {name}: {value}" for name, value in facts.items()).replace(": \n", ":\n")
 
 
-def _row(fidelity: Fidelity, swims: Swims) -> str:
+def _row(fidelity: str, swims: Swims) -> str:
     done = swims.pentagon
     pentagon = f"{done.time[-1]:.1f} s, {done.strokes} {done.counted_in}" if done.finished else done.result
     energy = "" if done.joules_per_metre is None else f"{done.joules_per_metre:.0f}"

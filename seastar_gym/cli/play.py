@@ -1,4 +1,4 @@
-"""Steers the robot with the keyboard. The picture says which keys there are.
+"""Steers the robot, or that of --scene, with the keyboard. The picture says which keys there are.
 
 Keys act at the next decision, and as long as they are held. Without a display, --keys "a a*5 1w up ." presses keys, one
 word per decision, and --film writes what is seen.
@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from seastar_gym.cli.keys import Steering, known_keys, typed
+from seastar_gym.cli.keys import PLUS, Steering, known_keys, typed
 from seastar_gym.cli.screen import Show, outcome, rate, screen, show_all, wait
 from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.envs.canvas import import_pygame
+from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.scene_file import load_scene
 
 if TYPE_CHECKING:
     from seastar_gym.cli.played import PlayedEnv
@@ -26,8 +28,8 @@ if TYPE_CHECKING:
 AGAIN, HELP, END = "z", "f1", "escape"
 """Keys that begin anew, show or hide the help, and end the game."""
 
-N_LIMBS = 5
-"""Limbs of the robot that is played."""
+PERIOD = 0.2
+"""Time between decisions of the chapter's robot [s]."""
 
 Held = Callable[[], set[str] | None]
 """Function that gives the keys for the next decision; None ends the game."""
@@ -37,7 +39,11 @@ def parser() -> argparse.ArgumentParser:
     """Parser of the options."""
     found = command_parser("seastar play", __doc__)
     found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {DEFAULT}")
-    found.add_argument("--decision-period", type=float, default=0.2, help=f"time between decisions [s] {DEFAULT}")
+    found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
+    found.add_argument(
+        "--decision-period", type=float,
+        help=f"time between decisions [s] (default: {PERIOD:g}, or a stroke of the robot of --scene)",
+    )  # fmt: skip
     found.add_argument("--speed", type=float, default=1.0, help=f"multiple of real time {DEFAULT}")
     found.add_argument("--keys", help="keys that are pressed, a word per decision, instead of the keyboard")
     found.add_argument("--film", type=Path, help="file of a film, .mp4 or .gif, instead of a window; needs --keys")
@@ -99,17 +105,25 @@ def game(env: PlayedEnv, show: Show, held: Held, seed: int) -> dict[str, Any]:
 def play(options: argparse.Namespace) -> str:
     """Play as the options say; returns a sentence on how it went."""
     for name in ("speed", "decision_period"):
-        require_number(f"--{name.replace('_', '-')}", getattr(options, name), "1")
+        if getattr(options, name) is not None:
+            require_number(f"--{name.replace('_', '-')}", getattr(options, name), "1")
     if options.film is not None and options.keys is None:
         raise ValueError('A film needs the keys that are pressed: --keys "a a*5 1w up .".')
-    path, (number, fps) = load_path(options.path), rate(options.film, options.decision_period, options.speed)
-    words = None if options.keys is None else iter(list(typed(options.keys, N_LIMBS)))
+    scene, period = None if options.scene is None else load_scene(options.scene), options.decision_period
+    if period is None:
+        period = PERIOD if scene is None else scene.actuator.period
+    scene = make_scene(scene, None, period)
+    path, (number, fps) = load_path(options.path), rate(options.film, period, options.speed)
+    n_limbs = scene.robot.n_limbs
+    if n_limbs > len(PLUS):
+        raise ValueError(f"The keyboard has keys for {len(PLUS)} limbs, the robot of {options.scene} has {n_limbs}.")
+    words = None if options.keys is None else iter(list(typed(options.keys, n_limbs)))
     with screen(options.film, fps) as show:
         if options.film is None:
             wait(show)
         from seastar_gym.cli.played import PlayedEnv  # numba, which takes a second, once there is a window
 
-        env = PlayedEnv(path=path, decision_period=options.decision_period, frames_per_stroke=number)
+        env = PlayedEnv(path=path, scene=scene, decision_period=period, frames_per_stroke=number)
         if words is None:
             keyboard = Keyboard(env)
             info = game(env, keyboard.watch(show), keyboard, options.seed)

@@ -2,7 +2,8 @@
 
 The window needs a display; a film, --film swim.mp4 or swim.gif, does not. With --task the agent swims in a registered
 environment, as that has been made; otherwise it swims along --path. Without options, the learned policy decides every
-0.2 s which limbs to heat, as in the picture of README.md.
+0.2 s which limbs to heat, as in the picture of README.md. A policy of a file swims the robot that it was trained on, as
+often as it decides, where options name none.
 """
 
 import argparse
@@ -15,7 +16,7 @@ import gymnasium as gym
 from seastar_gym.cli.screen import Show, outcome, rate, screen, show_all
 from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.controllers.contract import Policy
-from seastar_gym.controllers.registry import HELP, load_agent
+from seastar_gym.controllers.registry import HELP, is_file, load_agent, trained_for
 from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import read
 from seastar_gym.envs.sight import Sight
@@ -41,10 +42,12 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--speed", type=float, default=4.0, help=f"multiple of real time {DEFAULT}")
     found.add_argument("--film", type=Path, help="file of a film, .mp4 or .gif, instead of a window")
     found.add_argument("--fidelity", choices=get_args(Fidelity), help="accuracy of the simulation")
-    found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the task's)")
+    found.add_argument(
+        "--scene", type=Path, help="file of the robot's scene, .py or .json (default: the policy's, or the task's)"
+    )
     found.add_argument(
         "--decision-period", type=float,
-        help=f"time between decisions [s] (default: the task's; {LEARNED_PERIOD:g} for the learned policy on a path)",
+        help=f"time between decisions [s] (default: that of policy or task; {LEARNED_PERIOD:g} for learned on a path)",
     )  # fmt: skip
     found.add_argument(
         "--sight", help="what a camera sees, pose, nodes or 1, 3 or 9 markers per limb, or a file of a Sight"
@@ -67,8 +70,11 @@ def sight(text: str | None) -> Sight | None:
 
 def decision_period(options: argparse.Namespace) -> float | None:
     """Time between decisions that the options ask for [s]; None for that of the task."""
-    plain = options.agent == "learned" and options.task is None and options.scene is None
-    return LEARNED_PERIOD if plain and options.decision_period is None else options.decision_period
+    if options.decision_period is not None or options.task is not None or options.scene is not None:
+        return options.decision_period  # type: ignore[no-any-return]
+    if (known := trained_for(options.agent)) is not None:
+        return known.decision_period
+    return LEARNED_PERIOD if options.agent == "learned" else None
 
 
 def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
@@ -82,6 +88,8 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
         asked["path"] = load_path(options.path)
     if options.scene is not None:
         asked["scene"] = load_scene(options.scene)
+    elif options.task is None and is_file(options.agent) and (known := trained_for(options.agent)) is not None:
+        asked["scene"] = known.scene
     if options.random_heading:
         asked["random_heading"] = True
     return {name: value for name, value in asked.items() if value is not None}

@@ -13,6 +13,7 @@ import numpy as np
 
 from seastar_gym.controllers import checkpoint, learned, third_party
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit
+from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.planner import Planner, gait_planner
 from seastar_gym.controllers.scripted import GAITS, scripted
@@ -125,7 +126,7 @@ def _labels(names: Sequence[str]) -> dict[str, str]:
     require_texts("Agents", names)
     labels: dict[str, str] = {}
     for name in names:
-        label = Path(name).stem if _is_file(name) else name
+        label = Path(name).stem if is_file(name) else name
         label = str(Path(name).with_suffix("")) if label in labels else label
         if label in labels:
             raise ValueError(f"The agent {name!r} is named twice.")
@@ -158,7 +159,7 @@ def files_of(name: str, decision_period: float | None = None) -> list[Path]:
     file = learned_file(name, decision_period)
     if file is not None:
         return [file, file.with_suffix(".json")]
-    return [Path(name)] if _is_file(name) else []
+    return [Path(name)] if is_file(name) else []
 
 
 def learned_file(name: str, decision_period: float | None = None) -> Path | None:
@@ -170,7 +171,19 @@ def learned_file(name: str, decision_period: float | None = None) -> Path | None
     return bundled or (Path(name) if name.endswith(".safetensors") else None)
 
 
-def _is_file(name: str) -> bool:
+def trained_for(name: str) -> Description | None:
+    """What the learned policy of a name was trained for; None for other agents, and for learners that do not say it."""
+    bundled = learned.file_of(name)
+    if bundled is not None:
+        return learned.load(bundled).description
+    if not is_file(name) or third_party.is_function(name) or (name.endswith(".zip") and third_party.is_model(name)):
+        return None
+    policy = _load_file(name)
+    return policy.description if isinstance(policy, learned.LearnedPolicy) else None
+
+
+def is_file(name: str) -> bool:
+    """Whether a name is that of a file."""
     return name.endswith((".zip", ".safetensors", ".pth", ".pt", ".pkl")) or len(Path(name).parts) > 1
 
 
@@ -189,7 +202,7 @@ def _load_agent(
         return learned.load(bundled)
     if third_party.is_function(name):
         return third_party.call_function(name, make_env())
-    return _load_file(name) if _is_file(name) else _scripted(name, seed, decision_period, scene.robot.n_limbs)
+    return _load_file(name) if is_file(name) else _scripted(name, seed, decision_period, scene.robot.n_limbs)
 
 
 def _scripted(name: str, seed: int, decision_period: float | None, n_limbs: int) -> Policy:

@@ -13,7 +13,7 @@ numerics.step, of a whole part (robot, fluid, actuator, numerics, contact), fide
 
 Without ranges, the sweep is the grid of all combinations. Numbers that robots may have of their own are simulated side
 by side. Every batch, of some hundred designs, has one file of results, OUT/parts/*/*.parquet. The same command goes on
-with the batches that have none.
+with the batches that have none. In the end OUT/best.json is the scene of the best design, for `train.py --scene`.
 """
 
 import argparse
@@ -30,16 +30,16 @@ from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.executors.options import add_options, executor_of
 from seastar_gym.extras import require_extra
-from seastar_gym.files import within
+from seastar_gym.files import within, write_json
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import shown
+from seastar_gym.scene.checks import require_choice, shown
 from seastar_gym.scene.scene_file import load_scene
 from seastar_gym.simulator.device_batch import DEVICES
 from seastar_gym.sweep.axes import Axis, Range
 from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.controllers import Route
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.result_files import result_file_of
+from seastar_gym.sweep.result_files import best_result, result_file_of
 from seastar_gym.sweep.run import Progress, run
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS
 from seastar_gym.sweep.text import axis_of
@@ -136,7 +136,19 @@ def run_sweep(sweep: Sweep, options: argparse.Namespace) -> int:
     with tqdm(total=sweep.n_batches, unit="batch") as bar:
         tally = run(sweep.batches(), options.out, executor_of(options), bar_of(sweep.n_batches, bar), work)
     print(as_text(tally, options.out))
+    keep_best(options)
     return 1 if tally.problems else 0
+
+
+def keep_best(options: argparse.Namespace) -> None:
+    """Write the scene of the best design, and say which it is; nothing where no design has the objective."""
+    best = best_result(options.out, options.objective, not options.minimize)
+    if best is None:
+        return
+    file, design = options.out / "best.json", ", ".join(f"{name}={shown(value)}" for name, value in best.design.items())
+    write_json(file, best.scene.to_dict())
+    unit = (UNITS | OF_CONTROLLERS)[options.objective]
+    print(f"Best {options.objective}: {best.value:.6g} {unit}, of {design}. Its scene: {file}.")
 
 
 def search(sweep: Sweep, options: argparse.Namespace) -> int:
@@ -151,10 +163,9 @@ def search(sweep: Sweep, options: argparse.Namespace) -> int:
     storage = options.storage or f"sqlite:///{options.out}/study.db"
     wanted = Search(options.objective, not options.minimize, options.seed, options.stale_after)
     with tqdm(total=options.optuna, unit="design") as bar:
-        study = explore(sweep, wanted, storage, options.optuna, options.out, executor_of(options),
-                        lambda tally: bar.update(tally.designs - bar.n), work)  # fmt: skip
-    best = study.best_trial
-    print(f"Best {options.objective}: {best.value:.6g} {(UNITS | OF_CONTROLLERS)[options.objective]}, {best.params}.")
+        explore(sweep, wanted, storage, options.optuna, options.out, executor_of(options),
+                lambda tally: bar.update(tally.designs - bar.n), work)  # fmt: skip
+    keep_best(options)
     return 0
 
 
@@ -163,6 +174,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = make_parser().parse_args(arguments)
 
     def work() -> int:
+        require_choice("--objective", options.objective, tuple(UNITS | OF_CONTROLLERS))
         sweep = sweep_of(options, tuple(map(axis_of, options.axes)))
         return search(sweep, options) if options.optuna else run_sweep(sweep, options)
 

@@ -1,18 +1,20 @@
 """Files of results: those of a batch each, as Parquet files with units and the scene in their metadata."""
 
+import json
 import os
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
 from seastar_gym.files import within, write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_file
-from seastar_gym.scene.per_robot import unit_of
+from seastar_gym.scene.per_robot import numbers_of, unit_of, with_numbers
 from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS, swim
 
@@ -86,13 +88,48 @@ def read_results(folder: str | os.PathLike[str]) -> Any:
 
     Parts that are damaged are left out with a warning: the same sweep simulates their batches again.
     """
+    return pa.concat_tables(list(_tables(folder)), promote_options="default")  # sweeps differ in their columns
+
+
+def _tables(folder: str | os.PathLike[str]) -> Iterator[Any]:
+    """Tables of all parts that are not damaged, see `read_results`. ValueError if there is none."""
     require_file("folder", folder)
-    tables = []
-    for file in sorted(ResultFiles(folder).folder.glob("??/*.parquet")):
+    files, found = sorted(ResultFiles(folder).folder.glob("??/*.parquet")), 0
+    for file in files:
         try:
-            tables.append(read_result_file(file))
+            yield read_result_file(file)
+            found += 1
         except ValueError as damaged:
-            warnings.warn(f"{damaged} It is left out: the same sweep simulates its batch again.", stacklevel=2)
-    if not tables:
+            warnings.warn(f"{damaged} It is left out: the same sweep simulates its batch again.", stacklevel=3)
+    if not found:
         raise ValueError(f"There are no results in {folder}.")
-    return pa.concat_tables(tables, promote_options="default")  # sweeps differ in their columns
+
+
+class Best(NamedTuple):
+    """The best design of a sweep. value: Of its objective. design: Values of the axes by name. scene: With them."""
+
+    value: float
+    design: dict[str, Any]
+    scene: Scene
+
+
+def best_result(folder: str | os.PathLike[str], objective: str = "speed", is_largest_best: bool = True) -> Best | None:
+    """Best of all results of a folder that have the objective, a column; None if there is none.
+
+    Robots whose limbs crossed do not count.
+    """
+    best, sign = None, 1.0 if is_largest_best else -1.0
+    for table in _tables(folder):
+        if objective not in table.column_names:
+            continue
+        values = sign * table[objective].to_numpy().astype(float)
+        values[~(table["smallest_opening_angle"].to_numpy() >= 0.0) | np.isnan(values)] = -np.inf
+        row = int(values.argmax())
+        if values[row] > (-np.inf if best is None else sign * best.value):
+            told = json.loads(table.schema.metadata[b"seastar_gym"])
+            scene = Scene.from_dict(told["scene"])
+            labels = dict(told["labels"])
+            numbers = {name: table[name][row].as_py() for name in numbers_of(scene)
+                       if name in table.column_names and name not in labels}  # fmt: skip
+            best = Best(sign * float(values[row]), labels | numbers, with_numbers(scene, numbers))
+    return best

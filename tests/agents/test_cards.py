@@ -3,10 +3,12 @@
 import hashlib
 import re
 import shutil
+from types import SimpleNamespace
 
 import pytest
 
-from agents.cards import CHEAP, FIDELITIES, HELD_OUT_PATHS, card, main, measure
+from agents.cards import CHEAP, FIDELITIES, HELD_OUT_PATHS, OWN, card, main, measure, scenes_of
+from seastar_gym import Scene, Seastar
 from seastar_gym.controllers.learned import BUNDLED, load
 
 POLICIES = sorted(BUNDLED.parent.glob("*.safetensors"))
@@ -49,5 +51,7 @@ def test_the_command_writes_cards_and_says_what_is_wrong(tmp_path, monkeypatch, 
     assert main(["--policies", str(file)]) == 0
     text = file.with_suffix(".md").read_text(encoding="utf-8")
     assert text.startswith("# Model card: mine\n") and row(text, "fast")[3] == "1 of 1"
+    scene = Scene(Seastar(3, 7), numerics=load().scene.numerics)
+    assert list(scenes_of(SimpleNamespace(scene=scene, description=load().description))) == [OWN]  # and nobody else's
     assert main(["--policies", str(tmp_path / "other.safetensors")]) == 2
     assert "There is no trained policy at" in capsys.readouterr().err

@@ -1,0 +1,45 @@
+"""From a sweep that was stopped, and resumed on other workers, to the best design, trained and filmed."""
+
+import json
+import re
+
+import pytest
+
+from ways.story import block, command
+
+
+@pytest.mark.parametrize("n_limbs, options", [("3,5", ""), ("4,8", "--seed 7 --decision-period 0.5")])
+def test_the_best_of_many_designs_is_trained_and_filmed(story, n_limbs, options):
+    folder = story.folder / "runs/limbs"
+    sweep = command("docs/cluster.md", "seastar sweep robot.limb_length").rstrip("\\ ")
+    sweep = sweep.replace("n_limbs=3,5", f"n_limbs={n_limbs}").replace("100000", "300")
+    sweep += " --robots 20 --measured 2 --scene scene.py"
+    wires = "SmaWires()" if options else "SmaPulse(0.4)"
+    story.has("scene.py", f'from seastar_gym import *\nscene = Scene(Seastar(), actuator={wires}).at("fast")')
+
+    # Ctrl-C keeps what is finished; the same command goes on, here on other workers.
+    story.types(f"{sweep} --executor processes", ends=130, stop=lambda: any(folder.glob("parts/*/*.parquet")))
+    story.types(f"{sweep} --executor here")
+    ((new, kept),) = re.findall(r"batches: (\d+); there before, batches: (\d+)", story.told)
+    assert int(kept) >= 1 and int(new) + int(kept) == 30
+    (said,) = re.findall(r"Best speed: ([\d.]+) m/s, of (.*)\. Its scene: runs/limbs/best\.json", story.told)
+    best = json.loads((folder / "best.json").read_text())
+    assert f"robot.n_limbs={best['robot']['n_limbs']}" in said[1] and float(said[0]) > 1e-3
+
+    # The same on an executor of one's own finds nothing to do, and the same best.
+    story.types(f"{sweep} --executor here")
+    assert "New in runs/limbs: 0 designs" in story.told and f"Best speed: {said[0]} " in story.told
+
+    train = (
+        f"{command('docs/cluster.md', 'train.py --scene')} --strokes 8192 {options.partition('--dec')[1] and options}"
+    )
+    story.types(f"{train} --out mine")
+    assert (story.folder / "mine/evaluation/learned.mp4").is_file()
+
+
+def test_an_executor_of_ones_own_gives_the_same_designs(story):
+    story.runs(block("docs/cluster.md", "class Threads"))
+    speed = re.findall(r"the fastest swims ([\d.]+) mm/s", story.told)
+    story.types("seastar sweep robot.limb_length=0.05:0.15 robot.n_limbs=3,5 --latin 2 --measured 1 --executor here")
+    (again,) = re.findall(r"Best speed: ([\d.e-]+) m/s", story.told)
+    assert [f"{1e3 * float(again):.1f}"] == speed

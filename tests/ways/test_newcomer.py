@@ -1,0 +1,22 @@
+"""From README's first command to a report, and from its ten lines of Python to a window."""
+
+import re
+
+import pytest
+
+from ways.story import block, command
+
+
+@pytest.mark.parametrize("options, slowest", [("", 155.0), ("--seed 1 --decision-period 0.5 --strokes 65536", 120.0)])
+def test_the_first_command_ends_with_a_lap_and_a_report(story, options, slowest):
+    (train,) = re.findall(r"python train\.py.*", command("README.md", ".[train]"))
+    story.types(f"{train} {options} --no-video --out run")
+    laps = dict(re.findall(r"^(learned|script) +\d+ +([\d.]+) +5 of 5", story.told, re.MULTILINE))
+    assert float(laps["learned"]) <= slowest, story.told
+    assert float(laps["script"]) == pytest.approx(241.0 if not options else 160.0, rel=0.25)
+    assert (story.folder / "run/evaluation/report.html").stat().st_size > 10_000
+
+
+def test_the_ten_lines_open_a_window(story):
+    code = block("README.md", 'render_mode="human"')
+    story.runs(code.replace("gym.make(", "gym.make(max_episode_steps=10, id="))

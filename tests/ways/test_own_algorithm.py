@@ -1,0 +1,64 @@
+"""From an algorithm of one's own, in a file, a zip or a loop, to a row in a table beside those of the package."""
+
+import re
+
+import pytest
+
+from ways.story import ROOT, block, command
+
+
+def rows(told):
+    """Waypoints reached by every agent of a table, by name."""
+    return dict(re.findall(r"^(\S+) .*? (\d) of 5 ", told, re.MULTILINE))
+
+
+def test_a_class_with_predict_swims_beside_the_policy_and_the_script(story):
+    page = "docs/controllers.md"
+    story.has("nearest.py", block(page, "class Nearest") + block(page, "def make(env)"))
+    story.types(command(page, "seastar evaluate --agents nearest:make") + " planner --fidelity fast")
+    assert rows(story.told) == dict.fromkeys(["nearest:make", "learned", "pentagon", "planner"], "5")
+    benchmark = f"{command(page, 'seastar benchmark --agents nearest:make')} --fidelity fast --seeds 2 --executor here"
+    story.types(f"{benchmark} --tasks SeastarSwim-v0 SeastarSwimHeading-v0 --decisions 20 --out rows")
+    table = (story.folder / "rows/benchmark.md").read_text("utf-8")
+    assert all(f"| {agent} " in table for agent in ("nearest:make", "learned", "greedy")), table
+
+
+def test_it_swims_a_robot_of_three_limbs_too(story):
+    code = block("docs/controllers.md", "class Nearest") + block("docs/controllers.md", "def make(env)")
+    story.has("nearest.py", re.sub(r"\b5\b", "3", code))
+    story.has(
+        "three.py",
+        "from seastar_gym import Scene, Seastar, SmaPulse\nscene = Scene(Seastar(3), actuator=SmaPulse(0.4))",
+    )
+    story.types("seastar evaluate --scene three.py --agents nearest:make greedy")
+    assert int(rows(story.told)["nearest:make"]) >= 3 and rows(story.told)["greedy"] == "5"
+    story.types("seastar evaluate --scene three.py --agents nearest:make learned", ends=2)
+    assert "learned" in story.told and "5 limbs" in story.told  # what was asked for is not left out silently
+
+
+LEARN = """
+symmetric = BatchVecEnv(VectorSymmetryReduction(batch))
+for seed in range(10):
+    model = PPO("MlpPolicy", symmetric, n_steps=64, batch_size=256, gamma=0.8, seed=seed, device="cpu")
+    model.learn(4096)
+    model.save(f"{seed}.zip")
+"""
+
+
+def test_ten_zips_are_one_row(story):
+    story.runs(block("docs/training.md", "BatchVecEnv", "gym.make_vec").partition("model = ")[0] + LEARN)
+    label = "mine=" + ",".join(f"{seed}.zip" for seed in range(10))
+    benchmark = command("docs/controllers.md", "seastar benchmark --agents my_module:make").replace(
+        "my_module:make", label
+    )
+    story.types(f"{benchmark} learned --tasks SeastarSwim-v0 --seeds 10 --decisions 30 --executor here")
+    table = (story.folder / "runs/mine/benchmark.md").read_text("utf-8")
+    assert "| mine " in table and "| learned " in table, table
+
+
+@pytest.mark.parametrize("seed", [0, 5])
+def test_a_loop_in_one_file_ends_with_a_policy_that_arrives(story, seed):
+    story.has("loop.py", (ROOT / "examples/single_file_ppo.py").read_text("utf-8"))
+    story.types(f"python loop.py --out policy.safetensors --strokes 32768 --seed {seed}")
+    story.types("seastar evaluate --agents policy.safetensors pentagon --fidelity fast")
+    assert rows(story.told)["policy"] == "5"
