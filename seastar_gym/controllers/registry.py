@@ -95,7 +95,9 @@ def fitting_agents(
     for label, name in _labels(default_agents(known) if names is None else names).items():
         try:
             policy = _load_agent(name, seed, known, decision_period, None, make_env)
-            require_fit(policy, known, actions_of(policy, known.robot.n_limbs), decision_period)
+            sight = learned.camera_of(policy).get("sight")
+            n_seen = None if sight is None else policy.description.observation_size  # type: ignore[attr-defined]
+            require_fit(policy, known, actions_of(policy, known.robot.n_limbs), decision_period, n_seen, sight=sight)
         except (ValueError, OSError) as unfit:
             left_out.append(f"{label} is left out: {unfit}")
         else:

@@ -68,7 +68,8 @@ def require_seen(policy: Policy, env: Any) -> Actions:
     if isinstance(policy, Searcher) and n_seen != n_known:
         raise ValueError(f"It reads observations of {n_known} numbers, the task shows {n_seen}.")
     actions = actions_in(policy, env.actions, env.scene.robot.n_limbs)
-    require_fit(policy, env.scene, actions, env.decision_period, n_seen, getattr(env, "challenge", None))
+    challenge = getattr(env, "challenge", None)
+    require_fit(policy, env.scene, actions, env.decision_period, n_seen, challenge, env.sight)
     return actions
 
 
