@@ -42,7 +42,7 @@ def policy_for_camera(options: Options, arguments: Sequence[str]) -> int:
     with held(folder, new=False):
         teacher, command = finished_policy(options, folder), shlex.join(["python", "train.py", *arguments])
         policy = imitation(teacher, options, camera, folder)
-        training = {**versions_and_machine(), "seed": options.seed, "decisions": ENOUGH}
+        training = {**versions_and_machine(), "seed": options.seed, "strokes": length(options)}
         training["commands"] = [*config_of(folder)["commands"], command]
         save(policy, place / "policy.safetensors", **training)
         compare(load(place / "policy.safetensors"), teacher, options, place)
@@ -51,15 +51,21 @@ def policy_for_camera(options: Options, arguments: Sequence[str]) -> int:
     return 0
 
 
+def length(options: Options) -> int:
+    """Length of the imitation [decisions]."""
+    return ENOUGH // 3 if options.quick else ENOUGH
+
+
 def finished_policy(options: Options, folder: Path) -> LearnedPolicy:
     """Policy of the run with these options in a folder. ValueError for a run that is not at its end."""
     file = folder / "policy.safetensors"
     policy = load(file) if file.exists() else None
     done = 0 if policy is None else policy.training.get("strokes", 0)
     if policy is None or done < options.length:
+        end = f", or end it with that and --strokes {done}" if done else ""
         raise ValueError(
             f"The run in {folder} is not finished, after {done} of {options.length} decisions: continue it with "
-            f"{resume_command(folder)}, or end it with that and --strokes {max(1, done)}."
+            f"{resume_command(folder)}{end}."
         )
     return policy
 
@@ -72,11 +78,12 @@ def imitation(teacher: LearnedPolicy, options: Options, camera: Camera, folder: 
         num_envs=Hyperparameters().num_envs, scene=robot.scene, randomization=robot.draws, sight=camera.sight,
         action_delay=camera.action_delay,
     )  # fmt: skip
-    print(f"A policy for {told(camera.sight)} learns from the run's, {ENOUGH} decisions.", flush=True)
-    with tqdm(total=ENOUGH, unit=" decisions", unit_scale=True, disable=None) as bar:
+    decisions = length(options)
+    print(f"A policy for {told(camera.sight)} learns from the run's, {decisions} decisions.", flush=True)
+    with tqdm(total=decisions, unit=" decisions", unit_scale=True, disable=None) as bar:
         return distil(
-            teacher, VectorFrameStack(batch, PAST), ENOUGH, options.seed, options.ppo.hidden,
-            lambda decisions: bar.update(decisions - bar.n),
+            teacher, VectorFrameStack(batch, PAST), decisions, options.seed, options.ppo.hidden,
+            lambda done: bar.update(done - bar.n),
         )  # fmt: skip
 
 
@@ -88,8 +95,8 @@ def compare(policy: LearnedPolicy, teacher: LearnedPolicy, options: Options, pla
     remarks = Remarks(
         title="Learned for a camera, and with full sight, round the pentagon",
         sentences=[
-            f"The policy for {told(about.sight)} is an imitation of the other one, after {ENOUGH} decisions, seed "
-            f"{options.seed}.",
+            f"The policy for {told(about.sight)} is an imitation of the other one, after {length(options)} decisions, "
+            f"seed {options.seed}.",
             f"{about.sight}, action_delay={about.action_delay}.",
         ],
         commands=[*policy.training["commands"], drive_command(place)],

@@ -104,7 +104,7 @@ class Options(Lengths):
     """JSON file of a camera. With --resume: train no more, but make a policy for that camera, which `seastar drive`
     takes, by imitation of the run's policy, in a folder of the run that is named as the file (docs/plant.md)."""
     quick: bool = False
-    """Train for 32,768 strokes at fidelity "fast": a third of the default training."""
+    """Train for 32,768 strokes at fidelity "fast": a third of the default training, and of that with --for-camera."""
     ppo: Annotated[Hyperparameters, tyro.conf.arg(name="")] = Hyperparameters()
 
     def __post_init__(self) -> None:

@@ -17,13 +17,11 @@ from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.registry import HELP, load_agent
 from seastar_gym.envs.commands import decisions_in
-from seastar_gym.envs.options import read
-from seastar_gym.envs.sight import Sight
+from seastar_gym.envs.sight import Camera, Sight, read_camera
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.evaluation.tasks import make_task, require_seen
-from seastar_gym.files import read_json
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene
@@ -47,7 +45,7 @@ def parser() -> argparse.ArgumentParser:
         help=f"time between decisions [s] (default: the task's; {LEARNED_PERIOD:g} for the learned policy on a path)",
     )  # fmt: skip
     found.add_argument(
-        "--sight", help="what a camera sees, pose, nodes or 1, 3 or 9 markers per limb, or a file of a Sight"
+        "--sight", help="what a camera sees, pose, nodes or 1, 3 or 9 markers per limb, or a file of a camera"
     )
     found.add_argument("--action-delay", type=float, help="time from a decision to the heat of wires [s]")
     found.add_argument("--seconds", type=float, help="simulated time after which the swim ends")
@@ -57,12 +55,18 @@ def parser() -> argparse.ArgumentParser:
 
 
 def sight(text: str | None) -> Sight | None:
-    """Sight of which a word says what it sees, or that a JSON file has as `to_dict` writes it; None for none."""
+    """Sight of which a word says what it sees, or that a file of a camera has; None for none."""
+    camera = camera_of(text)
+    return None if camera is None else camera.sight
+
+
+def camera_of(text: str | None) -> Camera | None:
+    """Camera of which a word says what it sees, or that a JSON file has, see `read_camera`; None for none."""
     if text is None:
         return None
     if text.endswith(".json"):
-        return read(read_json(text), Sight)
-    return Sight(sees=int(text) if text.isdigit() else text)  # type: ignore[arg-type]  # which it checks
+        return read_camera(text)
+    return Camera(Sight(sees=int(text) if text.isdigit() else text))  # type: ignore[arg-type]  # which it checks
 
 
 def decision_period(options: argparse.Namespace) -> float | None:
@@ -77,7 +81,10 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
         if getattr(options, name) is not None:
             require_number(f"--{name.replace('_', '-')}", getattr(options, name), "1")
     asked: dict[str, Any] = {"fidelity": options.fidelity, "decision_period": decision_period(options)}
-    asked |= {"sight": sight(options.sight), "action_delay": options.action_delay}
+    if (camera := camera_of(options.sight)) is not None:
+        asked |= camera._asdict()
+    if options.action_delay is not None:
+        asked["action_delay"] = options.action_delay
     if options.path is not None:
         asked["path"] = load_path(options.path)
     if options.scene is not None:

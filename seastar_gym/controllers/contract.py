@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import MOST_LIMBS, Actions, action_space
 from seastar_gym.envs.layout import Layout
+from seastar_gym.envs.sight import Sight, told
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_array, shown
 
 if TYPE_CHECKING:
-    from seastar_gym.envs.sight import Sight
     from seastar_gym.envs.tasks.challenge import Challenge
 
 
@@ -72,7 +72,7 @@ def require_fit(
     decision_period: float | None = None,
     n_seen: int | None = None,
     challenge: "Challenge | None" = None,
-    sight: "Sight | None" = None,
+    sight: Sight | None = None,
 ) -> None:
     """ValueError, with one sentence, where a policy cannot drive the robot of an environment, as far as it tells.
 
@@ -92,7 +92,10 @@ def require_fit(
         raise ValueError(f"The policy decides every {ours:g} s, the environment every {theirs:g} s: make them equal.")
     sees: Any = getattr(policy, "observation_space", None)
     if sees is not None and sees.shape != (n_seen,):
-        raise ValueError(f"The policy sees observations of shape {sees.shape}, the environment's have {(n_seen,)}.")
+        shown_by = "" if sight is None else f", by {told(sight)}"
+        raise ValueError(
+            f"The policy sees observations of shape {sees.shape}, the environment's have {(n_seen,)}{shown_by}."
+        )
     acts = getattr(policy, "action_space", None)
     if acts is not None and acts != action_space(actions, scene.robot.n_limbs):
         raise ValueError(f'The policy acts in {acts}, which is not that of an environment with actions="{actions}".')

@@ -172,6 +172,17 @@ def learned_file(name: str, decision_period: float | None = None) -> Path | None
     return bundled or (Path(name) if name.endswith(".safetensors") else None)
 
 
+def learned_policy(name: str, decision_period: float | None = None) -> learned.LearnedPolicy | None:
+    """Learned policy of a name, bundled or from the files of a training; None for the name of another agent.
+
+    decision_period: As of `files_of`.
+    """
+    if name.endswith(".zip"):
+        return None if third_party.is_model(name) else checkpoint.load(name)
+    file = learned_file(name, decision_period)
+    return None if file is None else learned.load(file)
+
+
 def _is_file(name: str) -> bool:
     return name.endswith((".zip", ".safetensors", ".pth", ".pt", ".pkl")) or len(Path(name).parts) > 1
 

@@ -81,8 +81,8 @@ class Sight:
 FOR_CAMERA = "make one for the camera with python train.py --resume RUN --for-camera camera.json"
 """What to do with a policy that needs to see more than a camera does."""
 TEMPLATE = (
-    '{"rate": 30, "delay": {"kind": "Uniform", "low": 0.05, "high": 0.15}, "jitter": 0.01, "dropout": 0.05, '
-    '"noise": 0.001, "turn_noise": 0.01, "sees": "pose", "action_delay": 0.02}'
+    '{"rate": 30, "delay": {"kind": "Uniform", "low": 0.05, "high": 0.15}, "jitter": 0.01, "dropout": 0.01, '
+    '"noise": 0.001, "turn_noise": 0.01, "sees": "pose", "action_delay": 0.0}'
 )
 """File of a camera, see `read_camera`."""
 

@@ -560,9 +560,12 @@ def test_an_interrupted_drive_stops_the_wires(tmp_path, monkeypatch):
 
 def test_the_report_of_a_drive_is_as_kept(golden, tmp_path):
     (tmp_path / "poses.csv").write_text("captured,received,x,y,turn\n0,0.05,0,0,0\n0.03,0.09,0,0,0\n0.13,0.17,0,0,0\n")
-    options = SimpleNamespace(out=tmp_path, policy="straight", plant="serial:/dev/ttyACM0", decision_period=0.5)
+    options = SimpleNamespace(out=tmp_path, policy="straight", plant="serial:/dev/ttyACM0")
     planned, swum, _ = made_up.swims()
-    envs = [SimpleNamespace(stopped=stopped, latest=0.0123, dropped_pictures=3) for stopped in ("", "No new picture.")]
+    envs = [
+        SimpleNamespace(stopped=stopped, latest=0.0123, dropped_pictures=3, decision_period=0.5)
+        for stopped in ("", "No new picture.")
+    ]
     golden("report.md", "\n".join(report(options, planned, swum, env) for env in envs))
 
 
