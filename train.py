@@ -7,6 +7,8 @@
     python train.py --quick                a shorter training with everything that follows
     python train.py --resume runs/FOLDER   continues a run that was stopped (by Ctrl-C or killed), or trains it for more
                                            --strokes
+    python train.py --resume runs/FOLDER --for-camera camera.json
+                                           makes a policy for a camera from that of a finished run, for `seastar drive`
 
 Every run has a folder with the policy, the learner and its checkpoints, the options and the command, TensorBoard logs,
 and the comparison with its table, pictures, videos and report.html. With --publish the policy becomes the bundled
@@ -33,6 +35,7 @@ try:
     from agents.learner_file import resume
     from agents.ppo import make_model, make_training_env, require_device
     from agents.training import efficiency
+    from agents.training.camera import policy_for_camera
     from agents.training.filming import filmed_beside
     from agents.training.folder import export, held, is_unbegun, recorded, resume_command, write_config
     from agents.training.options import Options, config_of, read_options, require_consent
@@ -241,6 +244,8 @@ def main(arguments: Sequence[str]) -> int:
     try:
         with quiet_writers():
             options = read_options(arguments)
+            if options.for_camera is not None:
+                return policy_for_camera(options, arguments)
             return run_seeds(options, arguments) if options.seeds else run(options, arguments)
     except OSError as failure:
         return ended_by_disk(failure)

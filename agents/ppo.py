@@ -36,12 +36,30 @@ def make_training_env(
 ) -> BatchVecEnv:
     """Native batch for Stable-Baselines3, with symmetry reduction if the hyperparameters ask for it.
 
-    options: Further options of the environment, see `SwimOptions`; those of the hyperparameters unless they are named.
+    options: Further options of the batch, see `make_training_batch`.
+    """
+    env = make_training_batch(hyperparameters, path, random_heading, fidelity, threads, **options)
+    if hyperparameters.coasting:
+        env = with_coasting(env, hyperparameters.reward)
+    return BatchVecEnv(VectorSymmetryReduction(env) if hyperparameters.symmetry else env)
+
+
+def make_training_batch(
+    hyperparameters: Hyperparameters,
+    path: SwimPath,
+    random_heading: bool,
+    fidelity: Fidelity | None = None,
+    threads: int | None = None,
+    **options: Any,
+) -> gym.vector.VectorEnv[Any, Any, Any]:
+    """Native batch of a training, in autoreset mode SAME_STEP.
+
+    options: `num_envs` and options of the environment, see `SwimOptions`; those of the hyperparameters unless named.
     """
     require_kind("hyperparameters", hyperparameters, Hyperparameters, "Hyperparameters")
-    env: gym.vector.VectorEnv[Any, Any, Any] = gym.make_vec(
+    arguments = {"num_envs": hyperparameters.num_envs, **hyperparameters.options, **options}
+    return gym.make_vec(
         "SeastarSwim-v0",
-        num_envs=hyperparameters.num_envs,
         vectorization_mode="vector_entry_point",
         autoreset_mode=AutoresetMode.SAME_STEP,
         threads=threads,
@@ -49,11 +67,8 @@ def make_training_env(
         random_heading=random_heading,
         fidelity=fidelity,
         waypoint_radius=WAYPOINT_RADIUS,
-        **{**hyperparameters.options, **options},
+        **arguments,
     )
-    if hyperparameters.coasting:
-        env = with_coasting(env, hyperparameters.reward)
-    return BatchVecEnv(VectorSymmetryReduction(env) if hyperparameters.symmetry else env)
 
 
 def make_model(
@@ -103,9 +118,12 @@ def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
     about = Description(batch.actions, symmetry, batch.scene, hidden, period)
     past = 0 if memory is None else memory.frame_stack.past
     at = batch.layout
-    about = about._replace(past=past, entries=at.entries, shows_limbs=at.shows_limbs, stations=at.stations)
+    about = about._replace(
+        past=past, entries=at.entries, shows_limbs=at.shows_limbs, stations=at.stations, sight=batch.sight,
+        action_delay=batch.action_delay,
+    )  # fmt: skip
     if not isinstance(batch, SeastarTaskVectorEnv):
-        return about
+        return about._replace(path=batch.path if isinstance(batch.path, str) else None)
     return about._replace(task=task_of(batch), limb_mirror=observed_mirror(batch))
 
 

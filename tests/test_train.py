@@ -30,7 +30,7 @@ from agents.training.robot import robot_of
 from evaluation.made_up import made_up_swim
 from later import Later
 from refusals import assert_told
-from seastar_gym import DomainRandomization, Numerics, Scene, Seastar, SmaWires, Uniform
+from seastar_gym import DomainRandomization, Numerics, Scene, Seastar, Sight, SmaWires, Uniform
 from seastar_gym.controllers import learned as policies
 from seastar_gym.controllers.checkpoint import load
 from seastar_gym.controllers.contract import actions_of, require_fit
@@ -179,6 +179,59 @@ def test_a_finished_run_can_be_trained_for_more_strokes(finished, tmp_path, caps
     for option in (["--seed", "5"], ["--learning-rate", "0.1"], ["--path", "pentagon"]):
         assert train.main(["--resume", str(folder), *option]) == 2
         assert "cannot continue with another" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "name, sight, more, words",
+    [
+        ("none", None, [], "There is no camera in"),
+        ("camera", {"fps": 30}, [], "'fps'"),
+        ("camera", {"sees": "nodes"}, [], "sees all nodes, as the run's policy does"),
+        ("evaluation", {}, [], "has a folder evaluation already"),
+        ("camera", {}, ["--strokes", "1024"], "cannot continue with another strokes"),
+    ],
+)
+def test_a_camera_for_which_no_policy_can_be_made_is_refused(name, sight, more, words, finished, tmp_path, capsys):
+    file, before = tmp_path / f"{name}.json", sorted(finished.rglob("*"))
+    if sight is not None:
+        file.write_text(json.dumps(sight))
+    assert train.main(["--resume", str(finished), "--for-camera", str(file), *more]) == 2
+    assert_told(capsys, words)
+    assert sorted(finished.rglob("*")) == before
+
+
+@pytest.mark.parametrize("has_policy", [True, False])
+def test_a_run_that_is_not_finished_teaches_no_policy_for_a_camera(has_policy, finished, tmp_path, capsys):
+    folder, file = tmp_path / "run", tmp_path / "camera.json"
+    shutil.copytree(finished, folder)
+    file.write_text("{}")
+    config = json.loads((folder / "config.json").read_text())
+    config["options"]["strokes"] = 1024
+    (folder / "config.json").write_text(json.dumps(config))
+    if not has_policy:
+        (folder / "policy.safetensors").unlink()
+    assert train.main(["--resume", str(folder), "--for-camera", str(file)]) == 2
+    assert_told(capsys, "is not finished, after", "of 1024 decisions")
+
+
+@pytest.mark.parametrize("how", ["a plain run", "joint", "limbs, no symmetry"])
+def test_a_policy_for_a_camera_is_compared_with_that_of_its_run(
+    how, finished, tmp_path, capsys, short_swims, monkeypatch
+):
+    monkeypatch.setattr("agents.training.camera.ENOUGH", 3 * 4096)
+    folder, file = tmp_path / "run", tmp_path / "camera.json"
+    own = {"joint": ["--actions", "joint"], "limbs, no symmetry": ["--actions", "limbs", "--no-symmetry"]}
+    if how in own:
+        assert train.main([*TINY, *own[how], "--strokes", "256", "--out", str(folder)]) == 0
+    else:
+        shutil.copytree(finished, folder)
+    file.write_text(json.dumps({"delay": 0.1, "sees": 1}))
+    assert train.main(["--resume", str(folder), "--for-camera", str(file), "--quick", "--no-video"]) == 0
+    rows = (folder / "camera" / "evaluation" / "evaluation.csv").read_text().splitlines()
+    assert [row.partition(",")[0] for row in rows] == ["agent", "camera", "full sight"]
+    about = policies.load(folder / "camera" / "policy.safetensors").description
+    assert about.sight == Sight(delay=0.1, sees=1) and about.past and about.hidden == (16, 16)
+    assert "seastar drive" in (folder / "camera" / "evaluation" / "report.html").read_text()
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])

@@ -20,8 +20,9 @@ import numpy as np
 import tyro
 
 from agents.cards import training_facts
+from agents.distillation import ENOUGH
 from agents.ppo import policy_of
-from agents.tasks.learning import ENOUGH, LEARNERS, imitate, train
+from agents.tasks.learning import LEARNERS, imitate, train
 from agents.training.folder import versions_and_machine
 from seastar_gym import TASKS, SmaPulse
 from seastar_gym.command import answered

@@ -9,7 +9,7 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 
 from agents.coasting import with_coasting
-from agents.distillation import distil
+from agents.distillation import PAST, distil
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model
 from seastar_gym import TASKS
@@ -22,10 +22,6 @@ from seastar_gym.scene.numerics import Fidelity
 
 Batch = gym.vector.VectorEnv[Any, Any, Any]
 
-PAST = 8
-"""Past observations that a learner with memory sees."""
-ENOUGH = 98_304
-"""Length of an imitation [decisions], after which more gain nothing."""
 OWN: dict[str, dict[str, Any]] = {
     "miswired": {"discount": 0.9},
     "prey": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},

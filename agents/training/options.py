@@ -100,8 +100,11 @@ class Options(Lengths):
     """Folder of a run to continue with its own options; strokes, num_threads, device, save_freq, video and publish
     may differ. It is safe to continue a run of others: its files are read as JSON and tensors, and nothing is
     unpickled. Stable-Baselines3's own PPO.load, however, would execute code in its model.zip."""
+    for_camera: Path | None = None
+    """JSON file of a camera. With --resume: train no more, but make a policy for that camera, which `seastar drive`
+    takes, by imitation of the run's policy, in a folder of the run that is named as the file (docs/plant.md)."""
     quick: bool = False
-    """Train for 32,768 strokes at fidelity "fast": a third of the default training."""
+    """Train for 32,768 strokes at fidelity "fast": a third of the default training, and of that with --for-camera."""
     ppo: Annotated[Hyperparameters, tyro.conf.arg(name="")] = Hyperparameters()
 
     def __post_init__(self) -> None:
@@ -118,6 +121,8 @@ class Options(Lengths):
             raise ValueError("--seeds are different ones of new runs, without --resume and --publish.")
         if self.intervals_anyway and self.intervals is None:
             raise ValueError("--intervals-anyway confirms --intervals: give both.")
+        if self.for_camera is not None and (self.resume is None or self.publish):
+            raise ValueError("--for-camera makes a policy from a finished run: name that with --resume, alone.")
         if self.publish and not (self.scene is None and self.intervals is None):
             raise ValueError("--publish is for policies of the chapter's robot, without --scene and --intervals.")
         make_path(self.path, np.random.default_rng(0))
@@ -125,6 +130,7 @@ class Options(Lengths):
 
 CHANGEABLE = {
     "strokes", "num_threads", "device", "save_freq", "video", "publish", "publish_anyway", "out", "resume", "quick",
+    "for_camera",
 }  # fmt: skip
 """Names of the options that may change when a run is continued."""
 
@@ -136,7 +142,7 @@ def read_options(arguments: Sequence[str]) -> Options:
         return replace(options, strokes=32_768, fidelity="fast") if options.quick else options
     saved = replace(saved_options(options.resume), out=options.resume, resume=options.resume)
     options = tyro.cli(Options, prog="python train.py", args=arguments, default=saved)
-    require_same(options, saved, CHANGEABLE)
+    require_same(options, saved, CHANGEABLE - {"strokes"} if options.for_camera else CHANGEABLE)
     return replace(options, out=options.resume)
 
 
@@ -152,7 +158,7 @@ def saved_options(folder: Path) -> Options:
     options = config_of(folder)["options"]
     with faults_of(folder / CONFIG):
         here: dict[str, Any] = {"out": folder, "resume": None, "ppo": hyperparameters_of(options), "seeds": ()}
-        here |= {"publish": False, "publish_anyway": False}
+        here |= {"publish": False, "publish_anyway": False, "for_camera": None}
         here |= {name: Path(options[name]) for name in ("scene", "intervals") if options[name] is not None}
         return Options(**{**options, **here})
 

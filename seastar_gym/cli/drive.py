@@ -3,10 +3,15 @@
 First the policy swims in a simulation, as it would in the tank: a dry run, drawn in plan.png. Then the command asks
 before any wire is heated. While the robot swims, a window shows it. Logs, a picture and a report are in the folder
 --out. A guard stops all wires when a pulse is too long, when sight is lost, or when a line is bad, and says so.
+
+Decision period, camera, scene and path are those of the policy, as `train.py --for-camera` writes it, unless options
+say otherwise. Policies that see all nodes cannot drive.
 """
 
 import argparse
 import sys
+import threading
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -17,9 +22,11 @@ import numpy as np
 from seastar_gym.cli.swim import sight
 from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.controllers.contract import Policy
-from seastar_gym.controllers.registry import HELP, load_agent
+from seastar_gym.controllers.description import Description
+from seastar_gym.controllers.registry import HELP, learned_policy, load_agent
 from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import SwimOptions, make_scene, scene_at
+from seastar_gym.envs.sight import FOR_CAMERA, Sight, told
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.swim import Swim, swim
@@ -29,13 +36,14 @@ from seastar_gym.files import write_atomically
 from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.lines import LinePlant, open_serial
 from seastar_gym.plant.plant import Plant, PlantError
-from seastar_gym.plant.simulated import SimulatedPlant
+from seastar_gym.plant.simulated import SimulatedPlant, with_wires
 from seastar_gym.plant.swim import PlantSwim
+from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator
 
-SERIAL = "serial:"
+SIM, SERIAL = "sim", "serial:"
 RADIUS = SwimOptions().waypoint_radius
 """Radius of waypoints [m]."""
 STOPPED = 1
@@ -46,13 +54,18 @@ def parser() -> argparse.ArgumentParser:
     """Parser of the options."""
     found = command_parser("seastar drive", __doc__)
     found.add_argument("policy", help=HELP.replace("%", "%%"))
-    found.add_argument("--plant", default="sim", help=f"sim, or {SERIAL}/dev/... of who heats the wires {DEFAULT}")
+    found.add_argument(
+        "--plant", default=SIM,
+        help=f"{SIM}, {SIM}:FILE for a simulated robot of another scene than the plan's, or {SERIAL}/dev/... of who "
+        f"heats the wires {DEFAULT}",
+    )  # fmt: skip
     found.add_argument("--tracker", help=f"{SERIAL}/dev/... of who sends sightings (default: the plant's line)")
-    found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {DEFAULT}")
-    found.add_argument("--sight", default="pose", help=f"what is seen: pose, 1, 3, 9, or a file of a Sight {DEFAULT}")
-    found.add_argument("--decision-period", type=float, default=0.5, help=f"time between decisions [s] {DEFAULT}")
-    found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
-    found.add_argument("--fidelity", choices=get_args(Fidelity), default="fast", help=f"of the simulation {DEFAULT}")
+    own = "default: the policy's own, otherwise"
+    found.add_argument("--path", help=f"{PATH_HELP} ({own} pentagon)")
+    found.add_argument("--sight", help=f"what is seen: pose, 1, 3, 9, or a file of a camera ({own} pose)")
+    found.add_argument("--decision-period", type=float, help=f"time between decisions [s] ({own} 0.5)")
+    found.add_argument("--scene", type=Path, help=f"file of the robot's scene, .py or .json ({own} the chapter's)")
+    found.add_argument("--fidelity", choices=get_args(Fidelity), help=f"of the simulation ({own} fast)")
     found.add_argument("--seconds", type=float, default=200.0, help=f"time after which the swim ends {DEFAULT}")
     found.add_argument("--out", type=Path, default=Path("runs/drive"), help=f"folder of all files {DEFAULT}")
     found.add_argument("--no-window", action="store_true", help="show no picture while the robot swims")
@@ -63,25 +76,52 @@ def parser() -> argparse.ArgumentParser:
 
 
 def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
-    """Arguments of the environment that the options ask for, but for the plant."""
-    for name in ("decision_period", "seconds"):
-        require_number(f"--{name.replace('_', '-')}", getattr(options, name), "s")
-    given, period = scene_at(options.scene, options.fidelity), options.decision_period
-    scene = make_scene(None, options.fidelity, period) if given is None else given
-    return {"scene": scene, "path": load_path(options.path), "decision_period": period, "sight": sight(options.sight)}
+    """Arguments of the environment that the options, or else the policy, ask for, but for the plant."""
+    require_number("--seconds", options.seconds, "s")
+    if options.decision_period is not None:
+        require_number("--decision-period", options.decision_period, "s")
+    policy, fidelity = learned_policy(options.policy, options.decision_period), options.fidelity or "fast"
+    own: dict[str, Any] = {"decision_period": 0.5, "sight": Sight(), "path": "pentagon"}
+    if policy is not None:
+        about = policy.description
+        require_camera(options.policy, about)
+        path = "pentagon" if about.path in (None, "random") else about.path
+        own = {"decision_period": policy.decision_period, "sight": about.sight, "path": path}
+    asked = {
+        "decision_period": options.decision_period, "sight": sight(options.sight),
+        "path": None if options.path is None else load_path(options.path),
+    }  # fmt: skip
+    arguments = own | {name: value for name, value in asked.items() if value is not None}
+    scene = scene_at(options.scene, fidelity)
+    if scene is None and policy is not None:
+        scene = policy.scene.at(options.fidelity)
+    return arguments | {"scene": scene or make_scene(None, fidelity, arguments["decision_period"])}
 
 
-def simulated(options: argparse.Namespace, arguments: dict[str, Any], paced: bool) -> SimulatedPlant:
-    """Simulated plant that is driven with these arguments."""
-    return SimulatedPlant(Simulator(arguments["scene"]), arguments["sight"], options.seed, paced)
+def require_camera(name: str, about: Description) -> None:
+    """ValueError, with what to do, for a policy that sees more than a camera. name: Its name or file."""
+    if about.sight is None or about.sight.sees == "nodes":
+        folder = Path(name).parent
+        run = str(folder) if (folder / "config.json").is_file() else "RUN"
+        raise ValueError(
+            f"{name} was trained for {told(about.sight)}, which no plant gives: {FOR_CAMERA.replace('RUN', run)}."
+        )
+
+
+def simulated(
+    options: argparse.Namespace, arguments: dict[str, Any], paced: bool, scene: Scene | None = None
+) -> SimulatedPlant:
+    """Simulated plant that is driven with these arguments. scene: Of its robot. None means that of the arguments."""
+    simulator = Simulator(with_wires(scene or arguments["scene"]))
+    return SimulatedPlant(simulator, arguments["sight"], options.seed, paced)
 
 
 @contextmanager
-def opened(options: argparse.Namespace, arguments: dict[str, Any]) -> Iterator[Plant]:
-    """Context of the plant that the options ask for; whatever ends it, the wires are stopped."""
+def opened(options: argparse.Namespace, arguments: dict[str, Any], scene: Scene | None) -> Iterator[Plant]:
+    """Context of the plant that the options ask for; whatever ends it, wires are stopped. scene: See `simulated`."""
     with ExitStack() as ports:
-        if options.plant == "sim":
-            plant: Plant = simulated(options, arguments, paced=True)
+        if _is_simulated(options):
+            plant: Plant = simulated(options, arguments, True, scene)
         else:
             plant = LinePlant(*[ports.enter_context(open_serial(device)) for device in _devices(options)])
         try:
@@ -92,13 +132,45 @@ def opened(options: argparse.Namespace, arguments: dict[str, Any]) -> Iterator[P
 
 def _devices(options: argparse.Namespace) -> list[str]:
     """Serial ports of the wires and of the tracker, where it has one of its own; none of a simulated plant."""
-    if options.plant == "sim":
+    if _is_simulated(options):
         return []
     ports = [options.plant] if options.tracker is None else [options.plant, options.tracker]
     for port in ports:
         if not port.startswith(SERIAL) or port == SERIAL:
-            raise ValueError(f"A plant is sim, or {SERIAL}/dev/... of a serial line, not {port}.")
+            raise ValueError(f"A plant is {SIM}, {SIM}:FILE, or {SERIAL}/dev/... of a serial line, not {port}.")
     return [port.removeprefix(SERIAL) for port in ports]
+
+
+def _is_simulated(options: argparse.Namespace) -> bool:
+    return options.plant == SIM or _scene_of_plant(options) is not None
+
+
+def _scene_of_plant(options: argparse.Namespace) -> Path | None:
+    """File of the scene of a simulated plant, None where it is no other than the plan's."""
+    file = options.plant.removeprefix(f"{SIM}:")
+    return None if file == options.plant else Path(file)
+
+
+@contextmanager
+def progress(what: str) -> Iterator[None]:
+    """Context that says every second, at a terminal, for how long it has lasted; elsewhere once that it began."""
+    begun, ended, terminal = time.monotonic(), threading.Event(), sys.stderr.isatty()
+
+    def tick() -> None:
+        while True:
+            seconds, end = time.monotonic() - begun, "\r" if terminal else "\n"
+            print(f"{what}, {seconds:.0f} s", end=end, file=sys.stderr, flush=True)
+            if ended.wait(1.0 if terminal else None):
+                return
+
+    ticker = threading.Thread(target=tick, daemon=True)
+    ticker.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        ticker.join()
+        print(end="\n" if terminal else "", file=sys.stderr, flush=True)
 
 
 def plan(options: argparse.Namespace) -> tuple[Policy, Swim, dict[str, Any]]:
@@ -108,14 +180,17 @@ def plan(options: argparse.Namespace) -> tuple[Policy, Swim, dict[str, Any]]:
     policy = load_agent(options.policy, env, options.seed)
     arguments["actions"] = require_seen(policy, env)
     env = PlantSwim(simulated(options, arguments, paced=False), **arguments)
-    swum = _swim("plan", policy, env, options)
+    with progress("Planning in simulation, whose code is compiled if it is not on the disk"):
+        swum = _swim("plan", policy, env, options)
     if env.stopped:
-        raise PlantError(f"The dry run was stopped: {env.stopped}")
+        raise PlantError(
+            f"The dry run was stopped: {env.stopped} It was seen through {arguments['sight']}; --sight names another."
+        )
     return policy, swum, arguments
 
 
 def _swim(name: str, policy: Policy, env: PlantSwim, options: argparse.Namespace) -> Swim:
-    limit = decisions_in(options.seconds, options.decision_period, env.scene)
+    limit = decisions_in(options.seconds, env.decision_period, env.scene)
     return swim(name, policy, env, max_strokes=limit, seed=options.seed)
 
 
@@ -123,6 +198,7 @@ def drive(options: argparse.Namespace) -> int:
     """Plan, ask, drive, and write what came of it; returns the exit code."""
     if _devices(options) and not options.dry:
         require_extra("Serial ports", "plant", "serial")
+    robot = scene_at(_scene_of_plant(options), options.fidelity or "fast")
     policy, planned, arguments = plan(options)
     options.out.mkdir(parents=True, exist_ok=True)
     picture = options.out / "plan.png"
@@ -134,7 +210,7 @@ def drive(options: argparse.Namespace) -> int:
     if options.dry or not (options.yes or agreed()):
         print("No wire was heated.")
         return 0
-    with opened(options, arguments) as plant:
+    with opened(options, arguments, robot) as plant:
         env = PlantSwim(plant, Limits(), options.out, None if options.no_window else "human", **arguments)
         try:
             swum = _swim("driven", policy, env, options)
@@ -165,7 +241,7 @@ def report(options: argparse.Namespace, planned: Swim, swum: Swim, env: PlantSwi
         "planned": planned.result,
         "driven": swum.result,
         "guard": env.stopped or "nothing to stop",
-        "decisions": f"{swum.strokes}, every {options.decision_period:g} s, at most {1e3 * env.latest:.0f} ms late",
+        "decisions": f"{swum.strokes}, every {env.decision_period:g} s, at most {1e3 * env.latest:.0f} ms late",
         "heat": f"{swum.heating_time.sum():.2f} s, summed over wires",
         "sightings": f"{len(poses)}, at most {1e3 * gaps.max(initial=0.0):.0f} ms apart",
         "pictures dropped": f"{env.dropped_pictures}, where no robot can be",

@@ -13,11 +13,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from seastar_gym.command import answered, command_parser
-from seastar_gym.controllers import checkpoint, learned
+from seastar_gym.controllers import learned
 from seastar_gym.controllers.export.c_code import to_c
 from seastar_gym.controllers.export.onnx_graph import to_onnx
 from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy
-from seastar_gym.controllers.registry import learned_file
+from seastar_gym.controllers.registry import learned_policy
 from seastar_gym.files import write_atomically
 
 FORMATS = ("c", "onnx")
@@ -36,15 +36,13 @@ def parser() -> argparse.ArgumentParser:
 
 def load_policy(name: str) -> LearnedPolicy:
     """Policy of a name or a file."""
-    if name.endswith(".zip"):
-        return checkpoint.load(name)
-    file = learned_file(name)
-    if file is None:
+    policy = learned_policy(name)
+    if policy is None:
         raise ValueError(
             f"{name} is no learned policy: name a file, .safetensors or the model.zip of train.py, or one of "
             f"{', '.join(['learned', *learned.by_name()])}."
         )
-    return learned.load(file)
+    return policy
 
 
 def export(options: argparse.Namespace) -> str:

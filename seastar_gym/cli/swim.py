@@ -16,15 +16,13 @@ import gymnasium as gym
 from seastar_gym.cli.screen import Show, outcome, rate, screen, show_all
 from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.controllers.contract import Policy
-from seastar_gym.controllers.registry import HELP, is_file, load_agent, trained_for
+from seastar_gym.controllers.registry import HELP, is_file, learned_policy, load_agent
 from seastar_gym.envs.commands import decisions_in
-from seastar_gym.envs.options import read
-from seastar_gym.envs.sight import Sight
+from seastar_gym.envs.sight import Camera, Sight, read_camera
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.evaluation.tasks import make_task, require_seen
-from seastar_gym.files import read_json
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene
@@ -50,7 +48,7 @@ def parser() -> argparse.ArgumentParser:
         help=f"time between decisions [s] (default: that of policy or task; {LEARNED_PERIOD:g} for learned on a path)",
     )  # fmt: skip
     found.add_argument(
-        "--sight", help="what a camera sees, pose, nodes or 1, 3 or 9 markers per limb, or a file of a Sight"
+        "--sight", help="what a camera sees, pose, nodes or 1, 3 or 9 markers per limb, or a file of a camera"
     )
     found.add_argument("--action-delay", type=float, help="time from a decision to the heat of wires [s]")
     found.add_argument("--seconds", type=float, help="simulated time after which the swim ends")
@@ -60,21 +58,33 @@ def parser() -> argparse.ArgumentParser:
 
 
 def sight(text: str | None) -> Sight | None:
-    """Sight of which a word says what it sees, or that a JSON file has as `to_dict` writes it; None for none."""
+    """Sight of which a word says what it sees, or that a file of a camera has; None for none."""
+    camera = camera_of(text)
+    return None if camera is None else camera.sight
+
+
+def camera_of(text: str | None) -> Camera | None:
+    """Camera of which a word says what it sees, or that a JSON file has, see `read_camera`; None for none."""
     if text is None:
         return None
     if text.endswith(".json"):
-        return read(read_json(text), Sight)
-    return Sight(sees=int(text) if text.isdigit() else text)  # type: ignore[arg-type]  # which it checks
+        return read_camera(text)
+    return Camera(Sight(sees=int(text) if text.isdigit() else text))  # type: ignore[arg-type]  # which it checks
 
 
-def decision_period(options: argparse.Namespace) -> float | None:
-    """Time between decisions that the options ask for [s]; None for that of the task."""
-    if options.decision_period is not None or options.task is not None or options.scene is not None:
-        return options.decision_period  # type: ignore[no-any-return]
-    if (known := trained_for(options.agent)) is not None:
-        return known.decision_period
-    return LEARNED_PERIOD if options.agent == "learned" else None
+def trained_for(options: argparse.Namespace) -> dict[str, Any]:
+    """Arguments of the environment that a policy was trained for, its robot's where it is a file, unless options name a
+    task or a scene."""
+    if options.task is not None or options.scene is not None:
+        return {}
+    if options.agent == "learned":
+        return {"decision_period": LEARNED_PERIOD}
+    policy = learned_policy(options.agent)
+    if policy is None:
+        return {}
+    about = policy.description
+    own = {"decision_period": about.decision_period, "sight": about.sight, "action_delay": about.action_delay}
+    return own | ({"scene": about.scene} if is_file(options.agent) else {})
 
 
 def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
@@ -82,16 +92,18 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
     for name in ("speed", "decision_period", "seconds"):
         if getattr(options, name) is not None:
             require_number(f"--{name.replace('_', '-')}", getattr(options, name), "1")
-    asked: dict[str, Any] = {"fidelity": options.fidelity, "decision_period": decision_period(options)}
-    asked |= {"sight": sight(options.sight), "action_delay": options.action_delay}
+    asked = {"fidelity": options.fidelity, "decision_period": options.decision_period}
+    if (camera := camera_of(options.sight)) is not None:
+        asked |= camera._asdict()
+    if options.action_delay is not None:
+        asked["action_delay"] = options.action_delay
     if options.path is not None:
         asked["path"] = load_path(options.path)
     if options.scene is not None:
         asked["scene"] = load_scene(options.scene)
-    elif options.task is None and is_file(options.agent) and (known := trained_for(options.agent)) is not None:
-        asked["scene"] = known.scene
     if options.random_heading:
         asked["random_heading"] = True
+    asked = trained_for(options) | {name: value for name, value in asked.items() if value is not None}
     return {name: value for name, value in asked.items() if value is not None}
 
 
@@ -99,7 +111,7 @@ def make(options: argparse.Namespace, **more: Any) -> gym.Env[Any, Any]:
     """Environment that the options ask for."""
     task = "SeastarSwim-v0" if options.task is None else options.task
     arguments = {**arguments_of(options), **more}
-    if (period := decision_period(options)) is not None:
+    if (period := arguments.get("decision_period")) is not None:
         arguments["max_episode_steps"] = decisions_in(TIME_LIMIT, period)
     return make_task(task, **arguments)
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import MOST_LIMBS, Actions, action_space
 from seastar_gym.envs.layout import Layout
+from seastar_gym.envs.sight import Sight, told
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_array, shown
 
@@ -71,16 +72,17 @@ def require_fit(
     decision_period: float | None = None,
     n_seen: int | None = None,
     challenge: "Challenge | None" = None,
+    sight: Sight | None = None,
 ) -> None:
     """ValueError, with one sentence, where a policy cannot drive the robot of an environment, as far as it tells.
 
     decision_period: Time between decisions of the environment [s]. None means a stroke.
     n_seen: Length of the environment's observations. None means those of waypoints.
-    challenge: Of the environment. None means waypoints.
+    challenge: Of the environment. None means waypoints. sight: Through which the robot is seen, None for full sight.
     """
     n_seen = Layout.of(scene).size if n_seen is None else n_seen
     if hasattr(policy, "require_fit"):
-        policy.require_fit(scene, actions, n_seen, challenge)
+        policy.require_fit(scene, actions, n_seen, challenge, sight)
     limbs = getattr(policy, "n_limbs", None)
     if limbs is not None and limbs != scene.robot.n_limbs:
         raise ValueError(f"The policy is for a robot of {limbs} limbs, the environment's has {scene.robot.n_limbs}.")
@@ -90,7 +92,10 @@ def require_fit(
         raise ValueError(f"The policy decides every {ours:g} s, the environment every {theirs:g} s: make them equal.")
     sees: Any = getattr(policy, "observation_space", None)
     if sees is not None and sees.shape != (n_seen,):
-        raise ValueError(f"The policy sees observations of shape {sees.shape}, the environment's have {(n_seen,)}.")
+        shown_by = "" if sight is None else f", by {told(sight)}"
+        raise ValueError(
+            f"The policy sees observations of shape {sees.shape}, the environment's have {(n_seen,)}{shown_by}."
+        )
     acts = getattr(policy, "action_space", None)
     if acts is not None and acts != action_space(actions, scene.robot.n_limbs):
         raise ValueError(f'The policy acts in {acts}, which is not that of an environment with actions="{actions}".')

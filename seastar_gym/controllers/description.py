@@ -9,12 +9,16 @@ from typing import Any, NamedTuple, cast, get_args
 from seastar_gym.envs import TASKS
 from seastar_gym.envs.commands import Actions, Discrete, checked_decision_period, choices
 from seastar_gym.envs.layout import N_STATIONS, OBSERVATION_LAYOUT, Entry, Layout, memory_size
+from seastar_gym.envs.options import read
+from seastar_gym.envs.randomization import Distribution
+from seastar_gym.envs.sight import Drawn, Sight, require_action_delay
 from seastar_gym.envs.symmetry import FrameStack, Symmetry, memory_mirror, symmetry_of
 from seastar_gym.envs.symmetry.symmetry import MOST_PAST
 from seastar_gym.files import parse_json
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror
 from seastar_gym.scene.checks import is_whole_number, require_count, require_kind, shown
+from seastar_gym.scene.serial import to_dict
 from seastar_gym.version import __version__
 
 FORMAT = 3
@@ -35,6 +39,8 @@ class Description(NamedTuple):
     limb_mirror: What a mirror does to the numbers that are observed of every limb. None means those of the actuators.
     entries, shows_limbs, stations: Of the observations, see `Layout`. past: Number of past observations that the
     policy sees, see `FrameStack`.
+    sight, action_delay: Camera through which the robot was seen, None for full sight, and delay of its actions [s].
+    path: Name of the path of the training. None means that it has none.
     """
 
     actions: Actions
@@ -48,9 +54,13 @@ class Description(NamedTuple):
     shows_limbs: bool = True
     past: int = 0
     stations: int = N_STATIONS
+    sight: Sight | None = None
+    action_delay: Drawn = 0.0
+    path: str | None = None
 
     def to_json(self, **more: Any) -> str:
         """Description as text; `more` adds entries for people to read."""
+        late = self.action_delay
         facts = {
             "format": FORMAT,
             "seastar_gym": __version__,
@@ -58,6 +68,8 @@ class Description(NamedTuple):
             "observation_size": self.observation_size,
             **self._asdict(),
             "scene": self.scene.to_dict(),
+            "sight": None if self.sight is None else to_dict(self.sight),
+            "action_delay": to_dict(late) if isinstance(late, Distribution) else late,
             **more,
         }
         return json.dumps(facts, indent=2, default=str, allow_nan=False)
@@ -101,10 +113,14 @@ class Description(NamedTuple):
         if past and not symmetry:
             raise ValueError("A policy without symmetry has no past.")
         mirror = None if facts["limb_mirror"] is None else _mirror(facts["limb_mirror"])
+        sight, action_delay = read(facts["sight"], Sight), read(facts["action_delay"], object)
+        require_kind("its sight", sight, Sight | None, "a Sight, or null")
+        require_action_delay(action_delay)
+        require_kind("its path", facts["path"], str | None, "the name of a path, or null")
         entries = tuple(facts["entries"]) if isinstance(facts["entries"], list) else facts["entries"]
         found = cls(
             cast(Discrete, actions), symmetry, scene, tuple(hidden), facts["decision_period"], task, mirror, entries,
-            facts["shows_limbs"], past, facts["stations"],
+            facts["shows_limbs"], past, facts["stations"], sight, action_delay, facts["path"],
         )  # fmt: skip
         _ = found.layout  # refuses the entries that are its own
         return found

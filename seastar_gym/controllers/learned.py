@@ -23,9 +23,10 @@ import safetensors
 import safetensors.numpy
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.contract import as_floating, can_be_decided_by, memory_of, starts
+from seastar_gym.controllers.contract import Policy, as_floating, can_be_decided_by, memory_of, starts
 from seastar_gym.controllers.description import Description, read_facts
 from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.sight import FOR_CAMERA, Sight, told
 from seastar_gym.envs.symmetry import FrameStack
 from seastar_gym.files import read_whole, write_atomically
 from seastar_gym.scene import Scene
@@ -160,11 +161,19 @@ class LearnedPolicy:
                 x = np.tanh(x)
         return x.reshape(*x.shape[:-1], *self._outputs)
 
-    def require_fit(self, scene: Scene, actions: Actions, n_seen: int, challenge: "Challenge | None" = None) -> None:
+    def require_fit(
+        self,
+        scene: Scene,
+        actions: Actions,
+        n_seen: int,
+        challenge: "Challenge | None" = None,
+        sight: Sight | None = None,
+    ) -> None:
         """ValueError, with one sentence, where this policy cannot drive the robot of an environment.
 
         n_seen: Length of the environment's observations. challenge: Of the environment, None for waypoints. A policy
         of a task fits that task with any numbers; one of waypoints fits wherever the observations are as long.
+        sight: Through which the robot is seen, None for full sight; a policy fits any that sees the same.
         """
         ours, theirs = self.scene.robot.n_limbs, scene.robot.n_limbs
         if ours != theirs:
@@ -176,6 +185,7 @@ class LearnedPolicy:
         task = self.description.task
         if task is not None:
             require_task(task, challenge)
+        require_same_sight(self.description.sight, sight)
         ours = self.description.observation_size
         if ours != n_seen:
             task = task or "waypoints"
@@ -211,6 +221,20 @@ def require_task(task: str, challenge: "Challenge | None") -> None:
     if not isinstance(challenge, type(CHALLENGES[task])):
         other = "waypoints" if challenge is None else name_of(challenge) or type(challenge).__name__
         raise ValueError(f"The policy was trained for the task {task}, the environment's is {other}.")
+
+
+def require_same_sight(ours: Sight | None, theirs: Sight | None) -> None:
+    """ValueError unless a robot is seen as a policy was trained to see it. None means full sight."""
+    if (ours and ours.sees) == (theirs and theirs.sees):
+        return
+    remedy = FOR_CAMERA if theirs else "give it that camera, by sight=policy.description.sight or by --sight and a file"
+    raise ValueError(f"The policy was trained for {told(ours)}, and is given {told(theirs)}: {remedy}.")
+
+
+def camera_of(policy: Policy) -> dict[str, Any]:
+    """Options of an environment by which a policy sees the robot as it was trained to; none for full sight."""
+    about = policy.description if isinstance(policy, LearnedPolicy) else None
+    return {} if about is None or about.sight is None else {"sight": about.sight, "action_delay": about.action_delay}
 
 
 def _require_weights(weights: object) -> None:

@@ -13,7 +13,6 @@ import numpy as np
 
 from seastar_gym.controllers import checkpoint, learned, third_party
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit
-from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.planner import Planner, gait_planner
 from seastar_gym.controllers.scripted import GAITS, scripted
@@ -96,7 +95,9 @@ def fitting_agents(
     for label, name in _labels(default_agents(known) if names is None else names).items():
         try:
             policy = _load_agent(name, seed, known, decision_period, None, make_env)
-            require_fit(policy, known, actions_of(policy, known.robot.n_limbs), decision_period)
+            sight = learned.camera_of(policy).get("sight")
+            n_seen = None if sight is None else policy.description.observation_size  # type: ignore[attr-defined]
+            require_fit(policy, known, actions_of(policy, known.robot.n_limbs), decision_period, n_seen, sight=sight)
         except (ValueError, OSError) as unfit:
             left_out.append(f"{label} is left out: {unfit}")
         else:
@@ -171,15 +172,15 @@ def learned_file(name: str, decision_period: float | None = None) -> Path | None
     return bundled or (Path(name) if name.endswith(".safetensors") else None)
 
 
-def trained_for(name: str) -> Description | None:
-    """What the learned policy of a name was trained for; None for other agents, and for learners that do not say it."""
-    bundled = learned.file_of(name)
-    if bundled is not None:
-        return learned.load(bundled).description
-    if not is_file(name) or third_party.is_function(name) or (name.endswith(".zip") and third_party.is_model(name)):
-        return None
-    policy = _load_file(name)
-    return policy.description if isinstance(policy, learned.LearnedPolicy) else None
+def learned_policy(name: str, decision_period: float | None = None) -> learned.LearnedPolicy | None:
+    """Learned policy of a name, bundled or from the files of a training; None for the name of another agent.
+
+    decision_period: As of `files_of`.
+    """
+    if name.endswith(".zip"):
+        return None if third_party.is_model(name) else checkpoint.load(name)
+    file = learned_file(name, decision_period)
+    return None if file is None else learned.load(file)
 
 
 def is_file(name: str) -> bool:

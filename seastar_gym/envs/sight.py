@@ -1,17 +1,20 @@
 """`Sight`: what a camera sees of the robots, how often, how late, and with which errors."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.layout import N_STATIONS, Entry
 from seastar_gym.envs.randomization import ACTION_DELAY, Distribution
-from seastar_gym.scene.checks import is_whole_number, require_number, shown
+from seastar_gym.files import read_json
+from seastar_gym.scene.checks import as_float, is_whole_number, require_number, shown
 from seastar_gym.scene.number import check_numbers, positive
-from seastar_gym.scene.serial import register_part
+from seastar_gym.scene.serial import VERSION, from_dict, register_part
 
 Sees = Literal["nodes", "pose"]
 Drawn = float | Distribution
@@ -73,6 +76,53 @@ class Sight:
     def numbers(self) -> dict[str, Drawn]:
         """Numbers that may be drawn, by their names in a `DomainRandomization`."""
         return {f"sight.{name}": getattr(self, name) for name in UNITS}
+
+
+FOR_CAMERA = "make one for the camera with python train.py --resume RUN --for-camera camera.json"
+"""What to do with a policy that needs to see more than a camera does."""
+TEMPLATE = (
+    '{"rate": 30, "delay": {"kind": "Uniform", "low": 0.05, "high": 0.15}, "jitter": 0.01, "dropout": 0.01, '
+    '"noise": 0.001, "turn_noise": 0.01, "sees": "pose", "action_delay": 0.0}'
+)
+"""File of a camera, see `read_camera`."""
+
+
+class Camera(NamedTuple):
+    """A sight, and how late the actions are that follow from it [s]."""
+
+    sight: Sight
+    action_delay: Drawn = 0.0
+
+
+def read_camera(file: str | os.PathLike[str]) -> Camera:
+    """Camera of a JSON file such as `TEMPLATE`: the numbers of a `Sight`, and `action_delay`, all by their names.
+
+    FileNotFoundError or ValueError, with one sentence, where there is none.
+    """
+    if not Path(file).is_file():
+        raise FileNotFoundError(f"There is no camera in {file}: write it, such as {TEMPLATE}.")
+    data = read_json(file)
+    try:
+        if not isinstance(data, dict):
+            raise ValueError(f"it must be such as {TEMPLATE}, not {shown(data)}")
+        late = data.pop("action_delay", 0.0)
+        sight = from_dict({"version": VERSION, "kind": Sight.__name__, **data}, Sight)
+        late = from_dict({"version": VERSION, **late}, object) if isinstance(late, dict) else as_float(late)
+        require_action_delay(late)
+    except ValueError as wrong:
+        raise ValueError(f"{file} is no camera: {str(wrong).rstrip('.')}.") from wrong
+    return Camera(sight, late)
+
+
+def told(sight: Sight | None) -> str:
+    """What is seen of robots, in a few words; None means full sight."""
+    if sight is None:
+        return "full sight"
+    if isinstance(sight.sees, str):
+        seen = {"pose": "the pose alone", "nodes": "all nodes"}[sight.sees]
+        return f'a camera that sees {seen} (sees="{sight.sees}")'
+    markers = "a marker" if sight.sees == 1 else f"{sight.sees} markers"
+    return f"a camera that sees {markers} on every limb (sees={sight.sees})"
 
 
 def require_drawn(name: str, value: object, unit: str, largest: float) -> None:

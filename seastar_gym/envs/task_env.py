@@ -12,6 +12,7 @@ from seastar_gym.envs.commands import Actions, action_space, command_table
 from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.randomization import DomainRandomization
+from seastar_gym.envs.sight import Drawn, Sight
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.swimming import Swimming
 from seastar_gym.scene import Scene
@@ -99,6 +100,16 @@ class TaskEnv(PlainSpec):
     def headings(self) -> HeadingTargets | None:
         """Headings that are asked for at the waypoints, None if none are."""
         return self._task.options.headings
+
+    @property
+    def sight(self) -> Sight | None:
+        """Camera through which robots are seen, None for full sight."""
+        return self._task.options.sight
+
+    @property
+    def action_delay(self) -> Drawn:
+        """Time from a decision to the heat of wires [s], or its distribution."""
+        return self._task.options.action_delay
 
     @property
     def scene(self) -> Scene:

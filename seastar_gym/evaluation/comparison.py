@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from seastar_gym.controllers.contract import Policy, actions_of
-from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.controllers.learned import LearnedPolicy, camera_of
 from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import make_scene, read
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
@@ -49,7 +49,7 @@ def evaluate(
 ) -> list[Swim]:
     """Let every agent swim the path and print the table; returns the swims in the order of the agents.
 
-    agents: Policies by name, see `Policy`.
+    agents: Policies by name, see `Policy`. Those that were trained for a camera swim as it sees them.
     path: Name of a path, or waypoints [m], shape (n, 2).
     seed, reset_options: Seed and options of every agent's `reset`.
     max_strokes: Time limit [decisions]; by default that of 400 s. waypoint_radius: Radius of the waypoints [m].
@@ -117,7 +117,7 @@ def _swim_once(
 ) -> tuple[Swim, Playback | None]:
     """Swim of an agent, filmed if there is a file for the video, and its playback if `record` asks for one."""
     scene = make_scene(environment["scene"], None, environment["decision_period"])
-    environment = {"actions": actions_of(policy, scene.robot.n_limbs), **environment}
+    environment = {**camera_of(policy), "actions": actions_of(policy, scene.robot.n_limbs), **environment}
     if video is None and not record:
         return swim(name, policy, SeastarSwimEnv(**environment), **episode), None
     env = RecordingEnv(film=video is not None, frames_per_stroke=FRAMES_PER_STROKE, **environment)

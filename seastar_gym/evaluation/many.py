@@ -57,7 +57,7 @@ def swim_many(
         decision_period=decision_period, sight=sight, action_delay=action_delay,
     )  # fmt: skip
     task = DisturbedTask(disturbance, np.random.default_rng([seed, n_swims]), options, n_swims, threads)
-    require_fit(policy, scene, actions, decision_period, task.layout.size)
+    require_fit(policy, scene, actions, decision_period, task.layout.size, sight=sight)
     batch, limit = TaskBatch(task), max_strokes or decisions_in(TIME_LIMIT, decision_period, scene)
     batch.np_random = tuple(np.random.default_rng([seed, swim]) for swim in range(n_swims))
     swims = swims_of(agent, rollout(batch, policy, until=limit, record=RECORDED))

@@ -144,7 +144,7 @@ def swim(
         require_callable("watch", watch)
     assert env.observation_space.shape is not None
     n_seen, challenge = env.observation_space.shape[0], getattr(env, "challenge", None)
-    require_fit(policy, env.scene, env.actions, env.decision_period, n_seen, challenge)
+    require_fit(policy, env.scene, env.actions, env.decision_period, n_seen, challenge, env.sight)
 
     def look(info: Info) -> None:
         if watch is not None:

@@ -10,6 +10,7 @@ from seastar_gym.controllers.contract import Policy, actions_in, require_fit
 from seastar_gym.controllers.greedy import Searcher
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.layout import Layout
+from seastar_gym.envs.sight import told
 from seastar_gym.envs.tasks.numbered import Split
 from seastar_gym.evaluation.rollout import Batch, Episodes, rollout
 from seastar_gym.scene.numerics import Fidelity
@@ -66,9 +67,11 @@ def require_seen(policy: Policy, env: Any) -> Actions:
     """Action mode in which an agent swims a task; ValueError where it cannot know what the task shows, or drive it."""
     n_seen, n_known = env.observation_space.shape[0], Layout.of(env.scene).size
     if isinstance(policy, Searcher) and n_seen != n_known:
-        raise ValueError(f"It reads observations of {n_known} numbers, the task shows {n_seen}.")
+        shown_by = "" if env.sight is None else f", by {told(env.sight)}"
+        raise ValueError(f"It reads observations of {n_known} numbers, the task shows {n_seen}{shown_by}.")
     actions = actions_in(policy, env.actions, env.scene.robot.n_limbs)
-    require_fit(policy, env.scene, actions, env.decision_period, n_seen, getattr(env, "challenge", None))
+    challenge = getattr(env, "challenge", None)
+    require_fit(policy, env.scene, actions, env.decision_period, n_seen, challenge, env.sight)
     return actions
 
 

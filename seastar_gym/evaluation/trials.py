@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.learned import camera_of
 from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.disturbances import CURRENT_DIRECTIONS, DISTURBANCES
 from seastar_gym.evaluation.many import swim_many
@@ -62,7 +63,7 @@ def trials(
         for agent, policy in agents.items():
             found = swim_many(
                 agent, policy, path, n_swims, scene, DISTURBANCES[label], seed=seed, threads=threads,
-                decision_period=decision_period, max_strokes=max_strokes,
+                decision_period=decision_period, max_strokes=max_strokes, **camera_of(policy),
             )  # fmt: skip
             row: Row = {"path": path, "disturbance": label, "agent": agent, "fidelity": fidelity, "swims": n_swims}
             for name, numbers in statistics(found).items():

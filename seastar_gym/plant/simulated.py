@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,11 +10,20 @@ from numpy.typing import NDArray
 from seastar_gym.envs.sight import Lateness, Sight
 from seastar_gym.envs.tracker import POSE, Tracker
 from seastar_gym.plant.plant import Sighting
+from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.heating import WirePair
+from seastar_gym.scene.actuators.pulse import SmaPulse
+from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.scene.checks import require_flag, require_kind, require_seed
 from seastar_gym.simulator import Simulator
 
 ROUNDING = 1e-9
+
+
+def with_wires(scene: Scene) -> Scene:
+    """The scene with the wires of which an `SmaPulse` is the strokes from rest; others as they are."""
+    actuator = scene.actuator
+    return replace(scene, actuator=SmaWires(**asdict(actuator))) if isinstance(actuator, SmaPulse) else scene
 
 
 class SimulatedPlant:

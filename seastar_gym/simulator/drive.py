@@ -34,7 +34,6 @@ class Drive:
 
     step: Length of a time step [s].
     strengths: Factor by which every limb's rotation is reduced, shape (n_robots, n_limbs).
-    state: Present state of the actuators, shape (n_robots, n_limbs, n_state); n_state is 0 without memory.
     at_rest: State of the actuators at rest, of the shape of `state`.
     commands: Commands under way, shape (n_robots, n_limbs); 0 where none are.
     phase: Time since they were given [s], 0 if none are under way.
@@ -52,6 +51,21 @@ class Drive:
         self.set_actuator(actuator)
         self.state = self.at_rest.copy()
         self._before = self._after = self.state  # at the beginning and the end of the present interval
+
+    @property
+    def state(self) -> Floats:
+        """Present state of the actuators, shape (n_robots, n_limbs, n_state); n_state is 0 without memory.
+
+        Within an interval the actuators are asked for it when somebody looks.
+        """
+        if self._until is not None:
+            self.state = self._actuator.respond(self._until, self._given, self._before)[1]
+        return self._state
+
+    @state.setter
+    def state(self, state: Floats) -> None:
+        self._state = state
+        self._until: Floats | None = None  # times of the present interval until now [s], if nobody has looked yet
 
     def set_actuator(self, actuator: Actuator) -> None:
         """Continue with an actuator that differs only in numbers that may differ from robot to robot."""
@@ -127,7 +141,7 @@ class Drive:
         if end == len(times) - 1:
             self.state = self._after
         elif self._has_memory:
-            self.state = self._actuator.respond(times[: end + 1], self._given, self._before)[1]
+            self._until = times[: end + 1]
         self.phase = self.steps.phases[end]
         self.commands = self._given if self.phase > 0.0 else self._none
 

@@ -172,7 +172,8 @@ class Simulator:
         self.__init__(*state["arguments"])  # type: ignore[misc]
         self._batch.put_rows(state["rows"])
         vars(self._clock).update(vars(state["clock"]))
-        vars(self._drive).update(state["drive"])
+        for name, value in state["drive"].items():
+            setattr(self._drive, name, value)
         self._bars, self._growth, self._may_warn_of_overlap = (state[each] for each in ("bars", "growth", "may_warn"))
 
     def reset(self, mask: ArrayLike | None = None, heading: ArrayLike = 0.0) -> None:

@@ -173,7 +173,7 @@ def test_a_bundled_policy_fits_its_robot_and_mode_alone(name, file):
     about = policy.description
     own = about.scene, about.actions, about.decision_period, about.observation_size
     task = about.task and CHALLENGES[about.task]
-    require_fit(policy, *own, task)
+    require_fit(policy, *own, task, about.sight)
     for change, words in (
         ((replace(about.scene, robot=Seastar(n_limbs=4)), *own[1:]), "robot of 5 limbs, the environment's has 4."),
         ((own[0], "continuous", *own[2:]), "takes actions=\"continuous\"."),
@@ -181,4 +181,4 @@ def test_a_bundled_policy_fits_its_robot_and_mode_alone(name, file):
         ((*own[:2], 0.3, own[3]), "make them equal"),
     ):  # fmt: skip
         with assert_refused(words):
-            require_fit(policy, *change, task)
+            require_fit(policy, *change, task, about.sight)

@@ -13,12 +13,15 @@ from agents.hyperparameters import Hyperparameters
 from every_part import ACTUATORS, PARTS
 from later import Later
 from refusals import assert_refused
-from seastar_gym import Numerics, Scene, Seastar, SmaPulse, SmaWires, Water
+from seastar_gym import Numerics, Scene, Seastar, Sight, SmaPulse, SmaWires, Water
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, load, save
+from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, camera_of, load, save
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.sight import told
+from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.evaluation.swim import swim
 from symmetries import assert_equivariant, symmetry_for
 
@@ -218,6 +221,9 @@ OF_OWN = Description("pairs", False, Scene(actuator=Own()), (3,))
         (lambda: save(random_policy(OF_OWN), "own.safetensors"), "Scene.actuator is a Own, "),
         (lambda: TASK._replace(limb_mirror=[(0, 1)]).check(), "ts limb_mirror"),
         (lambda: TASK._replace(hidden=[8]).check(), "hidden must be a tuple of widths"),
+        (lambda: TASK._replace(sight="pose").check(), "its sight must be a Sight"),
+        (lambda: TASK._replace(action_delay=-1.0).check(), "action_delay must be"),
+        (lambda: TASK._replace(path=3).check(), "its path must be the name of a path"),
     ],
 )
 def test_what_no_policy_can_be_is_refused_and_not_written(call, words, tmp_path, monkeypatch):
@@ -226,6 +232,30 @@ def test_what_no_policy_can_be_is_refused_and_not_written(call, words, tmp_path,
         call()
     assert not [*tmp_path.iterdir()]
     TASK._replace(limb_mirror=((1, -1), (0, -1)), entries=("scalar",) * 1000, past=1000).check()
+
+
+SEEN = {
+    "full sight": {},
+    "the pose alone": {"sight": Sight(delay=0.1)},
+    "a marker": {"sight": Sight(dropout=0.1, sees=1), "action_delay": 0.02},
+}
+"""Options of environments by words for what is seen in them."""
+
+
+@pytest.mark.parametrize("given", SEEN)
+@pytest.mark.parametrize("trained", SEEN)
+def test_a_policy_knows_its_camera_and_swims_in_what_shows_the_same(trained, given, tmp_path):
+    options = {"num_envs": 1, "scene": WIRES, "decision_period": 0.2}
+    batch = VectorSymmetryReduction(ppo.make_training_batch(SMALL, "line", True, **options, **SEEN[trained]))
+    save(random_policy(ppo.describe(BatchVecEnv(batch), (4,))), tmp_path / "policy.safetensors")
+    policy = load(tmp_path / "policy.safetensors")
+    assert camera_of(policy).get("sight") == SEEN[trained].get("sight") and policy.description.path == "line"
+    env = SeastarSwimEnv("line", scene=WIRES, decision_period=0.2, actions="pairs", **SEEN[given])
+    if trained == given:
+        assert swim("trained", policy, env, max_strokes=1).strokes == 1
+        return
+    with assert_refused(f"trained for {told(policy.description.sight)}, and is given {told(env.sight)}"):
+        swim("trained", policy, env, max_strokes=1)
 
 
 N_DAMAGED = 200

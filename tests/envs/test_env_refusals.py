@@ -2,6 +2,7 @@
 
 import copy
 import importlib
+import json
 import subprocess
 import sys
 
@@ -36,6 +37,7 @@ from seastar_gym.envs.randomization import LogUniform, Normal
 from seastar_gym.envs.rendering import Renderer
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.sight import TEMPLATE, read_camera
 from seastar_gym.envs.symmetry import (
     Symmetry,
     VectorFrameStack,
@@ -367,6 +369,37 @@ def test_resets_that_are_refused_before_the_first_success_cost_nothing():
     """By `gym.make` and `gym.make_vec`, of every id, in a process of its own."""
     done = subprocess.run([sys.executable, "-c", REFUSED_FIRST], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        (None, "There is no camera in"),
+        ("{", "is no JSON that can be read"),
+        ("[30]", "it must be such as"),
+        ('{"fps": 30}', "'fps'"),
+        ('{"rate": -30}', "Sight.rate must be"),
+        ('{"delay": {"kind": "Uniform", "low": 0.1}}', "'high'"),
+        ('{"action_delay": 99}', "action_delay must be at most"),
+        ('{"kind": "SmaWires"}', "not a Sight"),
+    ],
+)
+def test_a_file_that_is_no_camera_is_refused_in_a_sentence(text, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    if text is not None:
+        (tmp_path / "camera.json").write_text(text)
+    with pytest.raises((ValueError, FileNotFoundError), match=r"^[^\n]*camera\.json[^\n]*\.$") as refused:
+        read_camera("camera.json")
+    assert words in str(refused.value)
+
+
+def test_a_camera_is_read_from_the_template_and_from_what_a_sight_is_written_as(tmp_path):
+    file = tmp_path / "camera.json"
+    file.write_text(TEMPLATE)
+    camera = read_camera(file)
+    assert camera.sight.delay == Uniform(0.05, 0.15) and camera.action_delay == 0.0
+    file.write_text(json.dumps(to_dict(camera.sight) | {"action_delay": {"kind": "Uniform", "low": 0.0, "high": 0.1}}))
+    assert read_camera(file) == camera._replace(action_delay=Uniform(0.0, 0.1))
 
 
 def test_modules_and_names_of_paths_are_registered_again_without_a_word(recwarn):

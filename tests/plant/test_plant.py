@@ -538,6 +538,29 @@ def test_a_simulated_drive_is_planned_driven_and_reported(tmp_path, capsys):
     assert measured.commands.tolist() == [[0, 1, 0, 0, -1], [0] * 5] * 2 and len(measured.nodes) == 6
 
 
+@pytest.mark.parametrize("sees", ["pose", 1])
+def test_a_drive_is_as_the_policy_was_trained(sees, tmp_path, capsys, monkeypatch):
+    scene = Scene(Seastar(n_limbs=3), actuator=SmaWires()).at("fast")
+    sight = Sight(20.0, delay=0.05, sees=sees)
+    layout = SeastarSwimEnv(scene=scene, sight=sight).layout
+    about = Description(
+        "pairs", True, scene, (4,), 0.25, entries=layout.entries, shows_limbs=layout.shows_limbs, past=2,
+        stations=layout.stations, sight=sight, path="line",
+    )  # fmt: skip
+    weights = {name: np.zeros(shape, np.float32) for name, shape in about.shapes().items()}
+    file = tmp_path / "policy.safetensors"
+    learned.save(learned.LearnedPolicy(about, weights), file)
+    made, make = [], drive_command.PlantSwim
+    monkeypatch.setattr(drive_command, "PlantSwim", lambda *a, **k: made.append(make(*a, **k)) or made[-1])
+    assert main(["drive", str(file), "--seconds", "1", "--yes", "--no-window", "--out", str(tmp_path / "out")]) == 0
+    assert "Driven: 0 of 1 waypoints. The guard had nothing to stop." in capsys.readouterr().out
+    assert {(env.scene, env.decision_period, env.path, env.sight.sees) for env in made} == {(scene, 0.25, "line", sees)}
+
+
+def test_strokes_are_driven_on_wires(tmp_path):
+    assert drive(tmp_path, "--decision-period", "1", "--dry") == 0
+
+
 def test_an_interrupted_drive_stops_the_wires(tmp_path, monkeypatch):
     plants, make = [], drive_command.simulated
 
@@ -560,9 +583,12 @@ def test_an_interrupted_drive_stops_the_wires(tmp_path, monkeypatch):
 
 def test_the_report_of_a_drive_is_as_kept(golden, tmp_path):
     (tmp_path / "poses.csv").write_text("captured,received,x,y,turn\n0,0.05,0,0,0\n0.03,0.09,0,0,0\n0.13,0.17,0,0,0\n")
-    options = SimpleNamespace(out=tmp_path, policy="straight", plant="serial:/dev/ttyACM0", decision_period=0.5)
+    options = SimpleNamespace(out=tmp_path, policy="straight", plant="serial:/dev/ttyACM0")
     planned, swum, _ = made_up.swims()
-    envs = [SimpleNamespace(stopped=stopped, latest=0.0123, dropped_pictures=3) for stopped in ("", "No new picture.")]
+    envs = [
+        SimpleNamespace(stopped=stopped, latest=0.0123, dropped_pictures=3, decision_period=0.5)
+        for stopped in ("", "No new picture.")
+    ]
     golden("report.md", "\n".join(report(options, planned, swum, env) for env in envs))
 
 
