@@ -176,11 +176,12 @@ class PlantTask(SwimTask):
         """Heat wires, now; where that is late, the episode's clock waits."""
         planned = self._begun + float(self.simulator.time[0])
         self.guard.look()
-        self._late = self.guard.now() - planned
+        now = self.guard.now()
+        self._late = now - planned
         if self.simulator.time[0] > 0.0:
             self.latest = max(self.latest, self._late)
         if self.simulator.time[0] == 0.0 and self.logs is not None:
-            self.logs.begin(self._origin, self.guard.now())
+            self.logs.begin(self._origin, now)
         if self._late > 0.0:
             self._begun += self._late
             self._known_pictures.wait(self._late)
@@ -188,7 +189,7 @@ class PlantTask(SwimTask):
             limbs = np.where(np.abs(commands) == share, np.sign(commands), 0.0).astype(int)
             self.guard.heat(limbs.tolist(), share * self.pulse)
         if self.logs is not None:
-            self.logs.decision(commands)
+            self.logs.decision(commands, now)
 
     def _attend(self, until: float) -> None:
         """Wait until a time of the plant's clock [s], and note what is seen."""
