@@ -1,7 +1,7 @@
 """Logs of a plant: sightings by the times at which pictures were taken, and commands, as `seastar identify` reads them.
 
-    tracking.csv   time since the first decision [s], places of hub and markers [m], and the orientation of a body [rad],
-                   in the frame in which the robot lay before it: the hub at the origin, limb 1 along +x
+    tracking.csv   time since the first decision [s], places of hub and markers [m], orientation of a body [rad], in the
+                   frame in which the robot lay before it: the hub at the origin, limb 1 along +x
     commands.csv   time of every decision since the first one [s], and its commands, limb by limb
     poses.csv      time of the picture, time at which it was known [s], x, y [m], heading [rad]: in the tank
 """  # fmt: skip
