@@ -32,6 +32,7 @@ MADE_BY_THE_PACKAGE = {
     "Setting", "Episode", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Progress",
     "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
     "Plant", "PlantError", "Sighting", "Derivatives", "Motion", "Gradient", "Record",
+    "Track",
 }  # fmt: skip
 """Records that functions return, protocols, and bases of classes of one's own."""
 UNCALLED = {*MADE_BY_THE_PACKAGE, "Here", "RayTasks", "SlurmArrays", "chapters_certificate",

@@ -79,7 +79,7 @@ def written(folder, name, text):
 
 def sleap_h5(folder, name, text):
     """HDF5 file of two animals with two points, in three pictures."""
-    h5py = pytest.importorskip("h5py", reason="h5py is not installed (extra data)")
+    h5py = pytest.importorskip("h5py", reason="h5py is not installed (extra tracks)")
     with h5py.File(folder / name, "w") as file:
         file["tracks"] = np.arange(24.0).reshape(2, 2, 2, 3)
         file["node_names"], file["track_names"] = [b"hub", b"tip"], [b"a", b"b"]
@@ -165,7 +165,7 @@ HARMFUL = {
 
 
 def h5(name):
-    return getattr(pytest.importorskip("h5py", reason="h5py is not installed (extra data)"), name)
+    return getattr(pytest.importorskip("h5py", reason="h5py is not installed (extra tracks)"), name)
 
 
 def virtual(file, other):
@@ -291,9 +291,9 @@ REFUSED = [
         lambda file: read_sleap(file.rename(file.with_suffix(".h5")), 10.0), "x", "h5 is no HDF5 file that can be read",
         marks=pytest.mark.skipif(find_spec("h5py") is None, reason="needs h5py"),
     ),
-    (read_table, "time,x\n0,1\n", "file.csv has no column y, but time, x."),
-    (read_table, "Zeit;x;y\n0,0;1;2\n", "separated by semicolons or tabs, has no column time, but Zeit, x, y."),
-    (read_table, "time,x,x,y\n0,1,2,3\n", "has several columns x: have more lines of names read, with --headers."),
+    (read_table, "time,x\n0,1\n", "file.csv has no column 'y', but time, x."),
+    (read_table, "Zeit;x;y\n0,0;1;2\n", "separated by semicolons or tabs, has no column 'time', but Zeit, x, y."),
+    (read_table, "time,x,x,y\n0,1,2,3\n", "has several columns 'x': have more lines of names read, with --headers."),
     (read_table, "time,x,y\n", "must have names, and lines below them"),
     (read_table, "time,x,y\n0,1\n", "line 2: the line must have 3 fields"),
     (read_table, "time,x,y\n,1,2\n", "line 2: '' is no number"),

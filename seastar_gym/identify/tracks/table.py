@@ -59,8 +59,12 @@ class Table(NamedTuple):
         if self.names.count(name) != 1:
             file = f"{self.file}{', separated by semicolons or tabs,' * self.rows[0].has_commas}"
             if name in self.names:
-                raise ValueError(f"{file} has several columns {name}: have more lines of names read, with --headers.")
-            raise ValueError(f"{file} has no column {name}, but {', '.join(filter(None, self.names))[:LONGEST_SHOWN]}.")
+                raise ValueError(
+                    f"{file} has several columns {shown(name)}: have more lines of names read, with --headers."
+                )
+            raise ValueError(
+                f"{file} has no column {shown(name)}, but {', '.join(filter(None, self.names))[:LONGEST_SHOWN]}."
+            )
         return self.names.index(name)
 
     def texts(self, name: str) -> list[str]:
@@ -104,7 +108,7 @@ def read_table(
     rate: float | None = None,
     score: str | Sequence[str] = (),
     likelihood: float | None = None,
-    only: Mapping[str, str] | None = None,
+    only: dict[str, str] | None = None,
     skip: int = 0,
     headers: int = 1,
     separator: str | None = None,
@@ -126,10 +130,9 @@ def read_table(
     separator, decimal: Character between fields, or "tab", and the one before decimals. None: as the first line tells.
     """
     require_file("file", file)
-    columns = [tuple([each] if isinstance(each, str) else each or ()) for each in (x, y, theta, score)]
-    for name, given in zip(("x", "y", "theta", "score"), columns, strict=True):
-        require_texts(name, given)
-    xs, ys, turns, scores = columns
+    xs, ys, turns, scores = (
+        _columns(name, given) for name, given in (("x", x), ("y", y), ("theta", theta), ("score", score))
+    )
     if not xs or len(xs) != len(ys) or len(scores) not in (0, len(xs)) or len(turns) not in (0, 1, 4):
         raise ValueError("Every x needs a y, and a score if there are any, and theta has one column or four.")
     if (likelihood is None) != (not scores):
@@ -140,8 +143,10 @@ def read_table(
             require_choice(name, value, choices)
     require_flag("degrees", degrees)
     require_flag("y_down", y_down)
-    require_kind("only", only, Mapping | None, "a dict of texts by names, or None")
-    table = Table.read(file, form_of(separator, decimal, skip), _lines("headers", headers, 1)).only(only or {})
+    only = {} if only is None else only
+    require_kind("only", only, dict, "a dict of texts by names, or None")
+    require_texts("only", [*only, *only.values()])
+    table = Table.read(file, form_of(separator, decimal, skip), _lines("headers", headers, 1)).only(only)
     if not turns and theta is None and "theta" in table.names:
         turns = ("theta",)
     times = _times(table, time, time_unit, rate)
@@ -160,6 +165,13 @@ def read_table(
     return Track(times, places, angles, in_pixels=unit == PIXEL)
 
 
+def _columns(name: str, given: str | Sequence[str] | None) -> Sequence[str]:
+    """Names of columns, none for None."""
+    found = [given] if isinstance(given, str) else [] if given is None else given
+    require_texts(name, found)
+    return found
+
+
 def _times(table: Table, time: str | None, unit: str | None, rate: float | None) -> Floats:
     """Times of a table's lines [s], see `read_table`."""
     if rate is None:
@@ -173,8 +185,9 @@ def _times(table: Table, time: str | None, unit: str | None, rate: float | None)
 
 def form_of(separator: str | None, decimal: str | None, skip: int = 0) -> Form:
     """Form of a file. ValueError for what is none."""
+    require_kind("separator", separator, str | None, "a character, or None")
     sign = "\t" if separator == "tab" else separator
-    if sign is not None and not (isinstance(sign, str) and len(sign) == 1 and sign not in '"\r\n.0123456789'):
+    if sign is not None and (len(sign) != 1 or sign in '"\r\n.0123456789'):
         raise ValueError(f"separator must be one character, such as ; or tab, not {shown(separator)}.")
     if decimal is not None:
         require_choice("decimal", decimal, (".", ","))

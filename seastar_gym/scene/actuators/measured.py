@@ -137,18 +137,17 @@ def _in_units(names: tuple[str, ...], columns: Floats) -> Floats:
     """Times [s] and angles [rad], shape (2, n), of columns in any order whose names may end with a unit."""
     from seastar_gym.scene.csv_rows import UNITS, unit_of
 
-    units = [unit_of(name) for name in names] or [None, None]
-    known = [next((what for what in ("time", "angle") if unit in UNITS[what]), None) for unit in units]
-    words = [what or next((it for it in ("time", "angle") if it in name.lower()), None)
-             for what, name in zip(known, names or ("", ""), strict=True)]  # fmt: skip
-    for unit, what, name in zip(units, known, names, strict=False):
-        if unit is not None and what is None:
+    found: dict[str, Floats] = {}
+    for default, name, column in zip(("time", "angle"), names or ("", ""), columns, strict=True):
+        unit, known = unit_of(name), ("time", "angle")
+        words = next((what for what in known if what in name.lower()), default)
+        what = next((what for what in known if unit in UNITS[what]), words)
+        if unit is not None and unit not in UNITS[what]:
             raise ValueError(f"{name} must be in {', '.join(UNITS['time'])} or {', '.join(UNITS['angle'])}.")
-    order = [1, 0] if words[0] == "angle" or words[1] == "time" else [0, 1]
-    if [words[k] for k in order] in (["time", "time"], ["angle", "angle"]):
+        found[what] = column * UNITS[what].get(unit or "", 1.0)
+    if len(found) == 1:
         raise ValueError(f"one column must be a time and one an angle, not {' and '.join(names)}.")
-    factors = [UNITS[what].get(units[k] or "", 1.0) for what, k in zip(("time", "angle"), order, strict=True)]
-    return columns[order] * np.array(factors)[:, None]
+    return np.array([found["time"], found["angle"]])
 
 
 def _kept(times: Floats, angles: Floats, error: float) -> list[int]:
