@@ -28,6 +28,10 @@ from seastar_gym.scene.checks import require_file, require_kind, shown
 from seastar_gym.simulator import StrokeReport
 from seastar_gym.simulator.pauses import pausing
 
+REST = 0.5
+"""Time for which a robot is watched at rest before it is driven and logged [s]: the noise of a single picture would
+otherwise be an error of all places in its logs."""
+
 
 def limits_for(limits: Limits, sight: Sight) -> Limits:
     """Limits that do not drop what a camera with these errors sees of a robot that lies still."""
@@ -81,13 +85,26 @@ class PlantTask(SwimTask):
         self.stopped, self._late, self.latest, self._noted = "", 0.0, 0.0, -math.inf
         with self.stopped_if_interrupted():
             self._open_logs()
-        seen = self._origin = self.guard.begin()
+        seen = self._origin = self._watched(self.guard.begin())
         super().reset(robots, generators, asked)
         self.simulator.reset(heading=seen.pose[2])
         self._begun = self.guard.now()
         self._note(seen)
         self._known_pictures.restart(self._picture(seen))
         self._begin(robots)
+
+    def _watched(self, seen: Sighting) -> Sighting:
+        """The last sighting of a robot that was seen so, after a while in which it rests and is logged, if it is."""
+        if self.logs is None:
+            return seen
+        until = self.guard.now() + REST
+        while (now := self.guard.now()) < until:
+            self.guard.wait_until(min(now + self.scene.numerics.step, until))
+            newest = self.guard.newest
+            if newest is not None and newest.captured_at > seen.captured_at:
+                self.logs.sighting(seen)
+                seen = newest
+        return seen
 
     def _open_logs(self) -> None:
         """Begin the logs of an episode, which take the place of those of the last one."""

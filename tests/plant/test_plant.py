@@ -466,7 +466,7 @@ def test_logs_tell_when_commands_were_given_and_what_the_robot_did(scene, nodes,
 
 def test_logs_of_late_decisions_tell_the_drag(tmp_path):
     truth = with_parameters(SCENE, ["fluid.drag_coefficient"], [1.3])
-    plant = simulated(Sight(delay=0.05, noise=2e-4), scene=truth)
+    plant = simulated(Sight(delay=0.05, noise=5e-4, turn_noise=0.01), scene=truth)
     env = PlantSwim(plant, logs=tmp_path, **OPTIONS)
     env.reset(seed=0)
     for action in np.random.default_rng(0).integers(env.action_space.n, size=12).tolist():
@@ -474,7 +474,8 @@ def test_logs_of_late_decisions_tell_the_drag(tmp_path):
         env.step(action)
     env.close()
     measured = Measurement.from_csv(tmp_path / "tracking.csv", tmp_path / "commands.csv")
-    assert identify(SCENE, ["fluid.drag_coefficient"], measured).values[0] == pytest.approx(1.3, rel=0.05)
+    found = identify(SCENE, ["fluid.drag_coefficient"], measured)
+    assert found.values[0] == pytest.approx(1.3, rel=0.05) and not found.is_doubted
 
 
 def test_markers_between_nodes_are_not_tracked():
