@@ -32,6 +32,7 @@ MADE_BY_THE_PACKAGE = {
     "Setting", "Episode", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Progress",
     "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
     "Plant", "PlantError", "Sighting", "Derivatives", "Motion", "Gradient", "Record",
+    "Track",
 }  # fmt: skip
 """Records that functions return, protocols, and bases of classes of one's own."""
 UNCALLED = {*MADE_BY_THE_PACKAGE, "Here", "RayTasks", "SlurmArrays", "chapters_certificate",
@@ -226,8 +227,8 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
                                   actions="pairs", randomization=None),
         "read_deeplabcut": dict(file=tracked(DEEPLABCUT), rate=30.0),
         "read_motive": dict(file=tracked(MOTIVE)),
-        "read_pose": dict(file=tracked("time,x,y\n0,1,2\n")),
-        "read_sleap": dict(file=tracked("track,frame_idx,instance.score,a.x,a.y\n,0,1,2,3\n"), rate=30.0),
+        "read_table": dict(file=tracked("time,x,y\n0,1,2\n")),
+        "read_sleap": dict(file=tracked("track,frame_idx,a.x,a.y,a.score\n,0,1,2,3\n"), rate=30.0),
         "to_c": dict(policy=learned(), name="a"),
         "policy_of": dict(model=named("make_model")(training_env(), training(), 0)),
     }.items():  # fmt: skip

@@ -174,7 +174,7 @@ def identify(
         require_places(measurement, float(2.0 * np.hypot(*robot.nodes().T).max()))
     first = residuals.trajectory(start)  # refuses times and commands that do not fit, which steps below may not
     if are_known:
-        require_rest(measurement, rests[0], first[0], robot.limb_length, late)
+        require_rest(measurement, rests[0], robot.limb_length, first[0], late)
     if largest_delay is not None:
         start[-1], bound[-1] = residuals.likely_delay(largest_delay), largest_delay
     found = search(residuals_of, measurement, period, start, bound, robot.limb_length, late)

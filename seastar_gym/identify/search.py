@@ -42,8 +42,8 @@ APART = 0.12
 """Least distance between logarithms of parameters of minima that differ."""
 LEAST_NOISE = 5e-4
 """Noise, over the length of a limb, below which errors of the simulation count more."""
-MOST_PERIODS = 10.0
-"""Longest time between pictures, in strokes, with which the strokes' motion is seen."""
+MOST_PERIODS, MOST_PAUSES = 3.0, 100.0
+"""Longest times, in strokes, between pictures with which the strokes' motion is seen, and between commands."""
 LONGEST_PAUSE = 60.0
 """Longest time between the first picture and the first command [s]."""
 
@@ -218,17 +218,16 @@ def distinct(rows: Floats, costs: Floats) -> list[Floats]:
 
 
 def require_clocks(measurement: Measurement, period: float, largest_delay: float = 0.0) -> None:
-    """ValueError for times that cannot be seconds of both files."""
-    spacing = float(np.median(np.diff(measurement.time))) if len(measurement.time) > 1 else 0.0
-    begin = 0.0 if measurement.command_times is None else float(measurement.command_times[0])
-    if spacing > MOST_PERIODS * period:
+    """ValueError for times that cannot be seconds of one clock. period: Of the strokes [s]."""
+    pictures, commands = measurement.time, measurement.command_times
+    commands = np.zeros(1) if commands is None else commands
+    between, pause = (float(np.median(np.diff(each))) if len(each) > 1 else 0.0 for each in (pictures, commands))
+    far = abs(pictures[0] - commands[0]) > LONGEST_PAUSE + largest_delay
+    if far or between > MOST_PERIODS * period or pause > MOST_PAUSES * period:
         raise ValueError(
-            f"Pictures are {spacing:.4g} s apart and strokes take {period:.4g} s: the times may be in milliseconds."
-        )
-    if abs(measurement.time[0] - begin) > LONGEST_PAUSE + largest_delay:
-        raise ValueError(
-            f"The first picture is of {measurement.time[0]:.6g} s and the first command of {begin:.6g} s, more than "
-            f"{LONGEST_PAUSE:g} s apart: give both in seconds, of one clock."
+            f"Pictures are {between:.4g} s apart and commands {pause:.4g} s, for strokes of {period:.4g} s, the first "
+            f"picture is of {pictures[0]:.6g} s and the first command of {commands[0]:.6g} s: give both in seconds, "
+            "not milliseconds, of one clock."
         )
 
 
@@ -252,25 +251,27 @@ def require_places(measurement: Measurement, length: float) -> None:
 
 
 def require_rest(
-    measurement: Measurement, rest: Floats, first: Floats, length: float, largest_delay: float = 0.0
-) -> None:
-    """ValueError where the robot is not at rest in the pictures from before the first command.
+    measurement: Measurement, rest: Floats, length: float, first: Floats | None = None, largest_delay: float = 0.0
+) -> float:
+    """Distance of the robot from its shape at rest in the pictures from before the first command [m]; NaN if unknown.
 
-    Where there are none, the first picture may be as far from it as the simulated robot is then. rest, first: Positions
-    of the nodes at rest, and simulated at the first picture [m], shape (n_nodes_seen, 2). length: Of a limb [m].
+    ValueError where it is not at rest. Where there are no such pictures, the first one may be as far from it as the
+    simulated robot is then. rest, first: Positions of the nodes at rest, and simulated at the first picture [m], shape
+    (n_nodes_seen, 2); None: as at rest. length: Of a limb [m].
     """
     begin = 0.0 if measurement.command_times is None else float(measurement.command_times[0])
     n_early = int(np.sum(measurement.time <= begin - largest_delay + 1e-9))
     if not n_early and largest_delay:
-        return  # they may be of any time
+        return math.nan  # they may be of any time
     early = measurement.positions[: max(n_early, 1)]
     early = early[np.isfinite(early).any(axis=(1, 2))]
     if not len(early):
-        return
+        return math.nan
     seen = np.full(rest.shape, np.nan)
     known = np.isfinite(early).any(axis=0)
     seen[known] = np.nanmean(early[:, known], axis=0)
-    noise, moved = noise_of(measurement.positions), 0.0 if n_early else _distance(first, rest)
+    noise = noise_of(measurement.positions)
+    moved = 0.0 if n_early or first is None else _distance(first, rest)
     allowed = max(3.0 * noise if math.isfinite(noise) else 0.0, 0.01 * length) + moved
     off = _distance(seen, rest)
     if off > allowed:
@@ -279,9 +280,10 @@ def require_rest(
         hint = f" {name} it would be within {1e3 * others[name]:.2g} mm." if others[name] < 0.3 * off else ""
         raise ValueError(
             f"The robot at rest is {1e3 * off:.3g} mm from the first picture, in the root mean square, and "
-            f"{1e3 * allowed:.2g} mm are allowed: the track must begin at rest, with the hub at the origin and limb 1 "
-            f"along +x.{hint}"
+            f"{1e3 * allowed:.2g} mm are allowed: check units, which point is which node, and that the track begins at "
+            f"rest, with the hub at the origin and limb 1 along +x.{hint}"
         )
+    return off
 
 
 def _distance(one: Floats, other: Floats) -> float:

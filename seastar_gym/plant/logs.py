@@ -1,8 +1,8 @@
 """Logs of a plant: sightings by the times at which pictures were taken, and commands, as `seastar identify` reads them.
 
-    tracking.csv   time since the first decision [s], places of hub and markers [m], in the frame in which the robot
-                   lay before it: the hub at the origin, limb 1 along +x
-    commands.csv   commands of every decision, limb by limb
+    tracking.csv   time since the first decision [s], places of hub and markers [m], orientation of a body [rad], in the
+                   frame in which the robot lay before it: the hub at the origin, limb 1 along +x
+    commands.csv   time of every decision since the first one [s], and its commands, limb by limb
     poses.csv      time of the picture, time at which it was known [s], x, y [m], heading [rad]: in the tank
 """  # fmt: skip
 
@@ -30,40 +30,47 @@ class Logs:
     """
 
     def __init__(self, folder: Path, robot: Seastar, n_markers: int):
-        self._nodes = nodes_of(robot, n_markers)
-        self._origin, self._begun = Sighting(0.0, 0.0, (0.0, 0.0, 0.0)), math.inf
+        self._nodes, self._has_body = nodes_of(robot, n_markers), robot.has_body
+        self._origin, self._begun = (0.0, 0.0, 0.0), math.inf
+        self._at_rest: list[tuple[float, float, float]] = []
         self._files: dict[str, LineFile] = {}
         with self._told_in_a_sentence():
             folder.mkdir(parents=True, exist_ok=True)
             for name in ("tracking", "commands", "poses"):
                 self._files[name] = LineFile(folder / f"{name}.csv")
         places = [f"{axis}{node}" for node in [0, *self._nodes.values()] for axis in "xy"]
-        self._write("tracking", ["time", *places])
+        self._write("tracking", ["time", *places, *(["theta"] if self._has_body else [])])
+        self._write("commands", ["time", *(f"limb{limb + 1}" for limb in range(robot.n_limbs))])
         self._write("poses", ["captured_at", "seen_at", "x", "y", "heading"])
 
     def begin(self, seen: Sighting, time: float) -> None:
-        """A robot that was seen so begins to swim at a time [s]. Sightings before it are not tracked."""
-        self._origin, self._begun = seen, time
+        """A robot that was seen so begins to swim at a time [s]; it lay at the mean of the sightings before."""
+        poses = np.array(self._at_rest or [seen.pose])
+        poses[:, 2] = np.unwrap(poses[:, 2])
+        x, y, heading = poses.mean(axis=0).tolist()
+        self._origin, self._begun = (x, y, heading), time
 
     def sighting(self, seen: Sighting) -> None:
         """Write a sighting."""
         self._write("poses", [f"{number:.6f}" for number in (seen.captured_at, seen.seen_at, *seen.pose)])
         if seen.captured_at < self._begun:
+            self._at_rest.append(seen.pose)
             return
         markers = np.zeros((0, 2)) if seen.markers is None else seen.markers.reshape(-1, 2)[list(self._nodes)]
         places = self._as_begun(np.concatenate([[seen.pose[:2]], markers]))
-        numbers = [seen.captured_at - self._begun, *places.ravel().tolist()]
+        turn = math.remainder(seen.pose[2] - self._origin[2], math.tau)
+        numbers = [seen.captured_at - self._begun, *places.ravel().tolist(), *([turn] if self._has_body else [])]
         self._write("tracking", ["" if math.isnan(number) else f"{number:.6f}" for number in numbers])
 
     def _as_begun(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Places [m], shape (n, 2), in the frame in which the robot lay when it began."""
-        x, y, heading = self._origin.pose
+        x, y, heading = self._origin
         c, s = math.cos(heading), math.sin(heading)
         return (places - [x, y]) @ np.array([[c, -s], [s, c]])
 
-    def decision(self, commands: NDArray[np.float64]) -> None:
-        """Write the commands of a decision, shape (n_limbs,)."""
-        self._write("commands", [f"{command:g}" for command in commands.tolist()])
+    def decision(self, commands: NDArray[np.float64], time: float) -> None:
+        """Write the commands of a decision, shape (n_limbs,), that is followed from a time on [s]."""
+        self._write("commands", [f"{time - self._begun:.6f}", *(f"{command:g}" for command in commands.tolist())])
 
     def _write(self, name: str, fields: Iterable[str]) -> None:
         with self._told_in_a_sentence():

@@ -28,6 +28,10 @@ from seastar_gym.scene.checks import require_file, require_kind, shown
 from seastar_gym.simulator import StrokeReport
 from seastar_gym.simulator.pauses import pausing
 
+REST = 0.5
+"""Time for which a robot is watched at rest before it is driven and logged [s]: the noise of a single picture would
+otherwise be an error of all places in its logs."""
+
 
 def limits_for(limits: Limits, sight: Sight) -> Limits:
     """Limits that do not drop what a camera with these errors sees of a robot that lies still."""
@@ -81,13 +85,26 @@ class PlantTask(SwimTask):
         self.stopped, self._late, self.latest, self._noted = "", 0.0, 0.0, -math.inf
         with self.stopped_if_interrupted():
             self._open_logs()
-        seen = self._origin = self.guard.begin()
+        seen = self._origin = self._watched(self.guard.begin())
         super().reset(robots, generators, asked)
         self.simulator.reset(heading=seen.pose[2])
         self._begun = self.guard.now()
         self._note(seen)
         self._known_pictures.restart(self._picture(seen))
         self._begin(robots)
+
+    def _watched(self, seen: Sighting) -> Sighting:
+        """The last sighting of a robot that was seen so, after a while in which it rests and is logged, if it is."""
+        if self.logs is None:
+            return seen
+        until = self.guard.now() + REST
+        while (now := self.guard.now()) < until:
+            self.guard.wait_until(min(now + self.scene.numerics.step, until))
+            newest = self.guard.newest
+            if newest is not None and newest.captured_at > seen.captured_at:
+                self.logs.sighting(seen)
+                seen = newest
+        return seen
 
     def _open_logs(self) -> None:
         """Begin the logs of an episode, which take the place of those of the last one."""
@@ -176,11 +193,12 @@ class PlantTask(SwimTask):
         """Heat wires, now; where that is late, the episode's clock waits."""
         planned = self._begun + float(self.simulator.time[0])
         self.guard.look()
-        self._late = self.guard.now() - planned
+        now = self.guard.now()
+        self._late = now - planned
         if self.simulator.time[0] > 0.0:
             self.latest = max(self.latest, self._late)
         if self.simulator.time[0] == 0.0 and self.logs is not None:
-            self.logs.begin(self._origin, self.guard.now())
+            self.logs.begin(self._origin, now)
         if self._late > 0.0:
             self._begun += self._late
             self._known_pictures.wait(self._late)
@@ -188,7 +206,7 @@ class PlantTask(SwimTask):
             limbs = np.where(np.abs(commands) == share, np.sign(commands), 0.0).astype(int)
             self.guard.heat(limbs.tolist(), share * self.pulse)
         if self.logs is not None:
-            self.logs.decision(commands)
+            self.logs.decision(commands, now)
 
     def _attend(self, until: float) -> None:
         """Wait until a time of the plant's clock [s], and note what is seen."""

@@ -112,13 +112,14 @@ def turned(angle):
         (lambda m: replace(m, positions=m.positions @ turned(0.5)), ["at rest", "Turned by 2"]),
         (lambda m: replace(m, positions=m.positions + [0.03, 0.0]), ["at rest", "Moved by ("]),
         (lambda m: replace(m, positions=m.positions[:, [0, 1, 3, 2]]), ["at rest", "Mirrored"]),
-        (lambda m: replace(m, time=1e3 * m.time, command_times=1e3 * np.arange(6.0)), ["40 s apart", "milliseconds."]),
+        (lambda m: replace(m, time=1e3 * m.time, command_times=1e3 * np.arange(6.0)), ["40 s apart", "milliseconds"]),
+        (lambda m: replace(m, command_times=1e3 * np.arange(6.0)), ["0.04 s apart", "1000 s, for", "milliseconds"]),
         (
             lambda m: replace(m, time=m.time + 1.7e9, command_times=np.arange(6.0)),
             ["1.7e+09 s", "of 0 s", "one clock."],
         ),
     ],
-    ids=["mm", "cm", "scaled", "mirrored", "turned", "moved", "swapped", "milliseconds", "clocks"],
+    ids=["mm", "cm", "scaled", "mirrored", "turned", "moved", "swapped", "milliseconds", "commands", "clocks"],
 )
 def test_what_is_no_track_of_the_robot_is_refused_with_the_likely_reason(change, words):
     with assert_refused(*words):
@@ -130,7 +131,7 @@ def test_a_track_that_begins_in_a_stroke_is_refused():
     late = seen.time >= 3.1
     cut = replace(seen, time=seen.time[late] - 3.1, positions=seen.positions[late] - seen.positions[late][:1, :1],
                   commands=seen.commands[3:])  # fmt: skip
-    with assert_refused("must begin at rest"):
+    with assert_refused("begins at rest"):
         identify(RINGING, NAMES, replace(cut, time=np.minimum(cut.time, 1.9)))
 
 

@@ -14,12 +14,9 @@ from seastar_gym import Body, Scene, Seastar
 from seastar_gym.cli.main import main
 from seastar_gym.identify import Measurement, identify, trajectory, with_parameters
 from seastar_gym.identify.measurement import ORIENTATION, pointer
-from seastar_gym.identify.tracks.deeplabcut import read_deeplabcut
-from seastar_gym.identify.tracks.motive import read_motive
-from seastar_gym.identify.tracks.plane import homography, in_metres, mapped, read_homography, scaled, turned
-from seastar_gym.identify.tracks.pose import read_pose
-from seastar_gym.identify.tracks.sleap import read_sleap
-from seastar_gym.identify.tracks.track import Seen, Track, from_rest, seen_nodes
+from seastar_gym.identify.tracks import Track, read_deeplabcut, read_motive, read_sleap, read_table
+from seastar_gym.identify.tracks.plane import homography, mapped, read_homography, turned
+from seastar_gym.identify.tracks.track import Seen, from_rest, seen_nodes
 
 POSE = "time,x,y,theta\n0,0.1,0.2,0.3\n0.033,,,\n0.067,nan,NaN,nan\n0.1,0.11,0.2,0.31\n"
 DEEPLABCUT = """\
@@ -82,7 +79,7 @@ def written(folder, name, text):
 
 def sleap_h5(folder, name, text):
     """HDF5 file of two animals with two points, in three pictures."""
-    h5py = pytest.importorskip("h5py", reason="h5py is not installed (extra data)")
+    h5py = pytest.importorskip("h5py", reason="h5py is not installed (extra tracks)")
     with h5py.File(folder / name, "w") as file:
         file["tracks"] = np.arange(24.0).reshape(2, 2, 2, 3)
         file["node_names"], file["track_names"] = [b"hub", b"tip"], [b"a", b"b"]
@@ -90,11 +87,14 @@ def sleap_h5(folder, name, text):
 
 
 READ = {
-    "pose.csv": (POSE, read_pose), "place.csv": ("time,x,y\n0,1,2\n", read_pose),
+    "pose.csv": (POSE, read_table), "place.csv": ("time,x,y\n0,1,2\n", read_table),
     "deeplabcut.csv": (DEEPLABCUT, lambda file: read_deeplabcut(file, 30.0)),
     "deeplabcut_unlikely.csv": (DEEPLABCUT, lambda file: read_deeplabcut(file, 30.0, likelihood=0.2)),
     "deeplabcut_b.csv": (SEVERAL, lambda file: read_deeplabcut(file, 30.0, "b")),
+    "deeplabcut_semicolons.csv": (
+        "\ufeff" + DEEPLABCUT.replace(",", ";").replace(".", ","), lambda file: read_deeplabcut(file, 30.0)),
     "sleap.csv": (SLEAP, lambda file: read_sleap(file, 10.0)),
+    "sleap_likely.csv": (SLEAP, lambda file: read_sleap(file, 10.0, likelihood=0.5)),
     "sleap.h5": ("", lambda file: read_sleap(file, 10.0, "b")),
     "motive.csv": (MOTIVE, read_motive), "motive_z.csv": (MOTIVE, lambda file: read_motive(file, "z")),
     "motive_with_parents.csv": (MOTIVE_WITH_PARENTS, read_motive),
@@ -118,7 +118,22 @@ def test_hdf5_without_h5py_says_what_to_install(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "h5py", None)
     given = ["--from", "sleap", "--out", str(tmp_path / "out.csv"), "--rate", "30", "--metres-per-pixel", "0.001"]
     assert main(["track2csv", str(tmp_path / "sleap.h5"), *given]) == 2
-    assert_told(capsys, 'need h5py: pip install "seastar-gym[data]"')
+    assert_told(capsys, 'need h5py: pip install "seastar-gym[tracks]"')
+
+
+@pytest.mark.parametrize("form", ["table", "fixed"])
+@pytest.mark.parametrize("text, individual", [(DEEPLABCUT, None), (SEVERAL, "b")])
+def test_deeplabcut_s_own_hdf5_is_read_as_its_csv(tmp_path, text, individual, form):
+    pandas = pytest.importorskip("pandas", reason="pandas is not installed (extra tracks)")
+    pytest.importorskip("tables", reason="PyTables is not installed (extra tracks)")
+    file = written(tmp_path, "dlc.csv", text)
+    table = pandas.read_csv(file, header=[0, 1, 2, *([3] if individual else [])], index_col=0)
+    table.to_hdf(tmp_path / "dlc.h5", key="df_with_missing", format=form, mode="w")
+    expected, track = (read_deeplabcut(each, 30.0, individual) for each in (file, tmp_path / "dlc.h5"))
+    np.testing.assert_array_equal(track.time, expected.time)
+    assert track.points.keys() == expected.points.keys()
+    for name, places in expected.points.items():
+        np.testing.assert_array_equal(track.points[name], places)
 
 
 HARMFUL = {
@@ -150,7 +165,7 @@ HARMFUL = {
 
 
 def h5(name):
-    return getattr(pytest.importorskip("h5py", reason="h5py is not installed (extra data)"), name)
+    return getattr(pytest.importorskip("h5py", reason="h5py is not installed (extra tracks)"), name)
 
 
 def virtual(file, other):
@@ -234,7 +249,8 @@ def test_directions_are_mapped_as_short_lines_are():
     ahead = points + 1e-4 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     x, y = (mapped(plane, ahead) - mapped(plane, points)).T
     np.testing.assert_allclose(turned(plane, points, angles), np.arctan2(y, x), atol=1e-6)
-    track = in_metres(Track(np.zeros(1), {"tag": np.array([[100.0, 200.0]])}, {"tag": np.array([0.5])}), scaled(1e-3))
+    track = Track(np.zeros(1), {"tag": np.array([[100.0, 200.0]])}, {"tag": np.array([0.5])}, in_pixels=True)
+    track = track.in_metres(1e-3)
     np.testing.assert_allclose(track.points["tag"], [[0.1, -0.2]])  # pictures have y down
     np.testing.assert_allclose(track.orientations["tag"], [-0.5])
 
@@ -266,7 +282,7 @@ LOST = np.array([[[np.nan, np.nan]], [[0.0, 0.0]]])
 NOTHING = Track(np.zeros(1), {"a": np.zeros((1, 2)), "b": np.zeros((1, 2))}, {})
 HORIZON = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, -1.0, 0.0]])
 REFUSED = [
-    (read_pose, "time,x,y,theta\n0,0,0,\n0.1,0,0,90\n", "begins at 90 rad, beyond a full turn: it may be in degrees."),
+    (read_table, "time,x,y,theta\n0,0,0,\n0.1,0,0,90\n", "begins at 90 rad, beyond a full turn: it may be in degrees."),
     (lambda file: read_deeplabcut(file, 30.0), SEVERAL, "has the individuals a, b: name one"),
     (lambda file: read_deeplabcut(file, 30.0, "c"), SEVERAL, "has the individuals a, b: name one"),
     (lambda file: read_deeplabcut(file, 30.0, "a"), DEEPLABCUT, "names no individuals: leave --individual out"),
@@ -275,24 +291,41 @@ REFUSED = [
         lambda file: read_sleap(file.rename(file.with_suffix(".h5")), 10.0), "x", "h5 is no HDF5 file that can be read",
         marks=pytest.mark.skipif(find_spec("h5py") is None, reason="needs h5py"),
     ),
-    (read_pose, "time,x\n0,1\n", "the first line must be time,x,y,theta"),
-    (read_pose, "time,x,y\n", "the first line must be time,x,y,theta"),
-    (read_pose, "time,x,y\n0,1\n", "line 2: the line must have 3 fields"),
-    (read_pose, "time,x,y\n,1,2\n", "line 2: there is no time"),
-    (read_pose, "time,x,y\n0,one,2\n", "line 2: 'one' is no number"),
+    (read_table, "time,x\n0,1\n", "file.csv has no column 'y', but time, x."),
+    (read_table, "Zeit;x;y\n0,0;1;2\n", "separated by semicolons or tabs, has no column 'time', but Zeit, x, y."),
+    (read_table, "time,x,x,y\n0,1,2,3\n", "has several columns 'x': have more lines of names read, with --headers."),
+    (read_table, "time,x,y\n", "must have names, and lines below them"),
+    (read_table, "time,x,y\n0,1\n", "line 2: the line must have 3 fields"),
+    (read_table, "time,x,y\n,1,2\n", "line 2: '' is no number"),
+    (read_table, "time,x,y\n0,one,2\n", "line 2: 'one' is no number"),
+    (read_table, "time,x,y\n0,1,2\n0,3,4\n", "Picture 1 is of 0 s and picture 2 of 0 s: give one line for every"),
+    (read_table, "time,x,y\n7,1,2\n7.5,1,2\n6,1,2\n", "2 is of 7.5 s and picture 3 of 6 s: the clock went back."),
+    (lambda file: read_sleap(file, 30.0), SLEAP + SLEAP.splitlines()[1], "Picture 1 is of 0 s and picture 2 of 0 s"),
+    (lambda file: read_table(file, x=["x", "z"]), "time,x,y\n0,1,2\n", "Every x needs a y"),
+    (lambda file: read_table(file, score="s"), "time,x,y\n0,1,2\n", "--score and --likelihood belong together."),
+    (lambda file: read_table(file, only={"id": "4"}), "time,id,x,y\n0,3,1,2\n", "has no line with id=4."),
+    (lambda file: read_table(file, separator=", "), POSE, "separator must be one character, such as ; or tab"),
+    (lambda file: read_table(file, rate=10.0, time_unit="s"), POSE, "With --rate, pictures are counted"),
+    (lambda file: read_table(file).since(9.0), POSE, "All pictures are from before 9 s: the last one is of 0.1 s."),
+    (lambda file: read_table(file).in_metres(1e-3), POSE, "The track is in metres, not in pixels"),
+    (lambda file: read_table(file, unit="px").in_metres(), POSE, "or by --homography, not both."),
+    (lambda file: read_table(file, unit="px").seen(Scene()), POSE, "The track is in pixels"),
+    (lambda _: Track.from_movement({}), "", "dataset must be one of poses, as movement has them, not {}."),
+    (lambda _: Track.from_movement(movement(time_unit="frames")), "", "times are numbers of frames: load it with fps."),
+    (lambda _: Track(np.zeros(0), {}, {}), "", "There are no pictures."),
     (lambda file: read_deeplabcut(file, 1.0), POSE, "has no lines scorer, bodyparts and coords"),
     (lambda file: read_deeplabcut(file, 1.0), DEEPLABCUT[:-1] + ",9\n", "line 6: the line must have 7 fields"),
     (lambda file: read_deeplabcut(file, 1.0), "scorer,s\nbodyparts,a\ncoords,x\n0,1\n", "x, y and likelihood"),
-    (lambda file: read_sleap(file, 1.0), POSE, "the first line must be track,frame_idx,instance.score"),
+    (lambda file: read_sleap(file, 1.0), POSE, "the first line must be track,frame_idx,"),
     (lambda file: read_sleap(file, 1.0), SLEAP[:-1] + "1\n" + "track_0,4\n", "line 5: the line must have 9 fields"),
-    (read_pose, "time,x,y\n0,1,2\n1,1e308,2\n", "In picture 2, the place of tag is [1.e+308 2.e+000]"),
-    (read_pose, "time,x,y,theta\n0,1,2,-1e308\n", "the orientation of tag is -1e+308: nothing is beyond 1e+06"),
-    (read_pose, "time,x,y\n1e308,1,2\n", "the time is 1e+308: nothing is beyond 1e+10"),
+    (read_table, "time,x,y\n0,1,2\n1,1e308,2\n", "In picture 2, the place of x is [1.e+308 2.e+000]"),
+    (read_table, "time,x,y,theta\n0,1,2,-1e308\n", "the orientation of x is -1e+308: nothing is beyond 1e+06"),
+    (read_table, "time,x,y\n1e308,1,2\n", "the time is 1e+308: nothing is beyond 1e+10"),
     (lambda file: read_deeplabcut(file, 30.0), DEEPLABCUT.replace("100.5", "1e7"), "the place of"),
     (lambda file: read_sleap(file, 1e-300), SLEAP, "the time is"),
     (read_motive, MOTIVE.replace("0.8660254", "1e200"), "the quaternion of Seastar is"),
     (read_homography, "0,0,0,0\n1,0,1,0\n0,1,0,1\n1,1,1e200,1\n", "no pixel and no place is beyond 1e+06"),
-    (lambda _: in_metres(Track(np.zeros(1), {"a": np.array([[1.0, 1.0]])}, {}), HORIZON), "", "the place of a is [inf"),
+    (lambda _: Track(np.zeros(1), {"a": np.array([[1.0, 1.0]])}, {}).mapped(HORIZON), "", "the place of a is [inf"),
     (read_motive, POSE, "has no types, names and Position"),
     (read_motive, MOTIVE.replace("Millimeters", "Feet"), "line 1: Format Version and Length Units must be there"),
     (read_motive, MOTIVE.replace("Z,W,", "Z,,"), "export it with the rotation type Quaternion"),
@@ -344,7 +377,7 @@ def test_files_of_a_tracker_end_in_a_fit(tmp_path, capsys):
     for wrong in (["--nodes", "mid=hub", "one=tip2", f"two={n}"], ["--metres-per-pixel", "0.5"]):
         plain = given[:4] + given[6:] if wrong[0] != "--nodes" else given
         assert main(["track2csv", str(file), *plain, *wrong, "--out", str(tmp_path / "track.csv")]) == 2
-        assert "from its shape" in capsys.readouterr().err
+        assert "The robot at rest is" in capsys.readouterr().err
     estimate = identify(scene, list(truth), Measurement.from_csv(tmp_path / "track.csv", tmp_path / "commands.csv"))
     assert ((estimate.lower < list(truth.values())) & (list(truth.values()) < estimate.upper)).all()
     assert estimate.root_mean_square < 1e-3 and (estimate.upper < 1.1 * estimate.lower).all()
@@ -367,19 +400,193 @@ def test_trackers_poses_and_markers_become_nodes_and_the_hub_s_orientation(tmp_p
         golden(f"{name}.csv", "\n".join([csv.splitlines()[0], *rounded]))
 
 
+# The files of one swim, as laboratories have them: each becomes the same trajectory.
+
+TIME = np.arange(6) / 20.0
+TURN = 2.1 + np.linspace(0.0, 0.3, 6)
+HUB = np.array([0.4, 0.3]) + np.linspace(0.0, 0.02, 6)[:, None] * [1.0, 0.5]
+TIP = HUB + 0.1 * np.stack([np.cos(TURN), np.sin(TURN)], axis=1)
+PIXELS = ["--metres-per-pixel", "1e-4"]
+POINTS = ["--nodes", "{0}=hub", "{1}=tip1"]
+
+
+def lines(names, *columns, separator=",", decimal=".", form="{:.9g}"):
+    """Text of a file: lines of names, and columns of numbers or texts."""
+    rows = (separator.join(form.format(x).replace(".", decimal) if isinstance(x, float) else str(x) for x in row)
+            for row in zip(*columns, strict=True))  # fmt: skip
+    return "\n".join([*names, *rows, ""])
+
+
+def ros(_):
+    half = 0.5 * TURN
+    none = ["0"] * 6
+    stamps = [str(1_700_000_000_000_000_000 + round(1e9 * t)) for t in TIME]
+    names = "%time,field.header.frame_id," + ",".join(f"field.pose.position.{axis}" for axis in "xyz")
+    names += "," + ",".join(f"field.pose.orientation.{axis}" for axis in "xyzw")
+    columns = stamps, ["map"] * 6, *HUB.T, none, none, none, np.sin(half), np.cos(half)
+    given = ["--time", "%time", "--time-unit", "ns", "--begin", "first"]
+    given += ["--x", "field.pose.position.x", "--y", "field.pose.position.y"]
+    return lines([names], *columns), [*given, "--theta", *(f"field.pose.orientation.{axis}" for axis in "xyzw")]
+
+
+def kinovea(_):
+    text = lines(["Time (ms);Hub/X;Hub/Y;Tip/X;Tip/Y"], 1e3 * TIME, *HUB.T, *TIP.T, separator=";", decimal=",")
+    return text, ["--time", "Time (ms)", "--x", "Hub/X", "Tip/X", "--y", "Hub/Y", "Tip/Y", *POINTS]
+
+
+def kinovea_by_options(_):
+    text, given = kinovea(_)
+    return text, [*given, "--separator", ";", "--decimal", ",", "--time-unit", "ms", "--unit", "m"]
+
+
+def vicon(_):
+    heads = ["Trajectories", "20", ",,Star:Hub,,,Star:Tip,,", "Frame,Sub Frame,X,Y,Z,X,Y,Z", ",,mm,mm,mm,mm,mm,mm"]
+    zero = ["0"] * 6
+    text = lines(heads, range(1, 7), zero, *1e3 * HUB.T, zero, *1e3 * TIP.T, zero)
+    given = ["--skip", "2", "--headers", "3", "--rate", "20", "--time", "Frame", "--unit", "mm", "--begin", "first"]
+    return text, [*given, "--x", "Star:Hub.X.mm", "Star:Tip.X.mm", "--y", "Star:Hub.Y.mm", "Star:Tip.Y.mm", *POINTS]
+
+
+def tracker(_):
+    text = lines(["mass_A\t\tmass_B\t", "t\tx\ty\tx_2\ty_2"], TIME, *1e2 * HUB.T, *1e2 * TIP.T, separator="\t")
+    text = text.replace("mass_A\t\tmass_B\t", "mass_A\t\t\tmass_B\t")
+    given = ["--headers", "2", "--time", "mass_A.t", "--unit", "cm", "--separator", "tab"]
+    return text, [*given, "--x", "mass_A.x", "mass_B.x_2", "--y", "mass_A.y", "mass_B.y_2", *POINTS]
+
+
+def idtracker(_):
+    text = lines(["seconds,x1,y1,x2,y2"], TIME, *1e4 * HUB.T * [[1], [-1]], *1e4 * TIP.T * [[1], [-1]])
+    given = ["--time", "seconds", "--unit", "px", *PIXELS]
+    return text, [*given, "--x", "x1", "x2", "--y", "y1", "y2", *POINTS]
+
+
+def trex(_):
+    lost = np.array([*1e2 * HUB.T[0], math.inf])
+    columns = [*range(7)], np.append(TIME, 0.3), lost, np.append(-1e2 * HUB.T[1], math.inf), np.append(-TURN, math.inf)
+    text = lines(["frame,time,X#wcentroid (cm),Y#wcentroid (cm),ANGLE"], *columns)
+    return text, ["--x", "X#wcentroid (cm)", "--y", "Y#wcentroid (cm)", "--theta", "ANGLE", "--y-down"]
+
+
+def tags(_):
+    both = [3, 7] * 6
+    time, turn, x, y = (np.repeat(each, 2) for each in (TIME, np.degrees(TURN), *1e3 * HUB.T))
+    text = "\ufeff" + lines(['"Tag id","Unix time","x (mm)","y (mm)","yaw (deg)"'], both, time + 1.7e9, x, y, turn,
+                            form="{:.12g}")  # fmt: skip
+    given = ["--only", "Tag id=7", "--time", "Unix time", "--begin", "1.7e9"]
+    return text, [*given, "--x", "x (mm)", "--y", "y (mm)", "--theta", "yaw (deg)"]
+
+
+def logger(_):
+    text = lines(["Logger started on:,2024-2-10_000000", "Stamp (since midnight),x,y,theta"], 56911836 + 1e3 * TIME,
+                 *HUB.T, np.degrees(TURN), form="{:.12g}")  # fmt: skip
+    given = ["--skip", "1", "--time", "Stamp (since midnight)", "--time-unit", "ms", "--degrees"]
+    return text, [*given, "--begin", "56911.836"]
+
+
+def frames(_):
+    text = lines(["x,y,angle,score"], *HUB.T, TURN, [1.0] * 5 + [0.1])
+    return text, ["--rate", "20", "--theta", "angle", "--score", "score", "--likelihood", "0.5"]
+
+
+def plant(_):
+    text = lines(["captured_at,seen_at,x,y,heading"], TIME + 5.0, TIME + 5.1, *HUB.T, TURN)
+    return text, ["--time", "captured_at", "--theta", "heading", "--begin", "5"]
+
+
+@pytest.mark.parametrize(
+    "made", [ros, kinovea, kinovea_by_options, vicon, tracker, idtracker, trex, tags, logger, frames, plant]
+)
+def test_one_swim_is_the_same_whatever_has_tracked_it(tmp_path, made):
+    text, given = made(None)
+    if "--nodes" in given:
+        names = given[given.index("--x") + 1 :][:2]
+        given = [each.format(*names) for each in given]
+    code, csv = converted(tmp_path, text, "--from", "table", *given)
+    assert code == 0
+    has_tip = "--nodes" in given
+    c, s = np.cos(TURN[0]), np.sin(TURN[0])
+    turned_back = np.array([[c, -s], [s, c]])
+    places = [(HUB - HUB[0]) @ turned_back, *([(TIP - HUB[0]) @ turned_back] if has_tip else [TURN[:, None] - TURN[0]])]
+    expected = np.column_stack([TIME, *places])
+    if made is frames:
+        expected[-1, 1:3] = np.nan
+    names, *rows = csv.splitlines()
+    assert names == ("time,x0,y0,x11,y11" if has_tip else "time,x0,y0,theta")
+    found = np.array([[float(x or "nan") for x in row.split(",")] for row in rows])
+    if made is trex:
+        assert np.isnan(found[-1, 1:]).all()
+    np.testing.assert_allclose(found[: len(expected)], expected, atol=2e-6)
+
+
+def test_pictures_from_before_the_begin_are_left_out_and_counted(tmp_path, capsys):
+    code, csv = converted(tmp_path, POSE, "--from", "pose", "--begin", "0.1")
+    assert code == 0 and csv.splitlines()[1].startswith("0.0,0,0,") and len(csv.splitlines()) == 2
+    assert "1 pictures in 0 s" in (said := capsys.readouterr().out) and "3 pictures from before were left out." in said
+
+
+class Labelled:
+    """What is used of an array of xarray: its dimensions, their coordinates and their order."""
+
+    def __init__(self, values, coords):
+        self.values, self.coords, self.dims = np.asarray(values), coords, tuple(coords)
+
+    def __array__(self, dtype=None, copy=None):
+        return np.asarray(self.values, dtype)
+
+    def transpose(self, *dims):
+        order = [self.dims.index(name) for name in dims]
+        return Labelled(self.values.transpose(order), {name: self.coords[name] for name in dims})
+
+
+class Dataset(dict):
+    attrs = {}
+
+
+def movement(ends="s", **attrs):
+    """A dataset of poses with the dimensions that `movement` has, before version 0.17 in the plural."""
+    coords = {"time": TIME, "space": ["x", "y"], f"keypoint{ends}": ["mid", "end"], f"individual{ends}": ["a", "b"]}
+    places = np.stack([np.stack([HUB, TIP], axis=2), np.zeros((6, 2, 2))], axis=3)
+    sure = np.ones((6, 2, 2))
+    sure[3, 1, 0] = 0.1
+    of_points = {name: coords[name] for name in coords if name != "space"}
+    places *= 1e4 * np.array([1.0, -1.0])[:, None, None]
+    dataset = Dataset(position=Labelled(places, coords), confidence=Labelled(sure, of_points))
+    dataset.attrs = {"time_unit": "seconds"} | attrs
+    return dataset
+
+
+@pytest.mark.parametrize("ends", ["s", ""])
+def test_a_dataset_of_movement_becomes_a_trajectory(tmp_path, ends):
+    track = Track.from_movement(movement(ends), individual="a").in_metres(1e-4)
+    track.to_csv(tmp_path / "tracking.csv", Scene(), nodes={"mid": "hub", "end": "tip1"})
+    (tmp_path / "commands.csv").write_text("0,0,0,0,0\n")
+    measured = Measurement.from_csv(tmp_path / "tracking.csv", tmp_path / "commands.csv")
+    assert measured.nodes == (0, 11) and np.isnan(measured.positions).nonzero()[0].tolist() == [3, 3]
+    np.testing.assert_allclose(measured.positions[0], [[0.0, 0.0], [0.1, 0.0]], atol=1e-6)
+
+
 @pytest.mark.parametrize(
     "text, given, words",
     [
+        (POSE, ["--from", "pose", "--up", "z"], "Files of pose have no use for --up."),
+        (POSE, ["--from", "table", "--individual", "a"], "Files of table have no use for --individual."),
+        (MOTIVE, ["--from", "motive", "--likelihood", "0.5"], "Files of motive have no use for --likelihood."),
+        (MOTIVE, ["--from", "motive", "--rate", "30"], "Files of motive have no use for --rate."),
+        (DEEPLABCUT, ["--from", "deeplabcut", "--y-down"], "Files of deeplabcut have no use for --y-down."),
+        (POSE, ["--from", "pose", "--only", "tag"], "--only must be such as id=3, not tag."),
+        (POSE, ["--from", "pose", "--begin", "now"], "--begin must be a time of the file or the word first, not now."),
         (DEEPLABCUT, ["--from", "deeplabcut"], "Files of deeplabcut have no times: give --rate"),
-        (DEEPLABCUT, ["--from", "deeplabcut", "--rate", "30"], "in pixels: give --metres-per-pixel or --homography"),
+        (DEEPLABCUT, ["--from", "deeplabcut", "--rate", "30", "--nodes", "hub=hub"], "The track is in pixels: give"),
         (SLEAP, ["--from", "sleap", "--rate", "0"], "rate must be a positive, finite number"),
         (SLEAP, ["--from", "sleap", "--rate", "9", "--metres-per-pixel", "1e-3"], "Say which points are which nodes"),
-        (POSE, ["--from", "pose", "--metres-per-pixel", "1", "--homography", "x"], "or --homography, not both"),
+        (POSE, ["--from", "pose", "--unit", "px", "--metres-per-pixel", "1", "--homography", "x"], "not both"),
+        (POSE, ["--from", "pose", "--metres-per-pixel", "1"], "The track is in metres, not in pixels: --unit px"),
         (POSE, ["--from", "pose", "--nodes", "tag"], "--nodes must be such as nose=hub"),
-        (POSE, ["--from", "pose", "--nodes", "tag=tip6"], "tag=tip6: the robot has 5 limbs and 56 nodes"),
-        (POSE, ["--from", "pose", "--rest", "-1"], "--rest must be"),
+        (POSE, ["--from", "pose", "--nodes", "x=tip"], "Nodes must be such as nose=hub, left=tip1 or left=11, not x"),
+        (POSE, ["--from", "pose", "--nodes", "x=tip6"], "x=tip6: the robot has 5 limbs and 56 nodes"),
+        (POSE, ["--from", "pose", "--rest", "-1"], "rest must be"),
         (DEEPLABCUT, ["--from", "deeplabcut", "--rate", "9", "--likelihood", "2"], "likelihood must be from 0 to 1"),
-        (POSE.replace("0.1,0.11", "0.05,0.11"), ["--from", "pose"], "Times must be finite, not negative, and in order"),
+        (POSE.replace("0.1,0.11", "0.05,0.11"), ["--from", "pose"], "the clock went back"),
         (POSE.replace("0.11", "2000"), ["--from", "pose"], "within 1000 m of the origin"),
     ],
 )

@@ -9,6 +9,7 @@ import threading
 import time
 import tty
 from collections import deque
+from dataclasses import replace
 from io import FileIO
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,7 +20,7 @@ import pytest
 from evaluation import made_up
 from faults import LIES
 from refusals import assert_refused, assert_told
-from seastar_gym import DomainRandomization, Scene, Seastar, Sight, Simulator, SmaPulse, SmaWires, Uniform, files
+from seastar_gym import Body, DomainRandomization, Scene, Seastar, Sight, Simulator, SmaPulse, SmaWires, Uniform, files
 from seastar_gym.cli import drive as drive_command
 from seastar_gym.cli.drive import report
 from seastar_gym.cli.main import main
@@ -28,8 +29,8 @@ from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.scripted import OpenLoopPolicy
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.rollout import rollout
-from seastar_gym.identify.measurement import Measurement
-from seastar_gym.identify.trajectories import trajectory
+from seastar_gym.identify import Measurement, identify, trajectory, with_parameters
+from seastar_gym.identify.measurement import ORIENTATION
 from seastar_gym.plant import lines
 from seastar_gym.plant.guard import FIRST, Guard, Limits
 from seastar_gym.plant.lines import LineError, LinePlant, Server, open_serial, opened, sealed
@@ -42,8 +43,8 @@ SCENE = Scene(actuator=SmaWires(heating_time=0.08, period=0.5)).at("fast")
 OPTIONS = {"scene": SCENE, "decision_period": 0.5, "actions": "pairs"}
 
 
-def simulated(sight=None, heading=0.0, **arguments):
-    simulator = Simulator(SCENE)
+def simulated(sight=None, heading=0.0, scene=SCENE, **arguments):
+    simulator = Simulator(scene)
     simulator.reset(heading=heading)
     return SimulatedPlant(simulator, sight, **arguments)
 
@@ -437,20 +438,47 @@ def test_late_decisions_make_the_clock_wait_and_wires_that_have_to_rest_are_mask
     assert not any(info["plant_message"] for info in heated)
 
 
-def test_logs_are_what_identify_reads(tmp_path):
-    """The robot begins turned; its logs are in the frame in which it lay. Markers between nodes are not tracked."""
+WITH_BODY = replace(SCENE, robot=Seastar(n_limbs=3, nodes_per_limb=7, body=Body(radius=0.02)))
+
+
+@pytest.mark.parametrize("late", [0.0, 0.03])
+@pytest.mark.parametrize(
+    ("scene", "nodes"), [(SCENE, (0, 6, 12, 18, 24, 30)), (WITH_BODY, (0, 6, 12, 18, ORIENTATION))]
+)
+def test_logs_tell_when_commands_were_given_and_what_the_robot_did(scene, nodes, late, tmp_path):
+    """The robot begins turned; its logs are in the frame in which it lay."""
     sight = Sight(rate=50.0, delay=0.1, sees=1)
-    env = PlantSwim(simulated(sight, heading=1.0), logs=tmp_path, sight=sight, **OPTIONS)
+    plant = simulated(sight, heading=1.0, scene=scene)
+    env = PlantSwim(plant, logs=tmp_path, sight=sight, **OPTIONS | {"scene": scene})
     env.reset()
-    for action in (3, 8, 12, 0, 5):
+    for action in (3, 1, 4, 0, 5):
+        plant.wait(late)
         env.step(action)
     env.close()
     measured = Measurement.from_csv(tmp_path / "tracking.csv", tmp_path / "commands.csv")
-    assert measured.nodes == (0, 6, 12, 18, 24, 30) and measured.commands.shape == (5, 5)
-    expected = trajectory(measured.time, measured.nodes, measured.commands, SCENE)
+    assert measured.nodes == nodes and measured.commands.shape == (5, scene.robot.n_limbs)
+    assert measured.command_times == pytest.approx((0.5 + late) * np.arange(5), abs=1e-5)
+    expected = trajectory(measured.time, nodes, measured.commands, scene, measured.command_times)
     assert np.abs(measured.positions - expected).max() < 1e-3 < np.abs(expected - expected[0]).max() / 10
     poses = np.loadtxt(tmp_path / "poses.csv", delimiter=",", skiprows=1)
     assert poses[0, 4] == pytest.approx(1.0, abs=1e-6) and (poses[:, 0] < poses[:, 1]).all() and len(poses) > 100
+
+
+def test_logs_of_late_decisions_tell_the_drag(tmp_path):
+    truth = with_parameters(SCENE, ["fluid.drag_coefficient"], [1.3])
+    plant = simulated(Sight(delay=0.05, noise=5e-4, turn_noise=0.01), scene=truth)
+    env = PlantSwim(plant, logs=tmp_path, **OPTIONS)
+    env.reset(seed=0)
+    for action in np.random.default_rng(0).integers(env.action_space.n, size=12).tolist():
+        plant.wait(0.02)
+        env.step(action)
+    env.close()
+    measured = Measurement.from_csv(tmp_path / "tracking.csv", tmp_path / "commands.csv")
+    found = identify(SCENE, ["fluid.drag_coefficient"], measured)
+    assert found.values[0] == pytest.approx(1.3, rel=0.05) and not found.is_doubted
+
+
+def test_markers_between_nodes_are_not_tracked():
     assert nodes_of(Seastar(nodes_per_limb=10), 9) == {k: k + 1 for k in range(45)}
     assert list(nodes_of(Seastar(nodes_per_limb=7), 3).values())[:4] == [2, 4, 6, 8]
     assert nodes_of(Seastar(nodes_per_limb=5), 3) == {2: 4, 5: 8, 8: 12, 11: 16, 14: 20}
@@ -619,7 +647,7 @@ def test_a_drive_over_a_serial_line(tank, tmp_path, capsys):
     commands = tmp_path / "second" / "out" / "commands.csv"
 
     def kill():
-        while not commands.exists() or len(commands.read_text().splitlines()) < 3:
+        while not commands.exists() or len(commands.read_text().splitlines()) < 4:
             time.sleep(0.05)
         process.kill()
 

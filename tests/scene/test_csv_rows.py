@@ -29,6 +29,9 @@ def read(tmp_path, data):
         GOOD.replace(b"\n", b"\n\n \n"),
         GOOD.replace(b",", b" , ").rstrip(),
         b'"0","0"\n+.1,6e-1\n1.,-0\n',
+        b"\xef\xbb\xbftime [s];angle [rad]\n0,0;0\n0,1;0,6\n1,0;0,0\n",
+        b"time [s]\tangle [rad]\n0,0\t0\n0.1\t0.6\n1\t0\n",
+        b"0,0;0,0\n0,1;0,6\n1;0\n",
     ],
 )
 def test_a_file_of_numbers_is_read_to_the_last_line(tmp_path, data):
@@ -47,7 +50,7 @@ def test_a_file_of_numbers_is_read_to_the_last_line(tmp_path, data):
         (GOOD + b"2.0,1e999\n", "line 4: '1e999' is no finite number"),
         (GOOD + b"\n\n2.0,1_0\n", "line 6: '1_0' is no number"),
         ("0,0\n1,٣\n".encode(), "line 2: '٣' is no number"),
-        (b"0;0\n1;0\n", "line 1: fields must be separated by commas, not by semicolons"),
+        (b"0;0\n1.2,5;0\n", "line 2: '1.2,5' is no number"),
         (b'"0,0","0,1"\n', "line 1: '0,0' is no number, decimals follow a point"),
         (b"0,0\n,\n", "line 2: '' is no number"),
         (b"Gr\xf6\xdfe,Winkel\n" + GOOD, "line 1: this is no UTF-8 text"),

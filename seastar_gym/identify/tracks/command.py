@@ -1,123 +1,152 @@
 """Makes a trajectory that `seastar identify` reads from the file of a tracker.
 
-Formats are pose (CSV with the columns time,x,y,theta, as of AprilTags), deeplabcut (CSV), sleap (analysis CSV or HDF5)
-and motive (CSV of OptiTrack). Pixels become metres by --metres-per-pixel, for a camera that looks straight down, or
---homography, a CSV file with the pixel and the place u,v,x,y of four points or more.
+Formats are table, any CSV file, whose columns are named, deeplabcut (CSV or HDF5), sleap (analysis CSV or HDF5) and
+motive (CSV of OptiTrack); pose is a table of AprilTags with the columns time,x,y and theta.
+
+A table has a line for every picture. A point has the name of its column of x. Units are those in names, such as
+"x (mm)", unless options say so. Files of Kinovea, for example, take --x Hub/X Tip/X --y Hub/Y Tip/Y --time "Time (ms)",
+those of Vicon --skip 2 --headers 3 --rate 100 --x Star:Hub.X.mm --y Star:Hub.Y.mm --unit mm, and those of rostopic
+--time %time --time-unit ns --begin first, and as --theta the four columns of a quaternion.
+
+Pixels become metres by --metres-per-pixel, for a camera that looks straight down, or --homography, a CSV file with the
+pixel and the place u,v,x,y of four points or more.
 
 The trajectory is moved and turned to where the robot begins: its hub at the origin, limb 1 along +x. Pictures in which
 something was not seen have empty fields.
 """
 
 import argparse
-import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from seastar_gym.command import DEFAULT, answered, command_parser
-from seastar_gym.identify.measurement import Measurement, write_trajectory
-from seastar_gym.identify.tracks.deeplabcut import LIKELIHOOD, read_deeplabcut
+from seastar_gym.identify.measurement import write_trajectory
 from seastar_gym.identify.tracks.motive import read_motive
-from seastar_gym.identify.tracks.plane import in_metres, read_homography, scaled
-from seastar_gym.identify.tracks.pose import read_pose
-from seastar_gym.identify.tracks.sleap import read_sleap
-from seastar_gym.identify.tracks.track import Track, from_rest, misfit, seen_nodes
-from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_number
+from seastar_gym.identify.tracks.table import LENGTHS, read_table
+from seastar_gym.identify.tracks.track import Track
+from seastar_gym.identify.tracks.videos import read_deeplabcut, read_sleap
+from seastar_gym.scene.csv_rows import UNITS
 from seastar_gym.scene.scene_file import load_scene
 
 Options = argparse.Namespace
-READERS: dict[str, Callable[[Options], Track]] = {
-    "pose": lambda options: read_pose(options.file),
-    "deeplabcut": lambda options: read_deeplabcut(options.file, _rate(options), options.individual, options.likelihood),
-    "sleap": lambda options: read_sleap(options.file, _rate(options), options.individual),
-    "motive": lambda options: read_motive(options.file, options.up),
+
+
+class Format(NamedTuple):
+    """Reader of a format, and the options that it takes."""
+
+    read: Callable[..., Track]
+    options: tuple[str, ...]
+
+
+OF_TEXT, OF_VIDEOS = ("separator", "decimal"), ("rate", "individual", "likelihood")
+TABLE = Format(read_table, (
+    "x", "y", "theta", "time", "time_unit", "unit", "degrees", "y_down", "rate", "score", "likelihood", "only", "skip",
+    "headers", *OF_TEXT,
+))  # fmt: skip
+FORMATS = {
+    "table": TABLE,
+    "pose": TABLE,
+    "deeplabcut": Format(read_deeplabcut, (*OF_VIDEOS, *OF_TEXT)),
+    "sleap": Format(read_sleap, (*OF_VIDEOS, *OF_TEXT)),
+    "motive": Format(read_motive, ("up",)),
 }
-"""Readers by the names of their formats."""
-IN_PIXELS = ("deeplabcut", "sleap")
-"""Formats whose files are in pixels."""
-ASSIGNED = re.compile(r"(.+)=(hub|tip([1-9][0-9]{0,2})|[0-9]{1,5})")
-"""A point and its node: the hub, the tip of a limb, or a number."""
+"""Formats by their names."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """Parser of the options."""
+    """Parser of the options. Those of some formats only are None where they are not given."""
     found = command_parser("seastar track2csv", __doc__)
     found.add_argument("file", type=Path, help="file of the tracker")
-    found.add_argument("--from", dest="format", choices=READERS, required=True, help="format of the file")
+    found.add_argument("--from", dest="format", choices=FORMATS, required=True, help="format of the file")
     found.add_argument("--out", type=Path, required=True, help="CSV file for the trajectory")
     nodes = "points that are kept and their nodes: hub, tip1, tip2, .. or a number (default: the only one is the hub)"
     found.add_argument("--nodes", nargs="+", metavar="POINT=NODE", help=nodes)
     found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
-    found.add_argument("--rate", type=float, help="pictures per second, of deeplabcut and sleap [Hz]")
     found.add_argument("--metres-per-pixel", type=float, help="size of a pixel; y of pictures points down")
     found.add_argument("--homography", type=Path, help="CSV file with u,v,x,y of four points or more")
-    found.add_argument("--individual", help="one of several animals of deeplabcut or tracks of sleap")
-    sure = f"points of deeplabcut below this likelihood were not seen {DEFAULT}"
-    found.add_argument("--likelihood", type=float, default=LIKELIHOOD, help=sure)
-    found.add_argument("--up", choices=("y", "z"), default="y", help=f"axis of motive that points up {DEFAULT}")
+    begin = "time of the file that becomes 0 [s], or first for that of the first picture; pictures before are left out"
+    found.add_argument("--begin", metavar="TIME", help=begin)
     rest = f"time for which the robot is at rest at the beginning [s]; 0 is the first picture {DEFAULT}"
     found.add_argument("--rest", type=float, default=0.0, help=rest)
     found.add_argument("--aligned", action="store_true", help="the robot begins at the origin, limb 1 along +x")
+
+    some = found.add_argument_group("options of some formats")
+    some.add_argument("--rate", type=float, help="pictures per second, of files without times [Hz]")
+    some.add_argument("--individual", help="one of several animals of deeplabcut or tracks of sleap")
+    sure = "points of a lower likelihood or score were not seen (default: 0.6 for deeplabcut, 0.2 for sleap)"
+    some.add_argument("--likelihood", type=float, help=sure)
+    some.add_argument("--up", choices=("y", "z"), help="axis of motive that points up (default: y)")
+    some.add_argument("--separator", help="character between fields, or tab (default: as in the first line)")
+    some.add_argument("--decimal", choices=(".", ","), help="character before decimals (default: as in the file)")
+
+    table = found.add_argument_group("options of tables, columns by their names")
+    table.add_argument("--time", help="time, or with --rate the number of the picture (default: time)")
+    table.add_argument("--time-unit", choices=UNITS["time"], help="(default: that of the name, or s)")
+    table.add_argument("--x", nargs="+", metavar="COLUMN", help="x of one point or more (default: x)")
+    table.add_argument("--y", nargs="+", metavar="COLUMN", help="y of as many (default: y)")
+    table.add_argument("--unit", choices=LENGTHS, help="unit of x and y (default: that of the name, or m)")
+    table.add_argument("--y-down", action="store_true", default=None, help="y points down, though not in pixels")
+    theta = "orientation of the first point, or x y z w of its quaternion (default: theta, if there is one)"
+    table.add_argument("--theta", nargs="+", metavar="COLUMN", help=theta)
+    table.add_argument("--degrees", action="store_true", default=None, help="theta is in degrees")
+    table.add_argument("--score", nargs="+", metavar="COLUMN", help="scores of the points, for --likelihood")
+    table.add_argument("--only", nargs="+", metavar="COLUMN=TEXT", help="lines that count (default: all)")
+    table.add_argument("--skip", type=int, help="lines above the names (default: 0)")
+    table.add_argument("--headers", type=int, help="lines of names, which are joined by points (default: 1)")
     return found
 
 
-def _rate(options: Options) -> float:
-    """Pictures per second [Hz]."""
-    if options.rate is None:
+def pairs(option: str, texts: Sequence[str] | None) -> dict[str, str] | None:
+    """What stands after the last = of texts, by what stands before."""
+    for text in texts or ():
+        if "=" not in text:
+            raise ValueError(f"{option} must be such as {'nose=hub' if option == '--nodes' else 'id=3'}, not {text}.")
+    return None if texts is None else dict(text.rsplit("=", 1) for text in texts)
+
+
+def read(options: Options) -> Track:
+    """Track of the file, as it is there."""
+    chosen, given = FORMATS[options.format], vars(options) | {"only": pairs("--only", options.only)}
+    every = {name for each in FORMATS.values() for name in each.options}
+    unused = [name for name in sorted(every - {*chosen.options}) if given[name] is not None]
+    if unused:
+        raise ValueError(f"Files of {options.format} have no use for --{unused[0].replace('_', '-')}.")
+    if options.rate is None and options.format in ("deeplabcut", "sleap"):
         raise ValueError(f"Files of {options.format} have no times: give --rate, pictures per second.")
-    return float(options.rate)
+    return chosen.read(options.file, **{name: given[name] for name in chosen.options if given[name] is not None})
 
 
-def metres(track: Track, options: Options) -> Track:
-    """Track in metres, by the options."""
-    if options.metres_per_pixel is not None and options.homography is not None:
-        raise ValueError("--metres-per-pixel or --homography, not both.")
-    if options.metres_per_pixel is not None:
-        return in_metres(track, scaled(options.metres_per_pixel))
-    if options.homography is not None:
-        return in_metres(track, read_homography(options.homography))
-    if options.format in IN_PIXELS:
-        raise ValueError(f"Files of {options.format} are in pixels: give --metres-per-pixel or --homography.")
-    return track
-
-
-def assigned(texts: Sequence[str] | None, track: Track, scene: Scene) -> dict[str, int]:
-    """Nodes of points, of texts such as "nose=hub"."""
-    if texts is None:
-        if len(track.points) != 1:
-            raise ValueError(f"Say which points are which nodes, with --nodes: there are {', '.join(track.points)}.")
-        return dict.fromkeys(track.points, 0)
-    robot, found = scene.robot, {}
-    for text in texts:
-        match = ASSIGNED.fullmatch(text)
-        if match is None:
-            raise ValueError(f"--nodes must be such as nose=hub, left=tip1 or left=11, not {text}.")
-        point, word, tip = match.groups()
-        node = int(tip) * (robot.nodes_per_limb - 1) if tip else 0 if word == "hub" else int(word)
-        if node >= robot.n_nodes:
-            raise ValueError(f"{text}: the robot has {robot.n_limbs} limbs and {robot.n_nodes} nodes.")
-        found[point] = node
-    return found
+def begun(track: Track, options: Options) -> Track:
+    """Track whose time 0 is what --begin says."""
+    if options.begin is None:
+        return track
+    if options.begin == "first":
+        return track.since(float(track.time[0]))
+    try:
+        begin = float(options.begin)
+    except ValueError:
+        raise ValueError(f"--begin must be a time of the file or the word first, not {options.begin}.") from None
+    return track.since(begin)
 
 
 def convert(options: Options) -> str:
     """Write the trajectory; returns a sentence on it."""
     scene = load_scene(options.scene)
-    require_number("--rest", options.rest, "s", zero_allowed=True)
-    track = metres(READERS[options.format](options), options)
-    told = ""
-    seen = seen_nodes(track, assigned(options.nodes, track, scene))
-    if not options.aligned:
-        seen = from_rest(seen, track.time, options.rest, scene)
-        off = misfit(seen, track.time, options.rest, scene)
-        told = f" At rest they are within {1e3 * off:.2g} mm of the robot's shape."
-    Measurement(track.time, *seen, np.zeros((1, scene.robot.n_limbs)))  # refuses what identify would
-    write_trajectory(options.out, track.time, *seen)
+    track = read(options)
+    if options.metres_per_pixel is not None or options.homography is not None:
+        track = track.in_metres(options.metres_per_pixel, options.homography)
+    n_read, track = len(track.time), begun(track, options)
+    seen = track.seen(scene, pairs("--nodes", options.nodes), options.rest, options.aligned)
+    write_trajectory(options.out, track.time, seen.positions, seen.nodes)
     lost = np.isnan(seen.positions).any(axis=2).mean()
     n, lasted = len(track.time), np.ptp(track.time)
-    return f"{options.out}: {n} pictures in {lasted:.4g} s, {100.0 * lost:.1f} % of their points not seen.{told}"
+    told = f"{options.out}: {n} pictures in {lasted:.4g} s, {100.0 * lost:.1f} % of their points not seen."
+    if n < n_read:
+        told += f" {n_read - n} pictures from before were left out."
+    return told if options.aligned else f"{told} At rest they are within {1e3 * seen.off:.2g} mm of the robot's shape."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -35,7 +35,7 @@ class _RefusedError(Exception):
 
 def require_plain(file: str | Path) -> None:
     """FileNotFoundError or ValueError, with one sentence, for what is no HDF5 file or could do harm when it is read."""
-    require_extra("HDF5 files", "data", "h5py")
+    require_extra("HDF5 files", "tracks", "h5py")
     import h5py
 
     if not Path(file).is_file():

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.identify.tracks.track import NOT_SEEN, Track, require_possible
 from seastar_gym.scene.checks import require_choice, require_file
-from seastar_gym.scene.csv_rows import Row, read_rows
+from seastar_gym.scene.csv_rows import Form, Row, read_rows
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ def read_motive(file: str | Path, up: Up = "y") -> Track:
     """Track in metres of a file of Motive. up: Axis that points up."""
     require_file("file", file)
     require_choice("up", up, ("y", "z"))
-    rows = read_rows(file)
+    rows = read_rows(file, form=Form(","))
     at = next((k for k, row in enumerate(rows) if _is_axes(row)), 0)
     if at < 4 or len(rows) == at + 1:
         raise ValueError(f"{file} has no types, names and Position above Frame,Time (Seconds),X,.. with numbers below.")
@@ -48,7 +48,7 @@ def read_motive(file: str | Path, up: Up = "y") -> Track:
                 raise ValueError(f"{file}: export it with the rotation type Quaternion.")
             turns = _numbers(rows[at + 1 :], [columns["Rotation", axis] for axis in "XYZW"])
             require_possible(f"the quaternion of {name}", turns)
-            orientations[name] = _heading(turns, up)
+            orientations[name] = heading(turns, up)
     return Track(times, points, orientations)
 
 
@@ -88,7 +88,7 @@ def _from_above(places: Floats, up: Up) -> Floats:
     return np.stack([x, -z if up == "y" else y], axis=-1)
 
 
-def _heading(quaternions: Floats, up: Up) -> Floats:
+def heading(quaternions: Floats, up: Up) -> Floats:
     """Direction of the rotated x-axis in the plane [rad], of unit quaternions x, y, z, w, shape (n, 4)."""
     x, y, z, w = quaternions.T
     rotated = np.stack([1.0 - 2.0 * (y**2 + z**2), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)], axis=-1)

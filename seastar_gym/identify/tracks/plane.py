@@ -7,18 +7,18 @@ With pixels (u, v), v down, and metres (x, y), y up, the homography H is a matri
 A camera that looks straight down is a scale with y flipped. Lenses that distort are to be corrected before.
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.identify.tracks.track import FARTHEST, Track
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.csv_rows import read_numbers
 
 Floats = NDArray[np.float64]
 
+FARTHEST = 1e6
+"""Largest coordinate [m] or [pixel], and largest angle [rad], that can be."""
 SINGULAR = 1e-9
 """Smallest eighth singular value of normalised equations for a homography, over the largest."""
 
@@ -87,10 +87,3 @@ def turned(matrix: Floats, points: Floats, angles: Floats) -> Floats:
     at = np.hstack([points, np.ones((len(points), 1))]) @ matrix.T
     direction = along[:, :2] * at[:, 2:] - at[:, :2] * along[:, 2:]  # times w^2
     return np.asarray(np.arctan2(direction[:, 1], direction[:, 0]))
-
-
-def in_metres(track: Track, matrix: Floats) -> Track:
-    """Track in metres, of one in pixels."""
-    points = {name: mapped(matrix, places) for name, places in track.points.items()}
-    turns = {name: turned(matrix, track.points[name], angles) for name, angles in track.orientations.items()}
-    return replace(track, points=points, orientations=turns)

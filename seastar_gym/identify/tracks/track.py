@@ -1,47 +1,150 @@
 """`Track`: points and orientations over time, as a tracker saw them, and as they are from a robot at rest."""
 
+import math
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.identify.measurement import LATEST, ORIENTATION, pointer
+from seastar_gym.identify.measurement import LATEST, ORIENTATION, Measurement, pointer, write_trajectory
+from seastar_gym.identify.search import require_rest
+from seastar_gym.identify.tracks.plane import FARTHEST, mapped, read_homography, scaled, turned
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_kind
+from seastar_gym.scene.checks import require_finite, require_flag, require_kind, require_number, require_within, shown
 
 Floats = NDArray[np.float64]
 
-NOT_SEEN = ("", "nan", "none")
+NOT_SEEN = ("", "nan", "none", "na", "n/a", "null", "inf", "-inf")
 """Fields of a file of what was not seen."""
-FARTHEST = 1e6
-"""Largest coordinate [m], [mm] or [pixel], and largest angle [rad], that can be."""
-MISFIT = 0.2
-"""Largest distance of a robot at rest from its shape, over the length of a limb."""
+NODE = re.compile(r"hub|tip([1-9][0-9]{0,2})|[0-9]{1,5}")
+"""Name of a node: the hub, the tip of a limb, or a number."""
 
 
 @dataclass(frozen=True)
 class Track:
     """What a tracker saw in n pictures. NaN stands for what it did not see.
 
-    time: [s], shape (n,).
-    points: Positions by name, each of shape (n, 2), in the file's unit of length or in pixels.
-    orientations: Orientations [rad] by name, anti-clockwise, each of shape (n,), of the points that have one.
+    time: [s], shape (n,), increasing.
+    points: Positions by name, each of shape (n, 2) [m], or in pixels, whose y points down.
+    orientations: Orientations [rad] by name, each of shape (n,), of the points that have one: from x to y.
+    in_pixels: Whether positions are in pixels.
     """
 
     time: Floats
     points: dict[str, Floats]
     orientations: dict[str, Floats]
+    in_pixels: bool = False
 
     def __post_init__(self) -> None:
+        if not len(self.time):
+            raise ValueError("There are no pictures.")
         require_possible("the time", self.time, LATEST)
+        if (wrong := np.diff(self.time) <= 0.0).any():
+            k = int(wrong.argmax())
+            before, after = self.time[k : k + 2]
+            what = "give one line for every picture, of one robot" if before == after else "the clock went back"
+            raise ValueError(f"Picture {k + 1} is of {before:.10g} s and picture {k + 2} of {after:.10g} s: {what}.")
         for name, places in self.points.items():
             require_possible(f"the place of {name}", places)
         for name, angles in self.orientations.items():
             require_possible(f"the orientation of {name}", angles)
             require_radians(name, angles)
+
+    @classmethod
+    def from_movement(
+        cls, dataset: Any, individual: str | None = None, likelihood: float = 0.6, in_pixels: bool = True
+    ) -> "Track":
+        """Track of a dataset of poses of the package `movement`, which reads the files of many trackers.
+
+        dataset: With `position` of the dimensions time, space, keypoint and individual, `confidence` if that is known,
+            and times in seconds.
+        individual: Name of one of several. likelihood: Points of a lower confidence were not seen.
+        """
+        require_within("likelihood", likelihood, 0.0, 1.0)
+        require_flag("in_pixels", in_pixels)
+        try:
+            places = dataset["position"]
+            names = {str(name).removesuffix("s"): name for name in places.dims}  # plural before version 0.17
+            order = [names[name] for name in ("individual", "keypoint", "time", "space")]
+            known, parts = ([str(text) for text in np.asarray(places.coords[name])] for name in order[:2])
+            time = np.asarray(places.coords[names["time"]], dtype=float)
+            in_seconds = dataset.attrs.get("time_unit", "seconds") == "seconds"
+            x = np.asarray(places.transpose(*order), dtype=float)
+            sure = np.full(x.shape[:3], np.nan)
+            if "confidence" in dataset:
+                sure = np.asarray(dataset["confidence"].transpose(*order[:3]), dtype=float)
+        except (AttributeError, LookupError, TypeError, ValueError):
+            raise ValueError(f"dataset must be one of poses, as movement has them, not {shown(dataset)}.") from None
+        if not in_seconds:
+            raise ValueError("The dataset's times are numbers of frames: load it with fps.")
+        k = known.index(str(chosen_individual("The dataset", known, individual)))
+        points = {part: likely(x[k, j, :, :2], sure[k, j], likelihood) for j, part in enumerate(parts)}
+        return cls(time, points, {}, in_pixels)
+
+    def mapped(self, matrix: Floats) -> "Track":
+        """Track in metres, of one in pixels, by a homography of shape (3, 3), see plane.py."""
+        points = {name: mapped(matrix, places) for name, places in self.points.items()}
+        turns = {name: turned(matrix, self.points[name], angles) for name, angles in self.orientations.items()}
+        return replace(self, points=points, orientations=turns, in_pixels=False)
+
+    def in_metres(self, metres_per_pixel: float | None = None, homography: str | Path | None = None) -> "Track":
+        """Track in metres, of one in pixels.
+
+        metres_per_pixel: Of a camera that looks straight down. homography: File with u,v,x,y of four points or more.
+        """
+        if not self.in_pixels:
+            raise ValueError("The track is in metres, not in pixels: --unit px would say otherwise.")
+        if metres_per_pixel is not None and homography is None:
+            return self.mapped(scaled(metres_per_pixel))
+        if homography is not None and metres_per_pixel is None:
+            return self.mapped(read_homography(homography))
+        raise ValueError("Pixels become metres by --metres-per-pixel or by --homography, not both.")
+
+    def since(self, begin: float) -> "Track":
+        """Track without the pictures before a time [s], which becomes time 0."""
+        require_finite("begin", begin, "s")
+        late = self.time >= begin
+        if not late.any():
+            raise ValueError(f"All pictures are from before {begin:.10g} s: the last one is of {self.time[-1]:.10g} s.")
+        points = {name: places[late] for name, places in self.points.items()}
+        turns = {name: angles[late] for name, angles in self.orientations.items()}
+        return replace(self, time=self.time[late] - begin, points=points, orientations=turns)
+
+    def seen(
+        self, scene: Scene, nodes: Mapping[str, str | int] | None = None, rest: float = 0.0, aligned: bool = False
+    ) -> "Seen":
+        """What was seen of a scene's robot, in the frame in which it began.
+
+        nodes: Nodes of points by name: "hub", "tip1", "tip2", .., or a number. None: the only point is the hub.
+        rest: Time for which the robot is at rest at the beginning [s]. aligned: The track is in that frame.
+        """
+        require_kind("scene", scene, Scene, "a Scene")
+        require_number("rest", rest, "s", zero_allowed=True)
+        require_flag("aligned", aligned)
+        if self.in_pixels:
+            raise ValueError("The track is in pixels: give --metres-per-pixel or --homography.")
+        found = seen_nodes(self, numbered(nodes, self, scene))
+        if not aligned:
+            found = from_rest(found, self.time, rest, scene)
+        still = np.zeros((1, scene.robot.n_limbs))
+        measured = Measurement(self.time, found.positions, found.nodes, still, self.time[:1] + rest)
+        if aligned:
+            return found
+        return found._replace(off=require_rest(measured, at_nodes(scene, found.nodes), scene.robot.limb_length))
+
+    def to_csv(self, file: str | Path, scene: Scene, **seen: Any) -> None:
+        """Write a trajectory that `seastar identify` reads. scene, and more: As of `seen`."""
+        found = self.seen(scene, **seen)
+        write_trajectory(file, self.time, found.positions, found.nodes)
+
+
+def likely(places: Floats, scores: Floats, least: float) -> Floats:
+    """Places, shape (n, 2), without those of a lower score, shape (n,). Those without a score were seen."""
+    return np.where((scores < least)[:, None], np.nan, places)
 
 
 def require_possible(what: str, numbers: Floats, largest: float = FARTHEST) -> None:
@@ -62,10 +165,14 @@ def require_radians(name: str, angles: Floats) -> None:
 
 
 class Seen(NamedTuple):
-    """Positions [m] of nodes, shape (n, n_nodes_seen, 2), and their numbers, as those of a `Measurement`."""
+    """Positions [m] of nodes, shape (n, n_nodes_seen, 2), and their numbers, as those of a `Measurement`.
+
+    off: Distance of the robot at rest from its shape, in the root mean square [m].
+    """
 
     positions: Floats
     nodes: tuple[int, ...]
+    off: float = math.nan
 
 
 def chosen_individual(file: str | Path, known: Sequence[str | None], individual: str | None) -> str | None:
@@ -79,6 +186,25 @@ def chosen_individual(file: str | Path, known: Sequence[str | None], individual:
         raise ValueError(f"{file} names no individuals: leave --individual out.")
     names = ", ".join(str(name) for name in known)
     raise ValueError(f"{file} has the individuals {names}: name one of them with --individual.")
+
+
+def numbered(nodes: Mapping[str, str | int] | None, track: Track, scene: Scene) -> dict[str, int]:
+    """Numbers of the nodes of points, see `Track.seen`."""
+    require_kind("nodes", nodes, Mapping | None, "a dict of nodes by the names of points, or None")
+    if nodes is None:
+        if len(track.points) != 1:
+            raise ValueError(f"Say which points are which nodes, with --nodes: there are {', '.join(track.points)}.")
+        return dict.fromkeys(track.points, 0)
+    robot, found = scene.robot, {}
+    for point, name in nodes.items():
+        match = NODE.fullmatch(str(name))
+        if match is None:
+            raise ValueError(f"Nodes must be such as nose=hub, left=tip1 or left=11, not {point}={name}.")
+        node = int(match[1]) * (robot.nodes_per_limb - 1) if match[1] else 0 if name == "hub" else int(name)
+        if node >= robot.n_nodes:
+            raise ValueError(f"{point}={name}: the robot has {robot.n_limbs} limbs and {robot.n_nodes} nodes.")
+        found[point] = node
+    return found
 
 
 def seen_nodes(track: Track, nodes: Mapping[str, int]) -> Seen:
@@ -119,21 +245,9 @@ def from_rest(seen: Seen, time: Floats, rest: float, scene: Scene) -> Seen:
     return seen._replace(positions=(seen.positions - origin) @ back)
 
 
-def misfit(seen: Seen, time: Floats, rest: float, scene: Scene) -> float:
-    """Distance of the robot at rest from its shape, in the root mean square over its nodes [m].
-
-    ValueError where it is no small share of a limb.
-    """
-    nodes = np.array(seen.nodes)
-    still = seen.positions[time <= time[0] + rest][:, nodes != ORIENTATION]
-    off = np.hypot(*(still - scene.robot.nodes()[nodes[nodes != ORIENTATION]]).T)
-    found, length = float(np.sqrt(np.nanmean(off**2))), scene.robot.limb_length
-    if found > MISFIT * length:
-        raise ValueError(
-            f"The robot at rest is {1e3 * found:.3g} mm from its shape, whose limbs are {1e3 * length:.3g} mm long: "
-            "check which point is which node, the size of a pixel, and whether the picture is mirrored."
-        )
-    return found
+def at_nodes(scene: Scene, nodes: Sequence[int]) -> Floats:
+    """Positions of nodes of a scene's robot at rest [m], shape (n_nodes_seen, 2)."""
+    return np.array([pointer(np.zeros(())) if node == ORIENTATION else scene.robot.nodes()[node] for node in nodes])
 
 
 def _turn(places: Floats, nodes: NDArray[np.intp], scene: Scene) -> float:

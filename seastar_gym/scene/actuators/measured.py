@@ -9,11 +9,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene.actuators.actuator import ActuatorBase
 from seastar_gym.scene.actuators.heating import WIRE_POWER, share_of_pulse
-from seastar_gym.scene.checks import require_number, require_numbers, shown
+from seastar_gym.scene.checks import require_flag, require_number, require_numbers, shown
 from seastar_gym.scene.number import Numbers, check_numbers, not_negative
 from seastar_gym.scene.serial import MOST_ENTRIES, register_part
 
 Floats = NDArray[np.float64]
+
+REST = 1e-3
+"""Largest angle at the ends of a curve, over its largest one, that is taken for 0."""
 
 
 @register_part
@@ -23,8 +26,8 @@ class MeasuredCurve(ActuatorBase):
 
     times: Increasing times [s], from 0 to the period. No time step straddles a sample, so samples closer than the step
         shorten it: leave out samples on a straight line between others.
-    angles: Rotation by command 1 at those times [rad]. It is 0 at both ends, so that limbs do not jump when their
-        command changes.
+    angles: Rotation by command 1 at those times [rad]. It is 0 at both ends, to a thousandth of the largest, so that
+        limbs do not jump when their command changes.
     scale: Factor of the angles [1].
     heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
     """
@@ -44,25 +47,38 @@ class MeasuredCurve(ActuatorBase):
             )
         if self.times[0] != 0.0 or (np.diff(self.times) <= 0.0).any():
             raise ValueError(f"times must begin at 0 and increase [s], not {shown(self.times)}.")
-        if self.angles[0] != 0.0 or self.angles[-1] != 0.0:
+        if max(abs(self.angles[0]), abs(self.angles[-1])) > REST * max(map(abs, self.angles)):
             raise ValueError(
                 f"A measured curve must begin and end at 0 rad, not at {self.angles[0]} and {self.angles[-1]}: "
-                "otherwise limbs would jump when their command changes."
+                "otherwise limbs would jump when their command changes. MeasuredCurve.from_csv has detrend."
             )
+        object.__setattr__(self, "angles", (0.0, *self.angles[1:-1], 0.0))
 
     @classmethod
-    def from_csv(cls, file: str | Path) -> "MeasuredCurve":
-        """Curve from a CSV file with a time [s] and an angle [rad] in every line. The first line may hold names.
+    def from_csv(cls, file: str | Path, detrend: bool = False, thin: float = 0.0) -> "MeasuredCurve":
+        """Curve from a CSV file with a time and an angle in every line.
 
-        Names have no digits, so a mistyped first line is an error, see `seastar_gym.scene.csv_rows`.
+        The first line may hold names with units, such as "time (ms),angle (deg)", else they are seconds and radians;
+        names have no digits, so that a mistyped first line is an error. Times count from the first one.
+
+        detrend: Take the straight line from the first angle to the last one away: an offset, or a drift.
+        thin: Leave out samples that are within this angle of the curve without them [rad].
         """
         if not Path(file).is_file():
             raise FileNotFoundError(f"There is no measured curve at {file}: give the path of a CSV file.")
-        from seastar_gym.scene.csv_rows import read_numbers  # only files need it
+        require_flag("detrend", detrend)
+        require_number("thin", thin, "rad", zero_allowed=True)
+        from seastar_gym.scene.csv_rows import MOST_ROWS, read_named_numbers  # only files need it
 
-        times, angles = zip(*read_numbers(file, "a time [s] and an angle [rad]", 2, MOST_ENTRIES), strict=True)
+        most = MOST_ROWS if thin else MOST_ENTRIES
+        names, lines = read_named_numbers(file, "a time [s] and an angle [rad]", 2, most)
         try:
-            return cls(times=times, angles=angles)
+            times, angles = _in_units(names, np.array(lines).T)
+            times = times - times[0]
+            if detrend:
+                angles = angles - np.interp(times, times[[0, -1]], angles[[0, -1]])
+            kept = _kept(times, angles, thin) if thin else slice(None)
+            return cls(times=tuple(times[kept].tolist()), angles=tuple(angles[kept].tolist()))
         except ValueError as no_curve:
             raise ValueError(f"{file}: {no_curve}") from None
 
@@ -115,3 +131,34 @@ class MeasuredCurve(ActuatorBase):
     def seconds_heated(self, t: Floats, commands: Floats, state: Floats) -> Floats:
         """Time for which limbs are heated from t[0] to t[-1] [s], shape of `commands`; half a command counts half."""
         return share_of_pulse(t, commands, self.heating_time)
+
+
+def _in_units(names: tuple[str, ...], columns: Floats) -> Floats:
+    """Times [s] and angles [rad], shape (2, n), of columns in any order whose names may end with a unit."""
+    from seastar_gym.scene.csv_rows import UNITS, unit_of
+
+    found: dict[str, Floats] = {}
+    for default, name, column in zip(("time", "angle"), names or ("", ""), columns, strict=True):
+        unit, known = unit_of(name), ("time", "angle")
+        words = next((what for what in known if what in name.lower()), default)
+        what = next((what for what in known if unit in UNITS[what]), words)
+        if unit is not None and unit not in UNITS[what]:
+            raise ValueError(f"{name} must be in {', '.join(UNITS['time'])} or {', '.join(UNITS['angle'])}.")
+        found[what] = column * UNITS[what].get(unit or "", 1.0)
+    if len(found) == 1:
+        raise ValueError(f"one column must be a time and one an angle, not {' and '.join(names)}.")
+    return np.array([found["time"], found["angle"]])
+
+
+def _kept(times: Floats, angles: Floats, error: float) -> list[int]:
+    """Samples whose broken line errs by no more than this angle at any other (Ramer, Douglas and Peucker)."""
+    kept, pieces = {0, len(times) - 1}, [(0, len(times) - 1)]
+    while pieces:
+        begin, end = pieces.pop()
+        straight = np.interp(times[begin : end + 1], times[[begin, end]], angles[[begin, end]])
+        off = np.abs(angles[begin : end + 1] - straight)
+        if off.max() > error:
+            middle = begin + int(off.argmax())
+            kept.add(middle)
+            pieces += [(begin, middle), (middle, end)]
+    return sorted(kept)

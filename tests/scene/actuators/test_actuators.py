@@ -56,6 +56,39 @@ def test_curves_are_read_from_csv(tmp_path, head):
         np.testing.assert_allclose(curve.angles, (0.0, -2.4, -1.2, 0.0), rtol=1e-14)
 
 
+BENCH = np.linspace(0.0, 1.0, 1001)
+SQUARE = 0.6 * np.sin(np.pi * BENCH) ** 2
+
+
+def bench(head, times, angles, separator=",", decimal="."):
+    rows = (
+        f"{t!r}{separator}{a!r}".replace(".", decimal) for t, a in zip(times.tolist(), angles.tolist(), strict=True)
+    )
+    return "\n".join([head, *rows]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        (bench("time,angle", BENCH, SQUARE), {}),  # which ends at 9e-33
+        (bench("time (ms),angle (deg)", 1e3 * BENCH, np.degrees(SQUARE)), {}),
+        (bench("t [s];Winkel [°]", BENCH, np.degrees(SQUARE), ";", ","), {}),
+        (bench("angle_deg,time_s", np.degrees(SQUARE), BENCH), {}),
+        (bench("angle,time", SQUARE, BENCH), {}),
+        (bench("time,angle", BENCH + 12.5, SQUARE), {}),
+        (bench("time,angle", BENCH, SQUARE + 2e-4 * np.sign(BENCH - 0.5)), {}),
+        (bench("time,angle", BENCH, SQUARE + 0.03 + 0.05 * BENCH), {"detrend": True}),
+        (bench("time,angle", BENCH, SQUARE), {"thin": 0.005}),
+    ],
+)
+def test_a_curve_from_a_bench_is_taken_in_its_own_units(tmp_path, text, options):
+    (tmp_path / "curve.csv").write_text(text, encoding="utf-8-sig")
+    curve = MeasuredCurve.from_csv(tmp_path / "curve.csv", **options)
+    assert curve.period == pytest.approx(1.0) and curve.angles[0] == curve.angles[-1] == 0.0
+    assert np.abs(curve.delta_psi(BENCH) - SQUARE).max() <= max(options.get("thin", 0.0), 3e-4)
+    assert (len(curve.times) < 40) == ("thin" in options)
+
+
 def of_curvatures(file):
     return MeasuredCurve.from_curvatures(file, 1.0, 0.03)
 
@@ -65,6 +98,8 @@ def of_curvatures(file):
     [
         *((MeasuredCurve.from_csv, text, "") for text in ("0,0\n1,0,0\n", "0,0\n0.5\n", "time,angle\n", "0,O\n", "")),
         (MeasuredCurve.from_csv, "0,0\n1,1\n", ": A measured curve must begin and end at 0"),
+        (MeasuredCurve.from_csv, "time (h),angle (deg)\n0,0\n1,0\n", ": time (h) must be in s, ms"),
+        (MeasuredCurve.from_csv, "a (s),b (ms)\n0,0\n1,0\n", ": one column must be a time and one an angle"),
         *((of_curvatures, text, "") for text in ("0.1,1\n0.5,2\n", "0,1\n0.5,2\n0.4,3\n", "0,1\n1.5,2\n", "0,1,2\n")),
     ],
 )
