@@ -29,7 +29,7 @@ from seastar_gym.scene.checks import (
 )
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.fluid import Water
-from seastar_gym.scene.number import as_tuple
+from seastar_gym.scene.number import as_tuple, check_numbers
 from seastar_gym.scene.numerics import DEFAULT, DEFAULT_FIDELITY, MAX_STEPS, PRESETS, Fidelity, Numerics
 from seastar_gym.scene.per_robot import batch_size, chosen
 from seastar_gym.scene.robot import Seastar
@@ -37,6 +37,7 @@ from seastar_gym.scene.section import Disc
 from seastar_gym.scene.serial import from_dict, register_part, to_dict
 from seastar_gym.scene.shape import cross_at_rest, n_hub_hinges, natural_hub_angle, turn_per_hinge
 from seastar_gym.scene.summary import scene_html, short_repr
+from seastar_gym.scene.terms import is_term
 
 if TYPE_CHECKING:
     from seastar_gym.accuracy import Certificate
@@ -60,6 +61,7 @@ class Scene:
     contact: Contact between limbs, and with a body. None lets limbs pass through each other, as in the chapter.
     gravity: Gravitational acceleration in the plane (g_x, g_y) [m/s^2]. Limbs feel their weight minus the buoyancy of
         the fluid that they displace. None means no gravity in the plane.
+    terms: Forces of your own, of classes that `register_term` has registered.
 
     >>> from dataclasses import replace
     >>> from seastar_gym import Scene, Seastar, UniformCurrent, Water
@@ -82,6 +84,7 @@ class Scene:
     limb_strengths: tuple[float, ...] = ()
     contact: Contact | None = None
     gravity: tuple[float, float] | None = None
+    terms: tuple[Any, ...] = ()
 
     def __post_init__(self) -> None:
         for name, value, kinds in (
@@ -95,6 +98,7 @@ class Scene:
         if not is_actuator(self.actuator):
             raise ValueError(f"Scene.actuator must be an Actuator such as SmaPulse(), not {shown(self.actuator)}.")
         check_actuator(self.actuator)
+        self._check_terms()
         batch_size(self)
         self._check_hub_hinges()
         self._check_strengths()
@@ -130,6 +134,17 @@ class Scene:
                 raise ValueError(f"gravity must be two numbers (g_x, g_y) [m/s^2], not {shown(self.gravity)}.")
         for node in (*self.held_nodes, *(load[0] for load in self.loads)):
             require_count("a held or loaded node", node, 0, self.robot.n_nodes - 1)
+
+    def _check_terms(self) -> None:
+        if not isinstance(self.terms, tuple) or not all(map(is_term, self.terms)):
+            raise ValueError(
+                f"Scene.terms must be a tuple of terms of classes that seastar_gym.register_term has registered, not "
+                f"{shown(self.terms)}."
+            )
+        for term in self.terms:
+            check_numbers(term, f"{type(term).__name__}.")
+        if self.terms and self.robot.has_body:
+            raise ValueError("Own terms act on the nodes of limbs, and know of no body: use a robot whose limbs meet.")
 
     def _check_contact(self) -> None:
         if self.contact is None:
