@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seastar_gym.der.stepping.schemes import SCHEMES, Scheme, scheme_of, tableau
+from seastar_gym.scene import numerics
 from seastar_gym.scene.checks import shown
-from seastar_gym.scene.numerics import SCHEME_NAMES
 from seastar_gym.scene.scene import Scene
 
 
@@ -23,8 +23,8 @@ def register_scheme(name: str, A: ArrayLike, b: ArrayLike) -> None:
     if not (np.array_equal(known.a, own.a) and np.array_equal(known.b, own.b)):
         raise ValueError(f"There is a scheme {name!r} with other numbers already: give this one another name.")
     SCHEMES[name] = own
-    if name not in SCHEME_NAMES:
-        SCHEME_NAMES.append(name)
+    if name not in numerics.SCHEME_NAMES:
+        numerics.SCHEME_NAMES.append(name)
 
 
 def scheme_for(scene: Scene) -> Scheme:

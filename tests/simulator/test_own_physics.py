@@ -3,53 +3,35 @@
 import math
 from dataclasses import dataclass, replace
 from importlib.util import module_from_spec, spec_from_file_location
-from typing import Annotated
 
 import numpy as np
 import pytest
 
+from own_terms import Trap
 from seastar_gym import Body, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, register_scheme, register_term
 from seastar_gym.envs.symmetry.wrappers import require_symmetry
 from seastar_gym.gradients import differentiate
-from seastar_gym.scene.number import Numbers, finite, not_negative
+from seastar_gym.scene import numerics
 from seastar_gym.simd.functions import code_digest
 
 START = (0.03, -0.01)  # m/s
 
 
-@register_term
-@dataclass(frozen=True)
-class Trap:
-    """A spring to a point, and linear drag, of a limb's length. k [N/m^2], c [N s/m^2], x [m]."""
-
-    k: Annotated[Numbers, finite("N/m^2")] = 0.0
-    c: Annotated[Numbers, not_negative("N s/m^2")] = 0.0
-    x: Annotated[Numbers, finite("m")] = 0.0
-
-    def coefficients(self, mesh):
-        return self.k * mesh.dl, self.c * mesh.dl, np.full(len(mesh.dl), float(self.x))
-
-    @staticmethod
-    def energy(of_node, x, y):
-        k, _, centre = of_node
-        away = x - centre
-        return 0.5 * k * (away * away + y * y), (k * away, k * y), (k, 0.0 * k, k)
-
-    @staticmethod
-    def dissipation(of_node, wx, wy):
-        c = of_node[1]
-        return 0.5 * c * (wx * wx + wy * wy), (c * wx, c * wy), (c, 0.0 * c, c)
-
-
 G = (3.0 + math.sqrt(3.0)) / 6.0
-register_scheme("crouzeix3", [[G, 0.0], [1.0 - 2.0 * G, G]], [0.5, 0.5])
-register_scheme("two-thirds", [[2 / 3]], [1.0])
+
+
+@pytest.fixture(autouse=True)
+def own_schemes(monkeypatch):
+    """Own schemes that no other test finds."""
+    monkeypatch.setattr(numerics, "SCHEME_NAMES", [*numerics.SCHEME_NAMES])
+    register_scheme("crouzeix3", [[G, 0.0], [1.0 - 2.0 * G, G]], [0.5, 0.5])
+    register_scheme("two-thirds", [[2 / 3]], [1.0])
 
 
 def trapped(term, n_limbs=3, scheme="crouzeix3", step=2e-3):
-    numerics = Numerics(scheme, step, newton_tolerance=1e-12)
+    fine = Numerics(scheme, step, newton_tolerance=1e-12)
     actuator = SmaPulse(peak_angle=0.0) if n_limbs == 1 else SmaPulse()
-    return Scene(Seastar(n_limbs, nodes_per_limb=4), None, actuator, numerics, terms=(term,))
+    return Scene(Seastar(n_limbs, nodes_per_limb=4), None, actuator, fine, terms=(term,))
 
 
 def thrown(scene, duration, n_robots=1):
@@ -148,7 +130,7 @@ def digest_of(folder, monkeypatch, half="0.5", rate="1.0"):
 
 
 def test_compiled_code_is_found_by_what_the_users_code_says_and_names(tmp_path, monkeypatch):
-    """Not by the file's name: two users' files of one name are two, an edited one is another, a moved one is the same."""
+    """Two users' files of one name are two, an edited one is another, a moved one is the same."""
     first = digest_of(tmp_path / "a", monkeypatch)
     assert digest_of(tmp_path / "b", monkeypatch) == first
     others = {

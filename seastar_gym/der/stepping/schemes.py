@@ -78,19 +78,19 @@ def tableau(A: ArrayLike, b: ArrayLike) -> Scheme:
             "it; Gauss's, Radau's, Lobatto's and explicit first stages cannot be."
         )
     if abs(weights.sum() - 1.0) > CONSISTENT:
-        raise ValueError(f"The numbers of b must add up to 1, or the robot swims at another speed, not {weights.sum():.6g}.")
+        raise ValueError(f"The numbers of b must add up to 1, or time runs at another speed, not {weights.sum():.6g}.")
     growth = largest_growth(rows, weights)
     if growth > 1.0 + GROWING:
         raise ValueError(
-            f"This tableau is not A-stable: it multiplies the amplitude of some oscillation by {growth:.4g} in every step, "
-            "and limbs have oscillations of all frequencies."
+            f"This tableau is not A-stable: it multiplies the amplitude of some oscillation by {growth:.4g} in every "
+            "step, and limbs have oscillations of all frequencies."
         )
     return _scheme(rows.tolist(), None if np.array_equal(rows[-1], weights) else weights.tolist())
 
 
 def largest_growth(A: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Largest |R(i y)| of an undamped oscillation in a step, with R(z) = 1 + z b (1 - z A)^-1 1."""
-    frequencies = np.concatenate([np.geomspace(1e-2, 1e6, 2000)])
+    frequencies = np.geomspace(1e-2, 1e6, 2000)
     one = np.ones(len(b))
     return max(abs(1.0 + 1j * y * (b @ np.linalg.solve(np.eye(len(b)) - 1j * y * A, one))) for y in frequencies)
 

@@ -61,8 +61,8 @@ def coefficients(terms: Sequence[Any], mesh: Any) -> Own | None:
                 check_slopes(name, kind, function, tuple(row.tolist() for row in found[:, [0, -1]]), mesh)
                 parts[kind].append(Function(function, len(columns), len(found)))
         columns.extend(found)
-    sums = [handed(sum_of(tuple(parts[kind]))) if parts[kind] else None for kind in KINDS]
-    return Own(*sums, np.stack(columns, axis=1).ravel(), len(columns))
+    energy, dissipation = (handed(sum_of(tuple(parts[kind]))) if parts[kind] else None for kind in KINDS)
+    return Own(energy, dissipation, np.stack(columns, axis=1).ravel(), len(columns))
 
 
 def rows_of(term: Any, mesh: Any) -> np.ndarray:
@@ -214,7 +214,7 @@ def _compare(name: str, kind: str, at: Callable, size: float, rest: np.ndarray) 
         if not np.isfinite(here).all() or off.any() or abs(along_y[1] - here[4]) > TOLERANCE * scale[3] + 1e-300:
             which = "slopes" if off[:2].any() else "second slopes"
             raise ValueError(f"{name}.{kind} has other {which} than differences of it show: compare it term by term.")
-        if kind == "dissipation" and (
-            here[0] < rest[0] or here[3] < 0.0 or here[5] < 0.0 or here[3] * here[5] - here[4] ** 2 < -1e-9 * scale[2] ** 2
-        ):
+        determinant = here[3] * here[5] - here[4] ** 2
+        is_convex = here[3] >= 0.0 and here[5] >= 0.0 and determinant >= -1e-9 * scale[2] ** 2
+        if kind == "dissipation" and not (is_convex and here[0] >= rest[0]):
             raise ValueError(f"{name}.dissipation must be convex and least at rest, or the force gives energy.")
