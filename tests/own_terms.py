@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from seastar_gym import register_term
-from seastar_gym.scene.number import Numbers, finite, not_negative
+from seastar_gym.scene.number import Numbers, check_numbers, finite, not_negative
 
 
 @register_term
@@ -17,6 +17,9 @@ class Trap:
     k: Annotated[Numbers, finite("N/m^2")] = 0.0
     c: Annotated[Numbers, not_negative("N s/m^2")] = 0.0
     x: Annotated[Numbers, finite("m")] = 0.0
+
+    def __post_init__(self):
+        check_numbers(self, "Trap.")
 
     def coefficients(self, mesh):
         return self.k * mesh.dl, self.c * mesh.dl, np.full(len(mesh.dl), float(self.x))

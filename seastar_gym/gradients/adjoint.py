@@ -1,5 +1,7 @@
 """`record` and `gradient`: the gradient of a number of a swim in all unknowns, by one sweep back through the swim."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from threading import RLock
 from typing import NamedTuple
@@ -102,7 +104,7 @@ def gradient(
     return Gradient(float(value), record_of_swim.swim, found, record_of_swim.status, record_of_swim.sentence)
 
 
-def record(scene: Scene, commands: ArrayLike, state: State | None = None, duration: float | None = None) -> "Record":
+def record(scene: Scene, commands: ArrayLike, state: State | None = None, duration: float | None = None) -> Record:
     """Swim with these commands, and keep the time steps, for gradients of the swim.
 
     Arguments are those of `differentiate`.

@@ -1,5 +1,7 @@
 """`differentiate`: a swim of one robot, and its derivatives in numbers of the scene, commands and the start."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """Time stepping schemes of scenes: those of the package, and tableaux that a user has registered."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,5 +1,7 @@
 """`Numerics`: scheme, step and tolerances of time stepping, chosen by value or by preset."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Literal, NamedTuple, get_args
 
@@ -78,7 +80,7 @@ class Numerics:
         return html_table("Numerics", ("setting", "value"), rows)
 
     @classmethod
-    def preset(cls, fidelity: Fidelity) -> "Numerics":
+    def preset(cls, fidelity: Fidelity) -> Numerics:
         """Numerics of a fidelity: "fast", "balanced", "accurate", "reference", or "chapter" for those of the chapter.
 
         What a fidelity promises holds with its nodes per limb and its discretisation: `Scene.preset` chooses them, too.

@@ -5,6 +5,8 @@ that says why in one sentence. Those of the type `Numbers` may be arrays of shap
 of a batch.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, replace
@@ -306,7 +308,7 @@ class Scene:
                 )
 
     @classmethod
-    def preset(cls, fidelity: Fidelity) -> "Scene":
+    def preset(cls, fidelity: Fidelity) -> Scene:
         """The chapter's robot and water with the nodes per limb, discretisation and numerics of a fidelity.
 
         "fast", "balanced", "accurate" and "reference" are of the continuum, "chapter" is the chapter's discretisation.
@@ -319,7 +321,7 @@ class Scene:
         discretisation, nodes_per_limb, numerics = PRESETS[fidelity]
         return cls(Seastar(nodes_per_limb=nodes_per_limb, discretisation=discretisation), numerics=numerics)
 
-    def at(self, fidelity: Fidelity | None = None) -> "Scene":
+    def at(self, fidelity: Fidelity | None = None) -> Scene:
         """Scene with the nodes per limb, discretisation and numerics of a fidelity, as far as it names none itself.
 
         Held and loaded nodes are counted on a mesh, so a scene with any keeps its own. ValueError where scene and
@@ -346,8 +348,8 @@ class Scene:
         error: float,
         any_gait: bool = False,
         robot: Seastar | None = None,
-        certificate: "Certificate | str | PathLike[str] | None" = None,
-    ) -> "Scene":
+        certificate: Certificate | str | PathLike[str] | None = None,
+    ) -> Scene:
         """Scene at the fastest measured setting whose path error is at most `error`.
 
         The error is that of the hub's path against infinitely many nodes and infinitely short steps, as a fraction of
@@ -384,7 +386,7 @@ class Scene:
         return to_dict(self)
 
     @classmethod
-    def from_dict(cls, data: object) -> "Scene":
+    def from_dict(cls, data: object) -> Scene:
         """Scene of the plain data that `to_dict` returned. ValueError for anything else."""
         return from_dict(data, cls)
 
@@ -393,7 +395,7 @@ class Scene:
         """Number of robots for which the scene has numbers, or None if it suits any number."""
         return batch_size(self)
 
-    def of_robot(self, index: int) -> "Scene":
+    def of_robot(self, index: int) -> Scene:
         """Scene of one robot of a batch."""
         return chosen(self, itemgetter(index))
 

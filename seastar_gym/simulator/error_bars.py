@@ -12,6 +12,8 @@ error in about 95 % of strokes of the robot that needs the largest, as `python -
 055100c4 measured (docs/numerics.md).
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import NamedTuple, Protocol
 

@@ -3,6 +3,8 @@
 A robot has the sectors of its own symmetry, see the package's docstring.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 

@@ -1,5 +1,7 @@
 """`MeasuredCurve`: an actuator given by measured angles at times."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -51,7 +53,7 @@ class MeasuredCurve(ActuatorBase):
             )
 
     @classmethod
-    def from_csv(cls, file: str | Path) -> "MeasuredCurve":
+    def from_csv(cls, file: str | Path) -> MeasuredCurve:
         """Curve from a CSV file with a time [s] and an angle [rad] in every line. The first line may hold names.
 
         Names have no digits, so a mistyped first line is an error, see `seastar_gym.scene.csv_rows`.
@@ -67,7 +69,7 @@ class MeasuredCurve(ActuatorBase):
             raise ValueError(f"{file}: {no_curve}") from None
 
     @classmethod
-    def from_curvatures(cls, file: str | Path, period: float, limb_length: float) -> "MeasuredCurve":
+    def from_curvatures(cls, file: str | Path, period: float, limb_length: float) -> MeasuredCurve:
         """Curve of limbs that are bent along their length, for `Seastar(along=AlongLimb())`.
 
         The limb bends by its change of curvature since phase 0 times its length. A line at phase 1, which is phase 0 of
