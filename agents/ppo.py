@@ -1,5 +1,7 @@
 """PPO on the native batch: the training environment, the learner, and the policy that it has learned."""
 
+from __future__ import annotations
+
 import os
 from collections.abc import Mapping
 from typing import Any

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from seastar_gym.envs.tasks.prizes import Prizes as Prizes
     from seastar_gym.envs.tasks.sim_to_real import SimToReal as SimToReal
     from seastar_gym.envs.tasks.station import Station as Station
+    from seastar_gym.model.schemes import register_scheme as register_scheme
     from seastar_gym.scene import AlongLimb as AlongLimb
     from seastar_gym.scene import Attachment as Attachment
     from seastar_gym.scene import Body as Body
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     from seastar_gym.scene import Water as Water
     from seastar_gym.scene import relaxation_time as relaxation_time
     from seastar_gym.scene.serial import register_part as register_part
+    from seastar_gym.scene.terms import register_term as register_term
     from seastar_gym.simulator import Simulator as Simulator
     from seastar_gym.simulator import SolverStatus as SolverStatus
     from seastar_gym.simulator import State as State

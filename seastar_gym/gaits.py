@@ -4,6 +4,8 @@ A gait is an array of commands, shape (n_strokes, n_limbs): per stroke and limb 
 anti-clockwise. In time, a stroke is a decision, and the share is that of a pulse.
 """
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import NDArray
 

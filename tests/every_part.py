@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from own_terms import Trap
 from seastar_gym import (
     AlongLimb,
     Attachment,
@@ -68,6 +69,7 @@ PARTS = {
     "held nodes": {"held_nodes": (3, 0)},
     "hub hinges": {"robot": Seastar(nodes_per_limb=8, discretisation="chapter")},
     "gravity": {"gravity": (1 / 3, -9.81)},
+    "own terms": {"terms": (Trap(1 / 3, 0.1 * EACH), Trap(x=0.1))},
     "strengths": {"limb_strengths": (1.0, 0.0, 1 / 3, 1.0, 0.5)},
     "limbs": {"robot": Seastar(limbs=(Limb(radius=(2e-3, 1e-3 / 3)), *(Limb(length=0.1 / 3),) * 4))},
     "discs": {"robot": Seastar(limbs=(Limb(section=Disc((2e-3, 1e-3 / 3))),) * 5)},

@@ -17,6 +17,7 @@ from seastar_gym import Numerics, Scene
 from seastar_gym.accuracy import endurance, measure
 from seastar_gym.envs import paths
 from seastar_gym.evaluation import many
+from seastar_gym.scene import numerics
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -39,7 +40,7 @@ NOTEBOOK = ROOT / "examples" / "first_hour.ipynb"
 @pytest.fixture
 def short_form(monkeypatch, tmp_path):
     """Episodes of LONGEST steps, trainings of one rollout, certificates of one setting, no window, a folder of one's
-    own, and no path that outlives the page."""
+    own, and no path or scheme that outlives the page."""
     from stable_baselines3 import PPO
 
     make, learn = gym.make, PPO.learn
@@ -61,6 +62,7 @@ def short_form(monkeypatch, tmp_path):
     monkeypatch.setattr(endurance, "LONG", 40)
     monkeypatch.setattr(measure, "MANY_NODES", 17)
     monkeypatch.setattr(paths, "PATHS", dict(paths.PATHS))
+    monkeypatch.setattr(numerics, "SCHEME_NAMES", [*numerics.SCHEME_NAMES])
     monkeypatch.chdir(tmp_path)
 
 

@@ -4,6 +4,8 @@ A certificate is a JSON file. It lapses where the scene's physics or the version
 refused with a sentence. The file has a digest of its content, so that errors stay those of their scene.
 """
 
+from __future__ import annotations
+
 import hashlib
 import json
 from collections.abc import Mapping
@@ -209,7 +211,7 @@ class Certificate:
         write_atomically(file, (json.dumps(signed, indent=1) + "\n").encode())
 
     @classmethod
-    def load(cls, file: Path | str) -> "Certificate":
+    def load(cls, file: Path | str) -> Certificate:
         """Read a certificate. ValueError for a file that is none, and for one that was changed since it was written."""
         try:
             text = Path(file).read_text(encoding="utf-8")

@@ -1,5 +1,7 @@
 """`Setting`: a resolution and numerics, with the errors and the speed of one scene."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace

@@ -1,5 +1,7 @@
 """Stable-Baselines3's `VecEnv` over the native batch."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Sequence
 from typing import Any

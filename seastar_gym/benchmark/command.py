@@ -2,7 +2,7 @@
 
 Agents are names as in `seastar swim`, files of policies, or module:function. LABEL=A,B,C is one agent whose seeds are
 swum by policies A, B, C in turn, as by ten trainings. Tasks are the ids that this package registers. An agent that does
-not fit a task is left out there, with a sentence that says why.
+not fit a task is left out there, with a sentence that says why, and the exit code is 2.
 
 An agent's episodes on a task are a job, or several (--seeds-per-job), which an executor runs. Results are the same on
 each. Nodes of a cluster need the package, the modules and the files of policies where this machine has them.
@@ -110,7 +110,7 @@ def require_measures(entries: Sequence[Entry]) -> None:
 
 
 class Measured(NamedTuple):
-    """Results so far. code: Exit code, 1 where a job was lost, INTERRUPTED after Ctrl-C."""
+    """Results so far. code: Exit code, 2 where an agent did not fit, 1 where a job was lost, INTERRUPTED after Ctrl-C."""
 
     entries: list[Entry]
     code: int
@@ -133,7 +133,7 @@ def benchmark(options: argparse.Namespace) -> Measured:
                 entry = entries[pair] = whole(found[pair])
             except ValueError as unfit:
                 print(f"{pair[1]} does not swim {pair[0]}: {unfit}", file=sys.stderr)
-                code |= any(each.is_lost for each in found[pair])
+                code = max(code, 1 if any(each.is_lost for each in found[pair]) else 2)
                 continue
             print(f"{pair[1]}, {pair[0]}: {entry.measure} {entry.estimate()} [{entry.unit}]", flush=True)
     except KeyboardInterrupt:

@@ -4,6 +4,8 @@
 
 With --sets, agents swim many paths, nominal and disturbed: a table of means with confidence intervals and, with --out,
 a CSV file of them. For registered tasks, see `seastar benchmark`.
+
+A named agent that does not fit the robot is left out with a sentence, and the exit code is 2.
 """
 
 import argparse
@@ -87,8 +89,11 @@ def limit_of(options: argparse.Namespace, scene: Scene | None = None) -> int:
     return decisions_in(options.seconds, options.decision_period, scene)
 
 
-def compared(options: argparse.Namespace, command: str) -> None:
-    """Let the agents swim the path. command: What was typed."""
+def compared(options: argparse.Namespace, command: str) -> int:
+    """Let the agents swim the path; returns the exit code, 2 where one that was named does not fit.
+
+    command: What was typed.
+    """
     require_sound(options)
     (fidelity,) = options.fidelity
     path, own = load_path(options.path), scene_at(options.scene, fidelity)
@@ -101,6 +106,7 @@ def compared(options: argparse.Namespace, command: str) -> None:
         report=remarks(agents, options, command) if options.report else None,
         fidelity=fidelity if own is None else None, random_heading=options.random_heading,
     )  # fmt: skip
+    return 2 if left_out and options.agents else 0
 
 
 def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: str) -> "Remarks":
@@ -124,8 +130,8 @@ def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: 
     )
 
 
-def swum_often(options: argparse.Namespace) -> None:
-    """Let the agents swim the sets."""
+def swum_often(options: argparse.Namespace) -> int:
+    """Let the agents swim the sets; returns the exit code."""
     require_sound(options)
     rows, period = list[Row](), options.decision_period
     for fidelity in options.fidelity:
@@ -137,6 +143,7 @@ def swum_often(options: argparse.Namespace) -> None:
     print(as_text(rows, period))
     if options.out is not None:
         write_csv(rows, options.out)
+    return 0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

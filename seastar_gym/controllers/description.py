@@ -1,5 +1,7 @@
 """Description of a learned policy: the environment that it expects, checked when it is read from JSON."""
 
+from __future__ import annotations
+
 import json
 import math
 from collections.abc import Mapping
@@ -75,12 +77,12 @@ class Description(NamedTuple):
         return json.dumps(facts, indent=2, default=str, allow_nan=False)
 
     @classmethod
-    def from_json(cls, text: str | bytes) -> "Description":
+    def from_json(cls, text: str | bytes) -> Description:
         """Description that `to_json` wrote, see from_facts."""
         return cls.from_facts(read_facts(text))
 
     @classmethod
-    def from_facts(cls, facts: Mapping[str, Any]) -> "Description":
+    def from_facts(cls, facts: Mapping[str, Any]) -> Description:
         """Description from the entries of `to_json`; ValueError where one is missing or wrong."""
         require_kind("facts", facts, Mapping, "entries by name, as to_json writes them")
         missing = [name for name in ("format", "observation_layout", *cls._fields) if name not in facts]
@@ -92,7 +94,7 @@ class Description(NamedTuple):
         return cls._of(facts, Scene.from_dict(facts["scene"]))
 
     @classmethod
-    def _of(cls, facts: Mapping[str, Any], scene: Scene) -> "Description":
+    def _of(cls, facts: Mapping[str, Any], scene: Scene) -> Description:
         """Description from its entries, with the scene of its own."""
         actions: Any = facts["actions"]
         symmetry, hidden, task, past = (facts[name] for name in ("symmetry", "hidden", "task", "past"))

@@ -7,6 +7,8 @@ the repeated command swims steadily. It is computed once for every scene and kep
 environment, commands are repeated at every decision, which heats the same wires over and over: the map knows no lag.
 """
 
+from __future__ import annotations
+
 import hashlib
 import os
 from abc import ABC, abstractmethod

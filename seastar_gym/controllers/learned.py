@@ -11,6 +11,8 @@ The network is plain numpy: layers `W x + b` with tanh between them (`0.weight`,
 outputs are the logits of the actions. Nothing is unpickled, and neither torch nor Stable-Baselines3 is needed.
 """
 
+from __future__ import annotations
+
 import hashlib
 import os
 from collections.abc import Mapping
@@ -166,7 +168,7 @@ class LearnedPolicy:
         scene: Scene,
         actions: Actions,
         n_seen: int,
-        challenge: "Challenge | None" = None,
+        challenge: Challenge | None = None,
         sight: Sight | None = None,
     ) -> None:
         """ValueError, with one sentence, where this policy cannot drive the robot of an environment.
@@ -208,7 +210,7 @@ class LearnedPolicy:
         return f"trained in another scene, with {', '.join(parts)}." if parts else ""
 
 
-def require_task(task: str, challenge: "Challenge | None") -> None:
+def require_task(task: str, challenge: Challenge | None) -> None:
     """ValueError unless a challenge is that of a task of this name, with any numbers.
 
     A policy of `SimToReal` swims along waypoints, also those of a plant.

@@ -7,6 +7,8 @@ tries whole periods of evolved gaits instead, and decides once a second. A robot
 than ten nodes per limb is taken to lie smoothly through the stations that are observed.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

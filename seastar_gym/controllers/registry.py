@@ -4,6 +4,8 @@ A new agent is a class with `predict` and one line in `AGENTS`. An agent of one'
 the name of the function that makes it, "module:function".
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path

@@ -10,6 +10,8 @@ Strokes begin once a second whatever the time between decisions. Lagged gaits, a
 shorter ones than a second, and wires.
 """
 
+from __future__ import annotations
+
 import re
 from collections.abc import Callable
 from functools import partial

@@ -1,5 +1,7 @@
 """Wrapper that keeps what a batch does, as Minari's `DataCollector` does for one environment."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 

@@ -10,6 +10,7 @@ from seastar_gym.der.terms.clamp import add_clamp_moments, clamp_energy
 from seastar_gym.der.terms.fluid import fluid_velocity
 from seastar_gym.der.terms.hub import set_natural_hub_angles
 from seastar_gym.der.terms.inertia import kinetic_energy
+from seastar_gym.der.terms.own import own_energy
 from seastar_gym.der.terms.stretching import stretching_energy, tension
 from seastar_gym.simd.compilation import entry_point, kernel
 from seastar_gym.simd.lanes import add_product, borrow, load, splat, store, subtract_product
@@ -31,7 +32,7 @@ def hub_hinge_energy(rods, work, q, limb, edge):
 
 @kernel
 def elastic_energy(rods, work, q):
-    """Stretching and bending energy (13.14) at the natural hub angles in `work` [J]."""
+    """Stretching and bending energy (13.14) at the natural hub angles in `work`, and that of own terms [J]."""
     total = splat(0.0) if rods.clamp is None else clamp_energy(rods, work, q)
     edges = rods.edges_per_limb
     for limb in range(rods.n_limbs):
@@ -43,6 +44,8 @@ def elastic_energy(rods, work, q):
             before, edge = edge, edge_of(rods, q, e)
             hinge = hinge_energy(rods, work, e, before, edge, 1.0, natural_moment(rods, work, e))
             total += stretching_energy(rods, e, tension(rods, e, edge.length)) + hinge
+    if rods.own is not None:
+        total = own_energy(rods, q, total)
     return total
 
 

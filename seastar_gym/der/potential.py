@@ -51,6 +51,7 @@ from seastar_gym.der.terms.damping import damped_energy, damped_stiffness, dampe
 from seastar_gym.der.terms.drag import add_cross_flow, add_middle_drag, drag_slopes
 from seastar_gym.der.terms.inertia import subtract_edge_inertia
 from seastar_gym.der.terms.load import load_power, nodal_load
+from seastar_gym.der.terms.own import add_own_slopes
 from seastar_gym.der.terms.stretching import stretching_energy, tension
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import add_product, load, select, splat, store, subtract_product
@@ -140,6 +141,8 @@ def node_slopes(rods, work, stage, node, motion, push):
         (add_product(diagonal, sx, wx), sx * wy, add_product(diagonal, sy, wy)),
     )
     slopes = add_fluid_inertia(work, node, dx, dy, stage.inverse_gamma, slopes)
+    if rods.own is not None:
+        slopes = add_own_slopes(rods, work, stage, node, wx, wy, slopes)
     return add_cross_flow(rods, work.normals, node, wx, wy, stage.gamma, stage.inverse_gamma, slopes)
 
 

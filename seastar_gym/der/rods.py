@@ -18,6 +18,7 @@ from seastar_gym.der.terms.bending import Bending
 from seastar_gym.der.terms.clamp import Clamp
 from seastar_gym.der.terms.current import Current
 from seastar_gym.der.terms.hub import Hub
+from seastar_gym.der.terms.own import Own
 from seastar_gym.der.terms.stretching import Stretching
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import aligned_rows
@@ -37,7 +38,7 @@ class Rods(NamedTuple):
     mass: Lumped mass, per node [kg]. drag: 1/2 rho_f C_d D dl_i of (13.8), per node [kg/m].
     cross_drag, added_mass: Coefficients of flow across half edges [kg/m], [kg]; two rows per node.
     damping: Relaxation time tau [s], one row. current: How the fluid moves.
-    load: Constant force per coordinate [N]. contact: Who may touch whom.
+    load: Constant force per coordinate [N]. own: Forces of a user's own. contact: Who may touch whom.
     body: A body between the limbs. With one, `mass`, `drag` and `load` have rows for all places, see star.py.
     scales: Scales of the robot that decide what Newton's method and the guard look at.
     """
@@ -65,6 +66,7 @@ class Rods(NamedTuple):
     damping: np.ndarray | None
     current: Current | None
     load: np.ndarray | None
+    own: Own | None
     contact: contact.Contact | None
     scales: Scales
     body: Body | None

@@ -1,5 +1,7 @@
 """Arrays that a batch writes the results of a step into."""
 
+from __future__ import annotations
+
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +21,7 @@ class Buffers(NamedTuple):
     terminated: NDArray[Any]
     truncated: NDArray[Any]
 
-    def take(self, results: "Buffers") -> None:
+    def take(self, results: Buffers) -> None:
         """Write the results of a step."""
         for buffer, result in zip(self, results, strict=True):
             buffer[...] = result

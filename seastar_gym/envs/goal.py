@@ -1,5 +1,7 @@
 """Goal form of the environment of one robot, for learners that change goals in hindsight (HER)."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from typing import Any
 

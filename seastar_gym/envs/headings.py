@@ -8,6 +8,8 @@ What is left to turn is known by the shortest way round, from one heading to the
 positive. It does not depend on which limb is called limb 1. A turn of the world leaves it, a mirror changes its sign.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from typing import Literal

@@ -29,6 +29,8 @@ With a `Sight`, fewer stations may be seen, or none, and further entries after t
 the last two pictures, and the age of the last one, see `entries_of` in sight.py.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -83,7 +85,7 @@ class Layout:
             raise ValueError(f"entries must be a tuple of {', '.join(get_args(Entry))}, not {shown(self.entries)}.")
 
     @classmethod
-    def of(cls, scene: Scene, observe_actuators: bool = True, entries: tuple[Entry, ...] = ()) -> "Layout":
+    def of(cls, scene: Scene, observe_actuators: bool = True, entries: tuple[Entry, ...] = ()) -> Layout:
         """Layout for the robot of a scene, with the memory of its actuators or without."""
         return cls(scene.robot.n_limbs, memory_size(scene.actuator) if observe_actuators else 0, entries)
 

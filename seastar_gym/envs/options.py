@@ -1,5 +1,7 @@
 """Options that all environments share, checked once, and the scene that they mean."""
 
+from __future__ import annotations
+
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

@@ -13,6 +13,8 @@ A path of one's own needs no name: environments take arrays of waypoints. With a
     env = gym.make("SeastarSwim-v0", path="zigzag")
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias

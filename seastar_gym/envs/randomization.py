@@ -1,5 +1,7 @@
 """Robots and waters that differ from episode to episode."""
 
+from __future__ import annotations
+
 import itertools
 import math
 from collections.abc import Mapping, Sequence
@@ -131,7 +133,7 @@ class DomainRandomization:
         return hash(tuple(self.distributions.items()))
 
     @property
-    def late(self) -> dict[str, "Distribution"]:
+    def late(self) -> dict[str, Distribution]:
         """Distributions of what is no number of a scene: of a sight, and of the delay of actions."""
         return {name: one for name, one in self.distributions.items() if name == ACTION_DELAY or _is_of_sight(name)}
 

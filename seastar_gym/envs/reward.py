@@ -1,5 +1,7 @@
 """The reward: a sum of named terms, and the route along which progress counts."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 

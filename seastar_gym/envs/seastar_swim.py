@@ -1,7 +1,9 @@
 """`SeastarSwim-v0`: the environment of one robot. Its docstring is the contract that users read."""
 
 from collections import deque
+from functools import cache
 from typing import Any, Literal
+from weakref import WeakSet
 
 import gymnasium as gym
 import numpy as np
@@ -27,6 +29,9 @@ MOST_FRAMES = 100
 """Largest number of pictures that wait for `render`, or those of one decision if they are more; 2 MB each."""
 ROUNDING = 1e-9
 """Fraction of a time that is no time."""
+MANY = 4
+"""Environments of one robot that are open in a process at once, at which it is told that a batch is faster."""
+_open: WeakSet[gym.Env[Any, Any]] = WeakSet()
 Observation = NDArray[np.float32]
 RenderMode = Literal["human", "rgb_array", "rgb_array_list"]
 
@@ -291,6 +296,9 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         self._frames: deque[NDArray[np.uint8]] = deque(maxlen=max(MOST_FRAMES, self.frames_per_stroke + 1))
         self._renderer: Renderer | None = None
         self._is_made = True
+        _open.add(self)
+        if len(_open) >= MANY:
+            _tell_of_batches()
 
     @property
     def waypoints(self) -> NDArray[np.float64]:
@@ -391,6 +399,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
 
     def close(self) -> None:
         """Close the window, if there is one, and end the simulator's threads."""
+        _open.discard(self)
         self.simulator.close()
         if self._renderer is not None:
             self._renderer.close()
@@ -398,6 +407,16 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_renderer": None}
+
+
+@cache
+def _tell_of_batches() -> None:
+    """One sentence per process."""
+    gym.logger.warn(
+        f"{MANY} environments of one robot are open in this process, stepped one after the other: gym.make_vec(id, "
+        'num_envs=128, vectorization_mode="vector_entry_point") steps 128 robots in one compiled call, which '
+        "seastar_gym.adapters.stable_baselines3.BatchVecEnv hands to Stable-Baselines3."
+    )
 
 
 def frames_of_a_decision(task: Swimming) -> int:

@@ -1,5 +1,7 @@
 """`Sight`: what a camera sees of the robots, how often, how late, and with which errors."""
 
+from __future__ import annotations
+
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass

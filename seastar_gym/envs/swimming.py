@@ -10,6 +10,8 @@ is scored:
     _task_info(hub)             entries of info that belong to the task
 """
 
+from __future__ import annotations
+
 import functools
 import operator
 from abc import ABC, abstractmethod

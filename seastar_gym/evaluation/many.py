@@ -1,5 +1,7 @@
 """Many swims side by side, nominal or disturbed."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit, require_policy

@@ -7,6 +7,8 @@
     found.success.mean(), found.last("time")
 """  # fmt: skip
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 

@@ -1,5 +1,7 @@
 """Means and their intervals by bootstrap, over swims, episodes, paths, and seeds of trainings."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -1,5 +1,7 @@
 """One agent swims one episode: `swim`, and what can be measured on it afterwards."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

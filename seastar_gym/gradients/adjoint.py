@@ -1,5 +1,7 @@
 """`record` and `gradient`: the gradient of a number of a swim in all unknowns, by one sweep back through the swim."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from threading import RLock
 from typing import NamedTuple
@@ -9,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.report import MOMENTS, REPORT_ROWS, SMALLEST_HUB_T, WORK
-from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
+from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.gradients.history import (
     CAPACITY,
@@ -36,6 +38,7 @@ from seastar_gym.gradients.swim import (
 )
 from seastar_gym.gradients.unknowns import OF_START, Rotations, Start, Unknown, slope_in_number, start_of, unknowns_of
 from seastar_gym.model.rods import make_limits, make_rods
+from seastar_gym.model.schemes import scheme_for
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_floats, require_callable, shown
 from seastar_gym.simd.lanes import N_LANES
@@ -101,7 +104,7 @@ def gradient(
     return Gradient(float(value), record_of_swim.swim, found, record_of_swim.status, record_of_swim.sentence)
 
 
-def record(scene: Scene, commands: ArrayLike, state: State | None = None, duration: float | None = None) -> "Record":
+def record(scene: Scene, commands: ArrayLike, state: State | None = None, duration: float | None = None) -> Record:
     """Swim with these commands, and keep the time steps, for gradients of the swim.
 
     Arguments are those of `differentiate`.
@@ -122,7 +125,7 @@ class Record:
     def __init__(self, scene: Scene, commands: Floats, state: State | None, duration: float):
         self._scene, self._commands, self._state, self._duration = scene, commands, state, duration
         self._rods, self._limits = make_rods(scene), make_limits(scene)
-        self._scheme = scheme_of(scene.numerics.scheme, scene.numerics.damping)
+        self._scheme = scheme_for(scene)
         self._n_limbs = scene.robot.n_limbs
         self._held = np.array([2 * node + axis for node in scene.held_nodes for axis in (0, 1)], dtype=int)
         self._start = start_of(scene, state)

@@ -1,5 +1,7 @@
 """`differentiate`: a swim of one robot, and its derivatives in numbers of the scene, commands and the start."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -8,13 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.report import MOMENTS, REPORT_ROWS, SMALLEST_HUB_T, WORK
-from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
+from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.gradients.kernels import advance_slopes
 from seastar_gym.gradients.memory import widened
 from seastar_gym.gradients.stencils import arrays_of
 from seastar_gym.gradients.unknowns import Rotations, Start, slopes_of_start, strengths_of, unknowns_of
 from seastar_gym.model.rods import make_limits, make_rods
+from seastar_gym.model.schemes import scheme_for
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_finite, require_kind, require_texts
 from seastar_gym.scene.numerics import require_duration
@@ -128,6 +131,8 @@ def checked_swim(scene: Scene, commands: ArrayLike, duration: float | None) -> t
     require_kind("scene", scene, Scene, "a Scene")
     if scene.n_robots is not None:
         raise ValueError("Derivatives need the scene of one robot, such as scene.of_robot(0).")
+    if scene.terms:
+        raise ValueError("Derivatives know the package's terms alone: leave out Scene.terms, or take differences.")
     told = as_finite("commands", commands, (None, scene.robot.n_limbs))
     length = scene.actuator.period if duration is None else duration
     require_duration(length, scene.numerics.step)
@@ -147,7 +152,7 @@ class _Group:
     """A robot in N_LANES lanes, with a direction in each. columns: Of the slopes that its lanes carry."""
 
     def __init__(self, scene: Scene, start: Start, slopes: Start, columns: slice):
-        self._columns, self._scheme = columns, scheme_of(scene.numerics.scheme, scene.numerics.damping)
+        self._columns, self._scheme = columns, scheme_for(scene)
         one, n_limbs = make_rods(scene), scene.robot.n_limbs
         self._rods = widened(side_by_side([one] * N_LANES), 2 * N_LANES)
         for rows, rise in zip(arrays_of(self._rods), slopes.coefficients, strict=True):

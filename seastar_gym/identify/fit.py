@@ -10,6 +10,8 @@ A delay between the logs, of a camera whose clock is not that of the commands, i
 [s]: simulated trajectories are interpolated at the times of the pictures less the delay.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from contextlib import suppress

@@ -1,5 +1,7 @@
 """`Measurement`: measured positions of a robot's nodes, with the commands of its strokes, from CSV files and back."""
 
+from __future__ import annotations
+
 import math
 import re
 from dataclasses import dataclass
@@ -71,7 +73,7 @@ class Measurement:
             require_command_times(self.command_times, len(self.commands))
 
     @classmethod
-    def from_csv(cls, trajectory: str | Path, commands: str | Path) -> "Measurement":
+    def from_csv(cls, trajectory: str | Path, commands: str | Path) -> Measurement:
         """Measurement from two CSV files, whose form `seastar identify --help` shows."""
         require_file("trajectory", trajectory)
         require_file("commands", commands)

@@ -1,7 +1,10 @@
 """Parameters: positive numbers of a scene, read and replaced by name."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import is_dataclass
+from typing import Any, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +15,7 @@ from seastar_gym.scene.per_robot import MISSING, at, numbers_of, with_numbers
 
 Floats = NDArray[np.float64]
 
-COUNTS = (int, "int", int | Any)
+COUNTS = (int, int | Any)
 """Types of fields that are counts, which nobody fits."""
 
 
@@ -29,8 +32,8 @@ def get_parameter(scene: Scene, name: str) -> float:
 def _found(scene: Scene, name: str) -> Any:
     """What a name stands for; MISSING for nothing, and for counts."""
     owner, _, last = name.rpartition(".")
-    field = getattr(at(scene, owner), "__dataclass_fields__", {}).get(last)
-    is_count = field is not None and getattr(field.type, "__origin__", field.type) in COUNTS
+    part = type(at(scene, owner))
+    is_count = is_dataclass(part) and get_type_hints(part).get(last) in COUNTS
     known = name.split(".")[0] in ("robot", "fluid", "actuator", "contact") and not is_count
     return at(scene, name) if known else MISSING
 

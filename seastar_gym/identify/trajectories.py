@@ -1,5 +1,7 @@
 """Simulated trajectories of nodes, at the times of a measurement."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor

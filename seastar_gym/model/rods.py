@@ -21,6 +21,7 @@ from seastar_gym.der.terms import (
     hub,
     inertia,
     load,
+    own,
     stretching,
 )
 from seastar_gym.model.body import body_rim, make_body
@@ -70,6 +71,8 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         mass, at_nodes = on_body.mass(mass), on_body.drag(mesh, at_nodes)
         loads = on_body.loads(loads)
     inertia.hold(mass, scene.held_nodes)
+    terms = own.coefficients([chosen(term, itemgetter(index)) for term in scene.terms], mesh)
+    all_scales = scales.coefficients(mesh, stretched, robot.density, water.density, C_d, mass, scene.held_nodes)
     n_free = len(mesh.dl) + robot.has_body
     return Rods(
         n_limbs=mesh.n_limbs,
@@ -97,12 +100,13 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         damping=damping.coefficients(robot.relaxation_time),
         current=None if water.current is None else current_rows(water.current),
         load=loads,
+        own=terms,
         contact=None
         if touch is None
         else contact.coefficients(
             mesh, robot.limbs_that_may_touch(), touch.modulus, touch.opening_angle, rim, touch.layer
         ),
-        scales=scales.coefficients(mesh, stretched, robot.density, water.density, C_d, mass, scene.held_nodes),
+        scales=all_scales if terms is None else scales.of_unknown_forces(all_scales),
         body=None if on_body is None else on_body.coefficients,
     )
 

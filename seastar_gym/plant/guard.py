@@ -1,5 +1,7 @@
 """`Guard`: what stands between a policy and wires that burn."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass

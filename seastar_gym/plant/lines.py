@@ -3,6 +3,8 @@
 docs/plant.md has the table of all lines. Every line ends with the checksum of NMEA: * and two hexadecimal digits.
 """
 
+from __future__ import annotations
+
 import contextlib
 import errno
 import math

@@ -1,5 +1,7 @@
 """`Plant`: what can be asked of a robot in a tank."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 

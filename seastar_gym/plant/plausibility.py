@@ -1,5 +1,7 @@
 """`Plausibility`: whether a robot can be where a tracker says that it is."""
 
+from __future__ import annotations
+
 import math
 from collections import deque
 from collections.abc import Sequence

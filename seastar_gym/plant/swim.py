@@ -1,5 +1,7 @@
 """`PlantSwim`: the environment in which policies drive a plant."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager

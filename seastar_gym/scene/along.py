@@ -1,5 +1,7 @@
 """`AlongLimb` and `Stiffening`: actuators that act on limbs along their length, on natural curvature and stiffness."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Annotated
 

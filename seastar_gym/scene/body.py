@@ -1,7 +1,9 @@
 """`Body`: a rigid body between the limbs of a robot, and `Attachment`: where and how a limb is clamped to it."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 
@@ -12,6 +14,9 @@ from seastar_gym.scene.serial import register_part
 
 GIVEN_DRAG = ("drag_along", "drag_across", "drag_turning")
 GIVEN_FLUID = ("added_mass_along", "added_mass_across", "added_mass_turning")
+
+
+Coefficient: TypeAlias = Annotated[Numbers | None, not_negative("1")]
 
 
 @register_part
@@ -69,13 +74,13 @@ class Body:
     mass: Annotated[Numbers | None, not_negative("kg")] = None
     inertia: Annotated[Numbers | None, not_negative("kg m^2")] = None
     centre_of_mass: tuple[float, float] | None = None
-    drag_coefficient: Annotated[Numbers | None, not_negative("1")] = None
-    drag_along: Annotated[Numbers | None, not_negative("1")] = None
-    drag_across: Annotated[Numbers | None, not_negative("1")] = None
-    drag_turning: Annotated[Numbers | None, not_negative("1")] = None
-    added_mass_along: Annotated[Numbers | None, not_negative("1")] = None
-    added_mass_across: Annotated[Numbers | None, not_negative("1")] = None
-    added_mass_turning: Annotated[Numbers | None, not_negative("1")] = None
+    drag_coefficient: Coefficient = None
+    drag_along: Coefficient = None
+    drag_across: Coefficient = None
+    drag_turning: Coefficient = None
+    added_mass_along: Coefficient = None
+    added_mass_across: Coefficient = None
+    added_mass_turning: Coefficient = None
     attachments: tuple[Attachment, ...] = ()
 
     def __post_init__(self) -> None:
@@ -102,7 +107,7 @@ class Body:
             raise ValueError("outline must go round a convex polygon once, anti-clockwise, with the hub (0, 0) inside.")
 
     @classmethod
-    def rectangle(cls, length: float, width: float, **others: Any) -> "Body":
+    def rectangle(cls, length: float, width: float, **others: Any) -> Body:
         """Body with a rectangular outline around the hub, `length` along x and `width` along y [m]."""
         require_number("length", length, "m")
         require_number("width", width, "m")

@@ -1,5 +1,7 @@
 """`Contact`: forces between limbs that touch each other or a body."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Annotated
 

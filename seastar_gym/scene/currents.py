@@ -1,5 +1,7 @@
 """Currents: velocity fields of the fluid. Some numbers may differ from robot to robot, see per_robot.py."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -106,7 +108,7 @@ class GridCurrent:
         x: tuple[float, float],
         y: tuple[float, float],
         spacing: float,
-    ) -> "GridCurrent":
+    ) -> GridCurrent:
         """Sample a function on the rectangle from x[0] to x[1] and from y[0] to y[1] [m].
 
         function: Velocity (u_x, u_y) [m/s] at arrays x, y [m] of one shape. It may return numbers where the velocity

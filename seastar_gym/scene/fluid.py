@@ -1,5 +1,7 @@
 """`Water`: the fluid around the robot."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Annotated
 

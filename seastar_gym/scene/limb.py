@@ -1,8 +1,10 @@
 """`Limb`: a limb that differs from the robot's others, with profiles along its length."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, fields
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,12 @@ from seastar_gym.scene.section import AnySection, Cut, cuts
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
+
+
+Length: TypeAlias = Annotated[Numbers | None, positive("m", "A limb's ")]
+Radius: TypeAlias = Annotated[Profile | Numbers | None, positive("m", "A limb's ")]
+Modulus: TypeAlias = Annotated[Profile | Numbers | None, positive("Pa", "A limb's ")]
+JointStiffness: TypeAlias = Annotated[Numbers | None, positive("N m/rad", "A limb's ")]
 
 
 @register_part
@@ -34,11 +42,11 @@ class Limb:
     """
 
     direction: float | None = None
-    length: Annotated[Numbers | None, positive("m", "A limb's ")] = None
-    radius: Annotated[Profile | Numbers | None, positive("m", "A limb's ")] = None
-    youngs_modulus: Annotated[Profile | Numbers | None, positive("Pa", "A limb's ")] = None
+    length: Length = None
+    radius: Radius = None
+    youngs_modulus: Modulus = None
     natural_curvature: Annotated[Numbers, finite("1/m")] = 0.0
-    joint_stiffness: Annotated[Numbers | None, positive("N m/rad", "A limb's ")] = None
+    joint_stiffness: JointStiffness = None
     section: AnySection | None = None
 
     def __post_init__(self) -> None:

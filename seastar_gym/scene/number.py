@@ -118,7 +118,7 @@ class Declared(NamedTuple):
 def declared(kind: Hashable) -> dict[str, Declared]:
     """Numbers that the annotations of a dataclass declare, by the names of its fields; none of other classes."""
     own = fields(kind) if is_dataclass(kind) else ()
-    hints = get_type_hints(kind, include_extras=True) if any("Annotated" in str(each.type) for each in own) else {}
+    hints = get_type_hints(kind, include_extras=True) if own else {}
     found = {}
     for field in own:
         for number in getattr(hints.get(field.name), "__metadata__", ()):

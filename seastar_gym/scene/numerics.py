@@ -1,5 +1,7 @@
 """`Numerics`: scheme, step and tolerances of time stepping, chosen by value or by preset."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Literal, NamedTuple, get_args
 
@@ -10,6 +12,8 @@ from seastar_gym.scene.serial import register_part
 from seastar_gym.scene.summary import html_table, short_repr
 
 SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
+SCHEME_NAMES: list[str] = [*get_args(SchemeName)]
+"""Schemes that a scene may name: those of the package, and what `register_scheme` adds."""
 Fidelity = Literal["fast", "balanced", "accurate", "reference", "chapter"]
 
 MAX_STEPS = 10_000_000
@@ -30,7 +34,8 @@ Strokes with adapted steps in vacuum may need half of it.
 class Numerics:
     """Settings of time stepping.
 
-    scheme: Implicit Runge-Kutta scheme. "implicit-euler" is the chapter's (13.9).
+    scheme: Implicit Runge-Kutta scheme: "implicit-euler" (the chapter's, (13.9)), "sdirk2", "sdirk3",
+        "implicit-midpoint", or the name of one of your own, see `register_scheme`.
     step: Time step h [s]. The last step before a corner of the actuation is shortened.
     newton_tolerance: Newton stops when the largest displacement of a node in an update is below this fraction of the
         limb length. If quadratic convergence foretells that the next update would be, it is skipped.
@@ -46,7 +51,7 @@ class Numerics:
         may replace. It does not count in comparisons.
     """
 
-    scheme: SchemeName = "implicit-euler"
+    scheme: SchemeName | str = "implicit-euler"
     step: Annotated[float, positive("s")] = 3e-3
     newton_tolerance: Annotated[float, positive("limb lengths")] = 1e-8
     max_iterations: Annotated[int, whole(2, 10_000)] = 60
@@ -56,7 +61,7 @@ class Numerics:
 
     def __post_init__(self) -> None:
         require_flag("named", self.named)
-        require_choice("scheme", self.scheme, get_args(SchemeName))
+        require_choice("scheme", self.scheme, tuple(SCHEME_NAMES))
         check_numbers(self)
         if self.newton_tolerance > 1e-2:
             raise ValueError(f"newton_tolerance must be at most 0.01 limb lengths, not {shown(self.newton_tolerance)}.")
@@ -75,7 +80,7 @@ class Numerics:
         return html_table("Numerics", ("setting", "value"), rows)
 
     @classmethod
-    def preset(cls, fidelity: Fidelity) -> "Numerics":
+    def preset(cls, fidelity: Fidelity) -> Numerics:
         """Numerics of a fidelity: "fast", "balanced", "accurate", "reference", or "chapter" for those of the chapter.
 
         What a fidelity promises holds with its nodes per limb and its discretisation: `Scene.preset` chooses them, too.

@@ -1,5 +1,7 @@
 """`Seastar`: a robot of limbs around a hub."""
 
+from __future__ import annotations
+
 import itertools
 import math
 from collections.abc import Sequence
@@ -106,7 +108,7 @@ class Seastar:
         if not is_named(self.nodes_per_limb):
             object.__setattr__(self, "nodes_per_limb", UnnamedCount(NODES[self.discretisation]))
 
-    def resolved(self, discretisation: Discretisation, nodes_per_limb: int) -> "Seastar":
+    def resolved(self, discretisation: Discretisation, nodes_per_limb: int) -> Seastar:
         """Robot with a discretisation and its nodes per limb as far as it names none itself."""
         named, nodes = self.named_resolution
         own = discretisation if named is None else named

@@ -5,6 +5,8 @@ that says why in one sentence. Those of the type `Numbers` may be arrays of shap
 of a batch.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, replace
@@ -29,7 +31,7 @@ from seastar_gym.scene.checks import (
 )
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.fluid import Water
-from seastar_gym.scene.number import as_tuple
+from seastar_gym.scene.number import as_tuple, check_numbers
 from seastar_gym.scene.numerics import DEFAULT, DEFAULT_FIDELITY, MAX_STEPS, PRESETS, Fidelity, Numerics
 from seastar_gym.scene.per_robot import batch_size, chosen
 from seastar_gym.scene.robot import Seastar
@@ -37,6 +39,7 @@ from seastar_gym.scene.section import Disc
 from seastar_gym.scene.serial import from_dict, register_part, to_dict
 from seastar_gym.scene.shape import cross_at_rest, n_hub_hinges, natural_hub_angle, turn_per_hinge
 from seastar_gym.scene.summary import scene_html, short_repr
+from seastar_gym.scene.terms import is_term
 
 if TYPE_CHECKING:
     from seastar_gym.accuracy import Certificate
@@ -60,6 +63,7 @@ class Scene:
     contact: Contact between limbs, and with a body. None lets limbs pass through each other, as in the chapter.
     gravity: Gravitational acceleration in the plane (g_x, g_y) [m/s^2]. Limbs feel their weight minus the buoyancy of
         the fluid that they displace. None means no gravity in the plane.
+    terms: Forces of your own, of classes that `register_term` has registered.
 
     >>> from dataclasses import replace
     >>> from seastar_gym import Scene, Seastar, UniformCurrent, Water
@@ -82,6 +86,7 @@ class Scene:
     limb_strengths: tuple[float, ...] = ()
     contact: Contact | None = None
     gravity: tuple[float, float] | None = None
+    terms: tuple[Any, ...] = ()
 
     def __post_init__(self) -> None:
         for name, value, kinds in (
@@ -95,6 +100,7 @@ class Scene:
         if not is_actuator(self.actuator):
             raise ValueError(f"Scene.actuator must be an Actuator such as SmaPulse(), not {shown(self.actuator)}.")
         check_actuator(self.actuator)
+        self._check_terms()
         batch_size(self)
         self._check_hub_hinges()
         self._check_strengths()
@@ -130,6 +136,17 @@ class Scene:
                 raise ValueError(f"gravity must be two numbers (g_x, g_y) [m/s^2], not {shown(self.gravity)}.")
         for node in (*self.held_nodes, *(load[0] for load in self.loads)):
             require_count("a held or loaded node", node, 0, self.robot.n_nodes - 1)
+
+    def _check_terms(self) -> None:
+        if not isinstance(self.terms, tuple) or not all(map(is_term, self.terms)):
+            raise ValueError(
+                f"Scene.terms must be a tuple of terms of classes that seastar_gym.register_term has registered, not "
+                f"{shown(self.terms)}."
+            )
+        for term in self.terms:
+            check_numbers(term, f"{type(term).__name__}.")
+        if self.terms and self.robot.has_body:
+            raise ValueError("Own terms act on the nodes of limbs, and know of no body: use a robot whose limbs meet.")
 
     def _check_contact(self) -> None:
         if self.contact is None:
@@ -291,7 +308,7 @@ class Scene:
                 )
 
     @classmethod
-    def preset(cls, fidelity: Fidelity) -> "Scene":
+    def preset(cls, fidelity: Fidelity) -> Scene:
         """The chapter's robot and water with the nodes per limb, discretisation and numerics of a fidelity.
 
         "fast", "balanced", "accurate" and "reference" are of the continuum, "chapter" is the chapter's discretisation.
@@ -304,7 +321,7 @@ class Scene:
         discretisation, nodes_per_limb, numerics = PRESETS[fidelity]
         return cls(Seastar(nodes_per_limb=nodes_per_limb, discretisation=discretisation), numerics=numerics)
 
-    def at(self, fidelity: Fidelity | None = None) -> "Scene":
+    def at(self, fidelity: Fidelity | None = None) -> Scene:
         """Scene with the nodes per limb, discretisation and numerics of a fidelity, as far as it names none itself.
 
         Held and loaded nodes are counted on a mesh, so a scene with any keeps its own. ValueError where scene and
@@ -331,8 +348,8 @@ class Scene:
         error: float,
         any_gait: bool = False,
         robot: Seastar | None = None,
-        certificate: "Certificate | str | PathLike[str] | None" = None,
-    ) -> "Scene":
+        certificate: Certificate | str | PathLike[str] | None = None,
+    ) -> Scene:
         """Scene at the fastest measured setting whose path error is at most `error`.
 
         The error is that of the hub's path against infinitely many nodes and infinitely short steps, as a fraction of
@@ -369,7 +386,7 @@ class Scene:
         return to_dict(self)
 
     @classmethod
-    def from_dict(cls, data: object) -> "Scene":
+    def from_dict(cls, data: object) -> Scene:
         """Scene of the plain data that `to_dict` returned. ValueError for anything else."""
         return from_dict(data, cls)
 
@@ -378,7 +395,7 @@ class Scene:
         """Number of robots for which the scene has numbers, or None if it suits any number."""
         return batch_size(self)
 
-    def of_robot(self, index: int) -> "Scene":
+    def of_robot(self, index: int) -> Scene:
         """Scene of one robot of a batch."""
         return chosen(self, itemgetter(index))
 

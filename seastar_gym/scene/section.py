@@ -3,6 +3,8 @@
 Every number may be a profile along the limb, or differ from robot to robot, as `Limb.radius` may.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import math
 from dataclasses import dataclass
@@ -40,6 +42,15 @@ class Cut(NamedTuple):
     width: float
     added: float
     reach: float
+
+
+Width: TypeAlias = Annotated[Profile | Numbers, positive("m", "A section's ")]
+Area: TypeAlias = Annotated[Profile | Numbers, positive("m^2", "A section's ")]
+SecondMoment: TypeAlias = Annotated[Profile | Numbers | None, positive("m^4", "A section's ")]
+AddedArea: TypeAlias = Annotated[Profile | Numbers | None, positive("m^2", "A section's ")]
+Stiffness: TypeAlias = Annotated[Profile | Numbers | None, positive("N m^2", "A section's ")]
+MassPerLength: TypeAlias = Annotated[Profile | Numbers | None, positive("kg/m", "A section's ")]
+HalfWidth: TypeAlias = Annotated[Profile | Numbers | None, positive("m", "A section's ")]
 
 
 @register_part
@@ -121,13 +132,13 @@ class Section:
         projected width.
     """
 
-    area: Annotated[Profile | Numbers, positive("m^2", "A section's ")]
-    second_moment: Annotated[Profile | Numbers | None, positive("m^4", "A section's ")]
-    projected_width: Annotated[Profile | Numbers, positive("m", "A section's ")]
-    added_area: Annotated[Profile | Numbers | None, positive("m^2", "A section's ")] = None
-    bending_stiffness: Annotated[Profile | Numbers | None, positive("N m^2", "A section's ")] = None
-    mass_per_length: Annotated[Profile | Numbers | None, positive("kg/m", "A section's ")] = None
-    half_width: Annotated[Profile | Numbers | None, positive("m", "A section's ")] = None
+    area: Area
+    second_moment: SecondMoment
+    projected_width: Width
+    added_area: AddedArea = None
+    bending_stiffness: Stiffness = None
+    mass_per_length: MassPerLength = None
+    half_width: HalfWidth = None
 
     def __post_init__(self) -> None:
         check_numbers(self)

@@ -187,6 +187,12 @@ class _DigestCache(FunctionCache):
     class _impl_class(FunctionCache._impl_class):  # noqa: N801 - numba's own name
         _locator_classes = (_DigestLocator,)
 
+        def reduce(self, cres):
+            """Without the environments of kernels, for which numba would import the modules of their files, also a
+            user's: kernels need none, and modules may not be there or be another user's of that name."""
+            *parts, environments = super().reduce(cres)
+            return *parts, tuple(each for each in environments if each is cres.environment)
+
     def __init__(self, py_func):
         super().__init__(py_func)
         stamp = self._impl.locator.get_source_stamp()

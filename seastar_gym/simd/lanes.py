@@ -154,7 +154,7 @@ def _borrowed(field):
         return None if None in fields else Bundle(tuple(fields), field.instance_class)
     if isinstance(field, types.NoneType):
         return absent
-    return field if isinstance(field, types.Number | types.Boolean) else None
+    return field if isinstance(field, types.Number | types.Boolean | types.Opaque) else None
 
 
 def _borrow_value(context, builder, field, value):

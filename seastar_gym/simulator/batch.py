@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from seastar_gym.der.energy import energies, energies_in_water
 from seastar_gym.der.rods import Work, make_work
 from seastar_gym.der.stepping.report import COVERED, MOMENTS, PEAK_MOMENT, REPORT_ROWS, SMALLEST_HUB_T, WORK
-from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
+from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
+from seastar_gym.model.schemes import scheme_for
 from seastar_gym.scene import Scene
 from seastar_gym.simd.dispatch import KnownCode
 from seastar_gym.simd.lanes import N_LANES
@@ -59,7 +60,7 @@ class Batch:
         self._known_parts: dict[bool, list[slice]] = {}  # by whether coefficients are shared
         self._code = KnownCode()
         n_groups, n_limbs, n_rows = -(-n_robots // N_LANES), scene.robot.n_limbs, 2 * scene.robot.n_nodes
-        self._scheme = scheme_of(scene.numerics.scheme, scene.numerics.damping)
+        self._scheme = scheme_for(scene)
         self.coefficients = Coefficients(scene, n_robots)
         self.n_node_rows = n_rows
         body = self.coefficients.rods(0).body

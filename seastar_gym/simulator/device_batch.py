@@ -51,6 +51,8 @@ class DeviceBatch(Batch):
     def __init__(self, scene: Scene, n_robots: int, name: str, effort: bool):
         if config.DISABLE_JIT:
             raise ValueError('With NUMBA_DISABLE_JIT=1 nothing is compiled, and devices have no code: use "cpu".')
+        if scene.terms:
+            raise ValueError('Own terms (Scene.terms) are compiled for the processor alone: use device="cpu".')
         self._device = DEVICES[name]
         self._arrays = self._device.arrays()
         self._on_host: dict[str, Floats] = {}

@@ -1,5 +1,7 @@
 """`Drive`: the actuators of a batch of robots, from commands, which are checked here, to rotations of limbs."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -12,6 +12,8 @@ error in about 95 % of strokes of the robot that needs the largest, as `python -
 055100c4 measured (docs/numerics.md).
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import NamedTuple, Protocol
 
@@ -20,14 +22,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
-from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.scene.per_robot import column
 from seastar_gym.simulator.state import State
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-FACTORS: dict[SchemeName, float] = {
+FACTORS: dict[str, float] = {
     "implicit-midpoint": 4.5, "sdirk2": 5.0, "sdirk3": 7.5, "implicit-euler": 9.0,
 }  # fmt: skip
 """Estimate over distance of the two hubs."""
@@ -69,6 +70,11 @@ def twin_scene(scene: Scene) -> Scene:
         raise ValueError(f"A Scene is needed, not {shown(scene)}.")
     if scene.held_nodes or scene.loads:
         raise ValueError(OF_ONE_MESH)
+    if scene.numerics.scheme not in FACTORS:
+        raise ValueError(
+            f"Nobody has measured how far the twin's errors go with the scheme {shown(scene.numerics.scheme)}: use "
+            f"error_bars=False, or one of {', '.join(map(repr, FACTORS))}."
+        )
     robot = replace(scene.robot, nodes_per_limb=2 * scene.robot.nodes_per_limb - 1)
     numerics = replace(scene.numerics, step=0.5 * scene.numerics.step, path_tolerance=None)
     return replace(scene, robot=robot, numerics=numerics)

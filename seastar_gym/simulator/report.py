@@ -1,5 +1,7 @@
 """`StrokeReport`: the solver's status and counts for every robot after an interval of time, such as a stroke."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Mapping, Sequence
 from enum import IntEnum

@@ -1,5 +1,7 @@
 """`Simulator`: a batch of robots of one scene, advanced by intervals of time, such as strokes."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from itertools import pairwise

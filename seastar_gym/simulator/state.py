@@ -1,5 +1,7 @@
 """`State`: positions, velocities, time and actuators of all robots of a simulator."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -37,12 +39,12 @@ class State(NamedTuple):
     orientation: Floats | None = None
     spin: Floats | None = None
 
-    def of_robots(self, robots: NDArray[np.intp] | NDArray[np.bool_] | slice) -> "State":
+    def of_robots(self, robots: NDArray[np.intp] | NDArray[np.bool_] | slice) -> State:
         """State of the chosen robots, in their order."""
         return State(*(None if part is None else part[robots] for part in self))  # type: ignore[arg-type]
 
     @classmethod
-    def joined(cls, states: "Sequence[State]") -> "State":
+    def joined(cls, states: Sequence[State]) -> State:
         """States of the same kind of robots as one, in their order. A part that is `None` in one is `None` in all."""
         parts = zip(*states, strict=True)
         return cls(*(None if any(part is None for part in each) else np.concatenate(each) for each in parts))  # type: ignore[arg-type]

@@ -4,6 +4,8 @@ An axis has the name of a number of the scene ("robot.limb_length", "numerics.st
 "fluid", "actuator", "numerics", "contact"), "fidelity" for the name of a preset, "gait" or "controller".
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, field, is_dataclass
 from typing import Any, TypeAlias
@@ -48,7 +50,7 @@ class Range:
             return np.clip(np.exp(low + share * (high - low)), self.low, self.high)
         return self.low + share * (self.high - self.low)
 
-    def spaced(self, n: int) -> "Choices":
+    def spaced(self, n: int) -> Choices:
         """Axis of n of its numbers, both ends included."""
         require_count("n", n, 1, MOST_VALUES)
         return Choices(self.name, tuple(self.at(np.linspace(0.0, 1.0, n)).tolist()))

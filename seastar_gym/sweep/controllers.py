@@ -1,5 +1,7 @@
 """Controllers of designs: policies by the names that `seastar evaluate` knows, and the path that they swim."""
 
+from __future__ import annotations
+
 import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,5 +1,7 @@
 """`Sweep`: designs of a grid or a Latin hypercube, and their batches, one after the other."""
 
+from __future__ import annotations
+
 import itertools
 import math
 from collections.abc import Iterator

@@ -1,5 +1,7 @@
 """Gaits by name, as the commands of a sweep's robots."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple

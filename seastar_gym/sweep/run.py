@@ -1,5 +1,7 @@
 """Runs the batches of a sweep that have no part yet, and writes their parts."""
 
+from __future__ import annotations
+
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field

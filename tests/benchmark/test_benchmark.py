@@ -287,7 +287,7 @@ def test_an_agent_with_a_bug_or_that_does_not_fit_does_not_cost_the_others_their
     (tmp_path / "a_bug.py").write_text("def make(env):\n    return 1 + 'one'\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     options = ["--tasks", SHORT, "--agents", agent, "rest", "--seeds", "2", "--out", str(tmp_path / "out")]
-    assert main([*options, "--fidelity", "fast", "--decisions", "2"]) == 0
+    assert main([*options, "--fidelity", "fast", "--decisions", "2"]) == 2
     assert f"{agent} does not swim {words}" in capsys.readouterr().err
     assert [entry.agent for entry in read(tmp_path / "out" / "results.json")] == ["rest"]
 

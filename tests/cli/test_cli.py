@@ -251,9 +251,9 @@ def test_the_keyboard_plays_in_a_window(dummy_window, monkeypatch, capsys):
 # Evaluation and training
 
 
-def compared(capsys, *options):
+def compared(capsys, *options, code=0):
     """Table of agents without its titles, as words, and what is said of those that are left out."""
-    assert main(["evaluate", *FAST, *options]) == 0
+    assert main(["evaluate", *FAST, *options]) == code
     said = capsys.readouterr()
     lines = said.out.splitlines()
     assert max(map(len, lines[:-1])) <= 80 and "of 1" in lines[3]
@@ -269,7 +269,7 @@ def test_agents_are_compared_in_a_table_and_files(folder, capsys):
         rows, _ = compared(capsys, "--scene", f"three{ending}", "--seconds", "2")
         assert [row[0] for row in rows] == ["greedy", "straight"]
     names = ["learned", "straight", "pentagon", "nobody", "none.zip"]
-    rows, left_out = compared(capsys, "--agents", *names, "--scene", "three.py", "--seconds", "2")
+    rows, left_out = compared(capsys, "--agents", *names, "--scene", "three.py", "--seconds", "2", code=2)
     assert [row[0] for row in rows] == ["straight"] and all(sentence.endswith(".") for sentence in left_out)
     out = [sentence.partition(" is left out: ")[0] for sentence in left_out]
     assert out == ["learned", "pentagon", "nobody", "none"]

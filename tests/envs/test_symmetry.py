@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from own_actuators import Remembering
+from own_terms import Trap
 from refusals import assert_refused
 from seastar_gym import (
     Attachment,
@@ -255,6 +256,7 @@ ASYMMETRIC = {
     "held": (Scene(STAR, held_nodes=(6,)), None, "held"),
     "loads": (Scene(STAR, loads=((0, 1e-4, 0.0),)), None, "loaded"),
     "gravity": (Scene(replace(STAR, density=1050.0), gravity=(0.0, -9.81)), None, "gravity"),
+    "own terms": (Scene(STAR, terms=(Trap(),)), None, "isotropic"),
     "uniform current": (Scene(STAR, Water(current=UniformCurrent(2e-3))), None, "current"),
     "shear": (Scene(STAR, Water(current=ShearCurrent(0.05))), None, "current"),
     "vortex": (Scene(STAR, Water(current=Vortex(1e-3))), None, "current"),

@@ -72,6 +72,16 @@ def coefficients(
     )
 
 
+def of_unknown_forces(scales: Scales) -> Scales:
+    """Scales where forces act of which no study measured how they curve the potential or drive the robot.
+
+    No Newton step is predictable, the guard looks at all steps of implicit Euler, and energies are judged in the
+    laboratory, where an energy of places stands still.
+    """
+    nothing = np.array([-np.inf])
+    return scales._replace(predictable=nothing, damped=nothing, held=True)
+
+
 class Limits(NamedTuple):
     """Tolerances and bounds of the solution of a stroke, that a scene names.
 

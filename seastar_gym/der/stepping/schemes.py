@@ -17,6 +17,7 @@ algebraically stable for d >= 0: two solutions of a dissipative problem never mo
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 
 class Scheme(NamedTuple):
@@ -47,6 +48,7 @@ def _scheme(a: list[list[float]], b: list[float] | None = None) -> Scheme:
     )
 
 
+CONSISTENT, GROWING = 1e-12, 1e-9  # rounding of b's sum, and of amplitudes
 _G2 = 1.0 - 0.5 * np.sqrt(2.0)
 _G3 = 0.43586652150845899942  # root of x^3 - 3 x^2 + 3/2 x - 1/6, Alexander (1977)
 
@@ -62,6 +64,35 @@ SCHEMES = {
     ),
     "implicit-midpoint": _scheme([[0.5]], [1.0]),  # order 2, keeps the amplitude of every oscillation
 }
+
+
+def tableau(A: ArrayLike, b: ArrayLike) -> Scheme:
+    """Scheme of a Butcher tableau. ValueError for what the stages of stages.py cannot solve, or what would blow up."""
+    rows, weights = np.asarray(A, dtype=float), np.asarray(b, dtype=float)
+    n = len(weights) if weights.ndim == 1 else 0
+    if not n or rows.shape != (n, n) or not np.isfinite([*rows.ravel(), *weights]).all():
+        raise ValueError("A tableau is finite numbers A of shape (n, n) and b of shape (n,), a row for each stage.")
+    if np.triu(rows, 1).any() or not (rows.diagonal() > 0.0).all():
+        raise ValueError(
+            "Stages are solved one after the other, each implicit: A must be zero above its diagonal, and positive on "
+            "it; Gauss's, Radau's, Lobatto's and explicit first stages cannot be."
+        )
+    if abs(weights.sum() - 1.0) > CONSISTENT:
+        raise ValueError(f"The numbers of b must add up to 1, or time runs at another speed, not {weights.sum():.6g}.")
+    growth = largest_growth(rows, weights)
+    if growth > 1.0 + GROWING:
+        raise ValueError(
+            f"This tableau is not A-stable: it multiplies the amplitude of some oscillation by {growth:.4g} in every "
+            "step, and limbs have oscillations of all frequencies."
+        )
+    return _scheme(rows.tolist(), None if np.array_equal(rows[-1], weights) else weights.tolist())
+
+
+def largest_growth(A: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """Largest |R(i y)| of an undamped oscillation in a step, with R(z) = 1 + z b (1 - z A)^-1 1."""
+    frequencies = np.geomspace(1e-2, 1e6, 2000)
+    one = np.ones(len(b))
+    return max(abs(1.0 + 1j * y * (b @ np.linalg.solve(np.eye(len(b)) - 1j * y * A, one))) for y in frequencies)
 
 
 def scheme_of(name: str, damping: float) -> Scheme:

@@ -11,6 +11,7 @@ from seastar_gym.der.star import tail_node
 from seastar_gym.der.terms.added_mass import freeze_added_mass
 from seastar_gym.der.terms.current import current_velocity
 from seastar_gym.der.terms.drag import add_cross_flow, drag_slopes, middle_drag_slopes
+from seastar_gym.der.terms.own import own_drag
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, splat, sqrt, store, subtract_product
 
@@ -71,6 +72,8 @@ def add_work_of_current(rods, work, v, h, frame, energy):
         c_speed = drag_slopes(load(rods.drag, node), wx, wy)[1]
         slopes = (zero, (c_speed * wx, c_speed * wy), (zero, zero, zero))
         fx, fy = add_cross_flow(rods, work.normals, node, wx, wy, 1.0, 1.0, slopes)[1]
+        if rods.own is not None:
+            fx, fy = own_drag(rods, node, wx, wy, fx, fy)
         power = subtract_product(power, fx, load(work.current, 2 * node) - frame[0])
         power = subtract_product(power, fy, load(work.current, 2 * node + 1) - frame[1])
     power = add_power_on_strips(rods, work, v, frame, power)

@@ -3,6 +3,8 @@
 A group is the number of limbs, which stands for all turns and mirrors of the regular polygon, or a `PointGroup`.
 """
 
+from __future__ import annotations
+
 from functools import cache
 from typing import Any
 

@@ -1,5 +1,7 @@
 """`Symmetry`: what a turned or mirrored robot sees, does and can follow; `FrameStack`: the same with its past."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any, get_args
@@ -72,7 +74,7 @@ class Symmetry:
             )
 
     @classmethod
-    def of(cls, scene: Scene, actions: Actions = "limbs") -> "Symmetry":
+    def of(cls, scene: Scene, actions: Actions = "limbs") -> Symmetry:
         """Symmetry of the robot of a scene that swims along waypoints."""
         mirror = memory_mirror(scene.actuator)
         return cls(symmetry_of(scene), mirror, Layout(scene.robot.n_limbs, len(mirror)), actions)

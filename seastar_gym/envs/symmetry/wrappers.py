@@ -3,6 +3,8 @@
 A robot has the sectors of its own symmetry, see the package's docstring.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -52,6 +54,9 @@ def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
         yield "nodes of limbs are held"
     if scene.loads:
         yield "its nodes are loaded"
+    for term in scene.terms:
+        if not getattr(term, "isotropic", False):
+            yield f"its own {type(term).__name__} does not say that turns and mirrors leave it (`isotropic = True`)"
     if scene.gravity is not None:
         yield "gravity has a direction"
     if scene.fluid is not None and scene.fluid.current is not None:

@@ -10,6 +10,8 @@ A course is eight numbers:
     7      angular velocity on the first circle, + is anti-clockwise        rad/s
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -1,5 +1,7 @@
 """`SeastarFailBlind-v0`: limbs that are dead, for a robot that does not see its limbs."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -72,7 +74,7 @@ class FailBlind(Challenge):
     dead: Annotated[int, whole(0, MOST_DEAD)] = 2
     reward: RewardWeights = RewardWeights()
 
-    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "FailBlindTask":
+    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> FailBlindTask:
         """The task of so many robots."""
         return FailBlindTask(self, options, n_robots, threads, split)
 

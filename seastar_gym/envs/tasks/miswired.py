@@ -1,5 +1,7 @@
 """`SeastarMiswired-v0`: limbs whose two wires may have been swapped."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -69,7 +71,7 @@ class Miswired(Challenge):
     swap_probability: Annotated[float, within(0.0, 1.0)] = 0.5
     reward: RewardWeights = RewardWeights()
 
-    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "MiswiredTask":
+    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> MiswiredTask:
         """The task of so many robots."""
         return MiswiredTask(self, options, n_robots, threads, split)
 

@@ -4,6 +4,8 @@ The splits share no episode: training draws one of two thousand million, testing
 number by the environment's own generator, or takes that of `options={"instance": number}`.
 """
 
+from __future__ import annotations
+
 from typing import Any, Literal, get_args
 
 import numpy as np

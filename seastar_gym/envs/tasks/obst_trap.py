@@ -1,5 +1,7 @@
 """`SeastarObstTrap-v0`: a goal behind discs, most of which may form a horseshoe."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
@@ -103,7 +105,7 @@ class ObstTrap(Challenge):
             raise ValueError(f"ObstTrap.distance must lie from {bounds}, not {self.distance}.")
         require_choice("ObstTrap.potential", self.potential, get_args(Potential))
 
-    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "ObstTrapTask":
+    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> ObstTrapTask:
         """The task of so many robots."""
         return ObstTrapTask(self, options, n_robots, threads, split)
 

@@ -1,5 +1,7 @@
 """`SeastarPrey-v0`: a prey that swims faster than the robot, on a course that comes back."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -87,7 +89,7 @@ class Prey(Challenge):
     catch: Annotated[float, not_negative("1")] = 10.0
     effort: Annotated[float, not_negative("1")] = 0.01
 
-    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "PreyTask":
+    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> PreyTask:
         """The task of so many robots."""
         return PreyTask(self, options, n_robots, threads, split)
 

@@ -1,5 +1,7 @@
 """`SeastarPrizes-v0`: prizes of different worth, more than can be reached in time."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -85,7 +87,7 @@ class Prizes(Challenge):
     prize: Annotated[float, not_negative("1")] = 5.0
     effort: Annotated[float, not_negative("1")] = 0.01
 
-    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "PrizesTask":
+    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> PrizesTask:
         """The task of so many robots."""
         return PrizesTask(self, options, n_robots, threads, split)
 

@@ -1,5 +1,7 @@
 """`SeastarSwimSimToReal-v0`: a robot that a late camera sees, and whose stiffness and drag nobody has measured."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 
 from seastar_gym.envs.options import SwimOptions
@@ -88,7 +90,7 @@ class SimToReal(Challenge):
     )
     reward: RewardWeights = RewardWeights()
 
-    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "SimToRealTask":
+    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> SimToRealTask:
         """The task of so many robots."""
         return SimToRealTask(self, options, n_robots, threads, split)
 

@@ -1,5 +1,7 @@
 """`SeastarStation-v0`: a place to keep in a current that shows in the velocities."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -80,7 +82,7 @@ class Station(Challenge):
     nearness: Annotated[float, not_negative("1")] = 100.0
     effort: Annotated[float, not_negative("1")] = 0.01
 
-    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "StationTask":
+    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> StationTask:
         """The task of so many robots."""
         return StationTask(self, options, n_robots, threads, split)
 

@@ -11,6 +11,8 @@ Where numbers of an actuator differ from robot to robot (see per_robot.py), curv
 (*t.shape, n_robots), and commands the shape (n_robots, n_limbs). Durations are equal for all robots of a batch.
 """
 
+from __future__ import annotations
+
 import math
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 

@@ -1,5 +1,7 @@
 """Heat that actuators are given, how long and at what electric power, and pairs of wires that are heated."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

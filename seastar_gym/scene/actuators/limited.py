@@ -1,5 +1,7 @@
 """`Limited`: an actuator with a largest angle and a largest rate of rotation."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Annotated
 

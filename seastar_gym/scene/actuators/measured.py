@@ -1,5 +1,7 @@
 """`MeasuredCurve`: an actuator given by measured angles at times."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -55,7 +57,7 @@ class MeasuredCurve(ActuatorBase):
         object.__setattr__(self, "angles", (0.0, *self.angles[1:-1], 0.0))
 
     @classmethod
-    def from_csv(cls, file: str | Path, detrend: bool = False, thin: float = 0.0) -> "MeasuredCurve":
+    def from_csv(cls, file: str | Path, detrend: bool = False, thin: float = 0.0) -> MeasuredCurve:
         """Curve from a CSV file with a time and an angle in every line.
 
         The first line may hold names with units, such as "time (ms),angle (deg)", else they are seconds and radians;
@@ -83,7 +85,7 @@ class MeasuredCurve(ActuatorBase):
             raise ValueError(f"{file}: {no_curve}") from None
 
     @classmethod
-    def from_curvatures(cls, file: str | Path, period: float, limb_length: float) -> "MeasuredCurve":
+    def from_curvatures(cls, file: str | Path, period: float, limb_length: float) -> MeasuredCurve:
         """Curve of limbs that are bent along their length, for `Seastar(along=AlongLimb())`.
 
         The limb bends by its change of curvature since phase 0 times its length. A line at phase 1, which is phase 0 of

@@ -1,5 +1,7 @@
 """`SmaPulse`: the shape memory alloy actuator of Fig. 13.5b, with linear ramps while it is heated and cools."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from typing import Annotated

@@ -19,9 +19,11 @@ curve is from its fit. The repeated pulse of any period follows from them, warm 
 repository `softmachineslab/frog`, which states no licence; the package has the fitted numbers alone.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, replace
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +67,10 @@ move them.
 """
 
 
+Widths: TypeAlias = Annotated[Numbers, positive("widths of the transformation")]
+Curvature: TypeAlias = Annotated[Numbers, not_negative("1/m")]
+
+
 @register_part
 @dataclass(frozen=True)
 class SmaLimb(WirePair):
@@ -91,14 +97,14 @@ class SmaLimb(WirePair):
     """
 
     peak_angle: Annotated[Numbers, not_negative("rad")] = math.pi / 5
-    rise: Annotated[Numbers, positive("widths of the transformation")] = MEASURED[0].rise
-    middle: Annotated[Numbers, positive("widths of the transformation")] = MEASURED[0].middle
+    rise: Widths = MEASURED[0].rise
+    middle: Widths = MEASURED[0].middle
     time_constant: Annotated[Numbers, positive("s")] = MEASURED[0].time_constant
     heating_time: Annotated[float, positive("s")] = MEASURED[0].heating_time
     delay: Annotated[float, not_negative("s")] = MEASURED[0].delay
     period: Annotated[float, positive("s")] = 1.0
-    rest_curvature: Annotated[Numbers, not_negative("1/m")] = MEASURED[0].rest_curvature
-    curvature_change: Annotated[Numbers, not_negative("1/m")] = MEASURED[0].curvature_change
+    rest_curvature: Curvature = MEASURED[0].rest_curvature
+    curvature_change: Curvature = MEASURED[0].curvature_change
     heating_power: Annotated[float, not_negative("W")] = WIRE_POWER
 
     def __post_init__(self) -> None:
@@ -119,7 +125,7 @@ class SmaLimb(WirePair):
         period: float | None = None,
         peak_angle: Numbers = math.pi / 5,
         limb_length: Numbers | None = None,
-    ) -> "SmaLimb":
+    ) -> SmaLimb:
         """Measured limb.
 
         liquid_metal: Volume fraction of liquid metal in its elastomer [%], one of MEASURED.

@@ -22,9 +22,11 @@ Latent heat, gradual transformation, natural convection or a shorter pulse reduc
 modelled. The defaults are effective numbers, not those of one alloy.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +42,10 @@ Floats = NDArray[np.float64]
 
 REACHED = 1e-9
 """Share of the largest rise in temperature that rounding may leave of it."""
+
+
+Celsius: TypeAlias = Annotated[Numbers, finite("deg C")]
+Seconds: TypeAlias = Annotated[float, positive("s")]
 
 
 @register_part
@@ -68,15 +74,15 @@ class ThermalSma(HeatingAndCooling, WirePair):
         "water_temperature", "martensite_finish", "austenite_start", "martensite_start", "austenite_finish",
     )  # fmt: skip
     peak_angle: Annotated[Numbers, not_negative("rad")] = math.pi / 5
-    heating_time: Annotated[float, positive("s")] = 0.1
-    cooling_time: Annotated[float, positive("s")] = 0.9
+    heating_time: Seconds = 0.1
+    cooling_time: Seconds = 0.9
     time_constant: Annotated[Numbers, positive("s")] = 0.42
     steady_rise: Annotated[Numbers, positive("K")] = 220.0
-    water_temperature: Annotated[Numbers, finite("deg C")] = 20.0
-    austenite_start: Annotated[Numbers, finite("deg C")] = 23.5
-    austenite_finish: Annotated[Numbers, finite("deg C")] = 70.5
-    martensite_start: Annotated[Numbers, finite("deg C")] = 56.0
-    martensite_finish: Annotated[Numbers, finite("deg C")] = 21.5
+    water_temperature: Celsius = 20.0
+    austenite_start: Celsius = 23.5
+    austenite_finish: Celsius = 70.5
+    martensite_start: Celsius = 56.0
+    martensite_finish: Celsius = 21.5
     largest_temperature: Annotated[Numbers | None, finite("deg C")] = None
     heating_power: Annotated[float, not_negative("W")] = WIRE_POWER
 

@@ -1,5 +1,7 @@
 """`SmaWires`: two shape memory alloy wires per limb with the linear heating and cooling of Fig. 13.5b."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from typing import Annotated
