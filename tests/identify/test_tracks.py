@@ -304,6 +304,9 @@ REFUSED = [
     (lambda file: read_table(file, x=["x", "z"]), "time,x,y\n0,1,2\n", "Every x needs a y"),
     (lambda file: read_table(file, score="s"), "time,x,y\n0,1,2\n", "--score and --likelihood belong together."),
     (lambda file: read_table(file, only={"id": "4"}), "time,id,x,y\n0,3,1,2\n", "has no line with id=4."),
+    (lambda file: read_table(file, x="x (inch)"), "time,x (inch),y\n0,1,2\n", "is in none of m, cm, mm: give its unit"),
+    (lambda file: read_table(file, time="t (since 8h)"), "t (since 8h),x,y\n0,1,2\n", "give its unit by --time-unit."),
+    (lambda file: read_table(file, theta="yaw (grad)"), "time,x,y,yaw (grad)\n0,1,2,3\n", "by --degrees."),
     (lambda file: read_table(file, separator=", "), POSE, "separator must be one character, such as ; or tab"),
     (lambda file: read_table(file, rate=10.0, time_unit="s"), POSE, "With --rate, pictures are counted"),
     (lambda file: read_table(file).since(9.0), POSE, "All pictures are from before 9 s: the last one is of 0.1 s."),
@@ -443,7 +446,7 @@ def vicon(_):
     heads = ["Trajectories", "20", ",,Star:Hub,,,Star:Tip,,", "Frame,Sub Frame,X,Y,Z,X,Y,Z", ",,mm,mm,mm,mm,mm,mm"]
     zero = ["0"] * 6
     text = lines(heads, range(1, 7), zero, *1e3 * HUB.T, zero, *1e3 * TIP.T, zero)
-    given = ["--skip", "2", "--headers", "3", "--rate", "20", "--time", "Frame", "--unit", "mm", "--begin", "first"]
+    given = ["--skip", "2", "--headers", "3", "--rate", "20", "--time", "Frame", "--begin", "first"]
     return text, [*given, "--x", "Star:Hub.X.mm", "Star:Tip.X.mm", "--y", "Star:Hub.Y.mm", "Star:Tip.Y.mm", *POINTS]
 
 

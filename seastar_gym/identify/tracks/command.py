@@ -5,7 +5,7 @@ motive (CSV of OptiTrack); pose is a table of AprilTags with the columns time,x,
 
 A table has a line for every picture. A point has the name of its column of x. Units are those in names, such as
 "x (mm)", unless options say so. Files of Kinovea, for example, take --x Hub/X Tip/X --y Hub/Y Tip/Y --time "Time (ms)",
-those of Vicon --skip 2 --headers 3 --rate 100 --x Star:Hub.X.mm --y Star:Hub.Y.mm --unit mm, and those of rostopic
+those of Vicon --skip 2 --headers 3 --rate 100 --x Star:Hub.X.mm --y Star:Hub.Y.mm, and those of rostopic
 --time %time --time-unit ns --begin first, and as --theta the four columns of a quaternion.
 
 Pixels become metres by --metres-per-pixel, for a camera that looks straight down, or --homography, a CSV file with the
