@@ -104,8 +104,10 @@ def test_every_extra_is_in_the_table_of_the_guide():
 @pytest.mark.parametrize(
     ("folders", "extras"),
     [
-        (["seastar_gym"], [
-            "render", "studies", "train", "search", "ray", "slurm", "data", "tracks", "export", "gpu", "plant"]),
+        (
+            ["seastar_gym"],
+            ["render", "studies", "train", "search", "ray", "slurm", "data", "tracks", "export", "gpu", "plant"],
+        ),
         (["studies"], ["train", "sweep", "test", "data"]),
         (["agents", "train.py"], ["train", "rllib"]),
         (["tests"], ["test", "browser", "ray", "learners"]),

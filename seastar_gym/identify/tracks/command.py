@@ -144,6 +144,8 @@ def convert(options: Options) -> str:
     lost = np.isnan(seen.positions).any(axis=2).mean()
     n, lasted = len(track.time), np.ptp(track.time)
     told = f"{options.out}: {n} pictures in {lasted:.4g} s, {100.0 * lost:.1f} % of their points not seen."
+    if not scene.robot.has_body and track.orientations:
+        told += " The orientation, which is that of a body, is left out."
     if n < n_read:
         told += f" {n_read - n} pictures from before were left out."
     return told if options.aligned else f"{told} At rest they are within {1e3 * seen.off:.2g} mm of the robot's shape."
