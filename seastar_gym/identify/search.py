@@ -81,17 +81,22 @@ class Found(NamedTuple):
         """Residual over the noise of the track, or of the residuals if that is less; NaN if neither is known."""
         table = np.full(self.residuals.seen.shape, np.nan)
         table[self.residuals.seen] = self.fit.fun
-        second = np.diff(table, n=2, axis=0)
-        known = np.abs(second[np.isfinite(second)])
-        own = float(1.4826 * np.median(known) / math.sqrt(6.0)) if known.size else math.nan
+        own = noise_of(table, order=2)
         return float(np.sqrt(np.mean(self.fit.fun**2))) / max(np.fmin(self.noise, own), self.least)
 
 
-def noise_of(positions: Floats) -> float:
-    """Noise of each coordinate of a track [m], from its fourth differences; NaN for fewer than five pictures."""
-    differences = np.diff(positions, n=4, axis=0)
-    known = np.abs(differences[np.isfinite(differences)])
-    return float(1.4826 * np.median(known) / math.sqrt(70.0)) if known.size else math.nan
+def noise_of(positions: Floats, order: int = 4) -> float:
+    """Noise of the coordinates of a track [m], from differences of this order; NaN for fewer pictures than these need.
+
+    It is the root mean square over coordinates, whose noises may differ: those of an orientation and a place do.
+    """
+    differences = np.abs(np.diff(positions, n=order, axis=0))
+    columns = [column[np.isfinite(column)] for column in differences.T.reshape(math.prod(positions.shape[1:]), -1)]
+    counts = [len(column) for column in columns]
+    if not any(counts):
+        return math.nan
+    squares = [np.median(column) ** 2 if column.size else 0.0 for column in columns]
+    return float(1.4826 * math.sqrt(np.average(squares, weights=counts) / math.comb(2 * order, order)))
 
 
 def search(

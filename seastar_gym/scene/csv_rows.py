@@ -21,8 +21,8 @@ NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 NAME = re.compile(r"[^\W\d_]\D*")
 NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
 QUOTED = re.compile(r'"[^"]*"')
-UNIT = re.compile(r".*(?:[(\[]\s*(?P<bracketed>[^()\[\]]+?)\s*[)\]]|_(?P<last>[^\W_]+))")
-"""Name with a unit, in brackets or after an underscore."""
+UNIT = re.compile(r".*(?:[(\[]\s*(?P<bracketed>[^()\[\]]+?)\s*[)\]]|[._](?P<last>[^\W_]+))")
+"""Name with a unit, in brackets or after an underscore or a point."""
 UNITS = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0},
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},

@@ -86,6 +86,8 @@ def test_noise_is_that_of_each_coordinate():
     exact, rng = np.concatenate([np.sin(t), np.cos(t)], axis=2), np.random.default_rng(0)
     assert noise_of(exact + 2e-3 * rng.standard_normal(exact.shape)) == pytest.approx(2e-3, rel=0.1)
     assert np.isnan(noise_of(exact[:4]))
+    unlike = exact + np.array([[1e-3], [1e-4]]) * rng.standard_normal((400, 2, 2))
+    assert noise_of(unlike) == pytest.approx(np.sqrt(0.5 * (1e-6 + 1e-8)), rel=0.1)
 
 
 @pytest.mark.parametrize("timed", [False, True])

@@ -304,6 +304,9 @@ REFUSED = [
     (lambda file: read_table(file, x=["x", "z"]), "time,x,y\n0,1,2\n", "Every x needs a y"),
     (lambda file: read_table(file, score="s"), "time,x,y\n0,1,2\n", "--score and --likelihood belong together."),
     (lambda file: read_table(file, only={"id": "4"}), "time,id,x,y\n0,3,1,2\n", "has no line with id=4."),
+    (lambda file: read_table(file, x="x (inch)"), "time,x (inch),y\n0,1,2\n", "is in none of m, cm, mm: give its unit"),
+    (lambda file: read_table(file, time="t (since 8h)"), "t (since 8h),x,y\n0,1,2\n", "give its unit by --time-unit."),
+    (lambda file: read_table(file, theta="yaw (grad)"), "time,x,y,yaw (grad)\n0,1,2,3\n", "by --degrees."),
     (lambda file: read_table(file, separator=", "), POSE, "separator must be one character, such as ; or tab"),
     (lambda file: read_table(file, rate=10.0, time_unit="s"), POSE, "With --rate, pictures are counted"),
     (lambda file: read_table(file).since(9.0), POSE, "All pictures are from before 9 s: the last one is of 0.1 s."),
@@ -389,12 +392,20 @@ def converted(tmp_path, text, *given):
     return code, (tmp_path / "out.csv").read_text() if code == 0 else None
 
 
+def with_body(tmp_path):
+    """Options of a robot with a body, whose orientation is tracked."""
+    (tmp_path / "body.py").write_text(
+        "from seastar_gym import Body, Scene, Seastar\nscene = Scene(Seastar(body=Body(radius=0.02)))\n"
+    )
+    return ["--scene", str(tmp_path / "body.py")]
+
+
 def test_trackers_poses_and_markers_become_nodes_and_the_hub_s_orientation(tmp_path, golden):
     for name, text, given in (
         ("pose_turned", POSE, ["--from", "pose"]), ("pose_aligned", POSE, ["--from", "pose", "--aligned"]),
         ("any_node", MOTIVE, ["--from", "motive", "--aligned", "--nodes", "Seastar:Marker 001=tip1", "Seastar=hub"]),
     ):  # fmt: skip
-        code, csv = converted(tmp_path, text, *given)
+        code, csv = converted(tmp_path, text, *given, *with_body(tmp_path))
         assert code == 0
         rounded = (",".join(f"{float(x):.6f}" if x else "" for x in line.split(",")) for line in csv.splitlines()[1:])
         golden(f"{name}.csv", "\n".join([csv.splitlines()[0], *rounded]))
@@ -443,7 +454,7 @@ def vicon(_):
     heads = ["Trajectories", "20", ",,Star:Hub,,,Star:Tip,,", "Frame,Sub Frame,X,Y,Z,X,Y,Z", ",,mm,mm,mm,mm,mm,mm"]
     zero = ["0"] * 6
     text = lines(heads, range(1, 7), zero, *1e3 * HUB.T, zero, *1e3 * TIP.T, zero)
-    given = ["--skip", "2", "--headers", "3", "--rate", "20", "--time", "Frame", "--unit", "mm", "--begin", "first"]
+    given = ["--skip", "2", "--headers", "3", "--rate", "20", "--time", "Frame", "--begin", "first"]
     return text, [*given, "--x", "Star:Hub.X.mm", "Star:Tip.X.mm", "--y", "Star:Hub.Y.mm", "Star:Tip.Y.mm", *POINTS]
 
 
@@ -501,9 +512,9 @@ def test_one_swim_is_the_same_whatever_has_tracked_it(tmp_path, made):
     if "--nodes" in given:
         names = given[given.index("--x") + 1 :][:2]
         given = [each.format(*names) for each in given]
-    code, csv = converted(tmp_path, text, "--from", "table", *given)
-    assert code == 0
     has_tip = "--nodes" in given
+    code, csv = converted(tmp_path, text, "--from", "table", *given, *([] if has_tip else with_body(tmp_path)))
+    assert code == 0
     c, s = np.cos(TURN[0]), np.sin(TURN[0])
     turned_back = np.array([[c, -s], [s, c]])
     places = [(HUB - HUB[0]) @ turned_back, *([(TIP - HUB[0]) @ turned_back] if has_tip else [TURN[:, None] - TURN[0]])]
@@ -518,9 +529,18 @@ def test_one_swim_is_the_same_whatever_has_tracked_it(tmp_path, made):
     np.testing.assert_allclose(found[: len(expected)], expected, atol=2e-6)
 
 
+def test_an_orientation_tells_where_a_robot_without_a_body_begins_and_is_left_out(tmp_path, capsys):
+    code, csv = converted(tmp_path, "time,x,y,theta\n0,0.1,0.2,0.3\n0.1,0.2,0.2,0.3\n", "--from", "pose")
+    assert code == 0 and "orientation, which is that of a body, is left out." in capsys.readouterr().out
+    names, _, last = csv.splitlines()
+    assert names == "time,x0,y0"
+    expected = 0.1 * np.array([math.cos(0.3), -math.sin(0.3)])
+    np.testing.assert_allclose(np.array(last.split(",")[1:], float), expected, atol=1e-6)
+
+
 def test_pictures_from_before_the_begin_are_left_out_and_counted(tmp_path, capsys):
     code, csv = converted(tmp_path, POSE, "--from", "pose", "--begin", "0.1")
-    assert code == 0 and csv.splitlines()[1].startswith("0.0,0,0,") and len(csv.splitlines()) == 2
+    assert code == 0 and csv.splitlines()[1].startswith("0.0,0,0") and len(csv.splitlines()) == 2
     assert "1 pictures in 0 s" in (said := capsys.readouterr().out) and "3 pictures from before were left out." in said
 
 

@@ -5,7 +5,7 @@ motive (CSV of OptiTrack); pose is a table of AprilTags with the columns time,x,
 
 A table has a line for every picture. A point has the name of its column of x. Units are those in names, such as
 "x (mm)", unless options say so. Files of Kinovea, for example, take --x Hub/X Tip/X --y Hub/Y Tip/Y --time "Time (ms)",
-those of Vicon --skip 2 --headers 3 --rate 100 --x Star:Hub.X.mm --y Star:Hub.Y.mm --unit mm, and those of rostopic
+those of Vicon --skip 2 --headers 3 --rate 100 --x Star:Hub.X.mm --y Star:Hub.Y.mm, and those of rostopic
 --time %time --time-unit ns --begin first, and as --theta the four columns of a quaternion.
 
 Pixels become metres by --metres-per-pixel, for a camera that looks straight down, or --homography, a CSV file with the
@@ -144,6 +144,8 @@ def convert(options: Options) -> str:
     lost = np.isnan(seen.positions).any(axis=2).mean()
     n, lasted = len(track.time), np.ptp(track.time)
     told = f"{options.out}: {n} pictures in {lasted:.4g} s, {100.0 * lost:.1f} % of their points not seen."
+    if not scene.robot.has_body and track.orientations:
+        told += " The orientation, which is that of a body, is left out."
     if n < n_read:
         told += f" {n_read - n} pictures from before were left out."
     return told if options.aligned else f"{told} At rest they are within {1e3 * seen.off:.2g} mm of the robot's shape."

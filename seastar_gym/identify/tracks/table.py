@@ -69,7 +69,8 @@ class Table(NamedTuple):
 
     def texts(self, name: str) -> list[str]:
         """Fields of a column."""
-        return [row.fields[self.column(name)] for row in self.rows]
+        k = self.column(name)
+        return [row.fields[k] for row in self.rows]
 
     def numbers(self, *names: str, are_known: bool = False) -> Floats:
         """Numbers of columns, shape (n, n_names), NaN where nothing was seen. are_known: Whether that is refused."""
@@ -79,7 +80,8 @@ class Table(NamedTuple):
 
     def only(self, values: Mapping[str, str]) -> "Table":
         """Lines that have these fields in the columns of these names."""
-        kept = [row for row in self.rows if all(row.fields[self.column(name)] == text for name, text in values.items())]
+        wanted = [(self.column(name), text) for name, text in values.items()]
+        kept = [row for row in self.rows if all(row.fields[k] == text for k, text in wanted)]
         if not kept:
             raise ValueError(f"{self.file} has no line with {', '.join(map('='.join, values.items()))}.")
         return self._replace(rows=kept)
@@ -150,8 +152,8 @@ def read_table(
     if not turns and theta is None and "theta" in table.names:
         turns = ("theta",)
     times = _times(table, time, time_unit, rate)
-    unit = unit or unit_of(xs[0]) or "m"
-    size, up = UNITS["length"].get(unit, 1.0), -1.0 if y_down else 1.0
+    unit = PIXEL if unit is None and unit_of(xs[0]) == PIXEL else unit
+    size, up = 1.0 if unit == PIXEL else _factor(xs[0], unit, "length"), -1.0 if y_down else 1.0
     places = {name: table.numbers(name, other) * [size, up * size] for name, other in zip(xs, ys, strict=True)}
     if likelihood is not None:
         require_within("likelihood", likelihood, 0.0, 1.0)
@@ -160,8 +162,10 @@ def read_table(
     angles = {}
     if turns:
         angle = table.numbers(*turns)
-        radians = UNITS["angle"].get("deg" if degrees else unit_of(turns[0]) or "rad", 1.0)
-        angles[xs[0]] = up * (heading(angle, "z") if len(turns) == 4 else radians * angle[:, 0])
+        if len(turns) == 4:
+            angles[xs[0]] = up * heading(angle, "z")
+        else:
+            angles[xs[0]] = up * _factor(turns[0], "deg" if degrees else None, "angle") * angle[:, 0]
     return Track(times, places, angles, in_pixels=unit == PIXEL)
 
 
@@ -176,11 +180,20 @@ def _times(table: Table, time: str | None, unit: str | None, rate: float | None)
     """Times of a table's lines [s], see `read_table`."""
     if rate is None:
         name = "time" if time is None else time
-        return table.numbers(name, are_known=True)[:, 0] * UNITS["time"].get(unit or unit_of(name) or "s", 1.0)
+        return table.numbers(name, are_known=True)[:, 0] * _factor(name, unit, "time")
     require_number("rate", rate, "Hz")
     if unit is not None:
         raise ValueError("With --rate, pictures are counted, and no --time-unit is needed.")
     return (np.arange(len(table.rows)) if time is None else table.numbers(time, are_known=True)[:, 0]) / rate
+
+
+def _factor(name: str, unit: str | None, quantity: str) -> float:
+    """Unit of a column of a quantity, [s], [m] or [rad]: the one that is given, that of its name, or 1."""
+    chosen = unit or unit_of(name)
+    if chosen is not None and chosen not in UNITS[quantity]:
+        option = {"time": "--time-unit", "length": "--unit", "angle": "--degrees"}[quantity]
+        raise ValueError(f"{shown(name)} is in none of {', '.join(UNITS[quantity])}: give its unit by {option}.")
+    return 1.0 if chosen is None else UNITS[quantity][chosen]
 
 
 def form_of(separator: str | None, decimal: str | None, skip: int = 0) -> Form:

@@ -117,7 +117,7 @@ class Track:
     def seen(
         self, scene: Scene, nodes: Mapping[str, str | int] | None = None, rest: float = 0.0, aligned: bool = False
     ) -> "Seen":
-        """What was seen of a scene's robot, in the frame in which it began.
+        """What was seen of a scene's robot, in the frame in which it began, without the orientation if it has no body.
 
         nodes: Nodes of points by name: "hub", "tip1", "tip2", .., or a number. None: the only point is the hub.
         rest: Time for which the robot is at rest at the beginning [s]. aligned: The track is in that frame.
@@ -132,9 +132,12 @@ class Track:
             found = from_rest(found, self.time, rest, scene)
         still = np.zeros((1, scene.robot.n_limbs))
         measured = Measurement(self.time, found.positions, found.nodes, still, self.time[:1] + rest)
-        if aligned:
-            return found
-        return found._replace(off=require_rest(measured, at_nodes(scene, found.nodes), scene.robot.limb_length))
+        if not aligned:
+            off = require_rest(measured, at_nodes(scene, found.nodes), scene.robot.limb_length)
+            found = found._replace(off=off)
+        if found.nodes[-1] == ORIENTATION and not scene.robot.has_body:
+            found = found._replace(positions=found.positions[:, :-1], nodes=found.nodes[:-1])
+        return found
 
     def to_csv(self, file: str | Path, scene: Scene, **seen: Any) -> None:
         """Write a trajectory that `seastar identify` reads. scene, and more: As of `seen`."""
