@@ -8,6 +8,10 @@ error is above UNTOLD are not determined by the data, and the estimate says so.
 
 A delay between the logs, of a camera whose clock is not that of the commands, is one more parameter, fitted as it is
 [s]: simulated trajectories are interpolated at the times of the pictures less the delay.
+
+The frame of a track is only as good as the picture that it was taken from: an error of a few milliradians at the
+beginning is one of all places. So trajectories may be moved and turned by the noise of one picture, which is linear
+and is eliminated from residuals and Jacobian.
 """
 
 from __future__ import annotations
@@ -29,6 +33,7 @@ from seastar_gym.identify.search import (
     SUSPICIOUS,
     Found,
     ends_of_search,
+    noise_of,
     require_clocks,
     require_places,
     require_rest,
@@ -78,7 +83,8 @@ class Estimate(NamedTuple):
     lower, upper: Ends of the confidence intervals, shape (p,).
     correlation: Correlation of the estimates, shape (p, p); with a delay (p + 1, p + 1), and it is the last.
     untold: Groups of parameters that the data do not determine, or only in combination; their intervals mean nothing.
-    residuals: Measured minus fitted positions [m], shape (n, n_nodes_seen, 2); NaN where a point was left out.
+    residuals: Measured minus fitted positions [m], less what an error of the track's frame explains, shape (n,
+        n_nodes_seen, 2); NaN where a point was not seen, or was left out.
     scene: Scene with the fitted values.
     delay: Delay between the logs. None where it was not fitted.
     noise: Of each coordinate of the track [m], from its fourth differences; NaN for fewer than five pictures.
@@ -218,6 +224,8 @@ class Residuals:
         if self.seen.sum() <= n_fitted:
             raise ValueError(f"{self.seen.sum()} coordinates are too few for {n_fitted} parameters.")
         self._changes = DIFFERENCE * np.vstack([np.zeros(n_fitted), np.eye(n_fitted)])
+        per_node = np.nan_to_num(noise_of(measurement.positions)) / math.sqrt(len(measurement.nodes))
+        self._frame = np.array([per_node, per_node, per_node / robot.limb_length])  # its errors [m, m, rad]
         self._simulate = lru_cache(maxsize=1)(self._trajectories)  # for residuals and Jacobian at once
 
     def scenes(self, fitted: ArrayLike) -> list[Scene]:
@@ -247,15 +255,32 @@ class Residuals:
     def __call__(self, fitted: Floats) -> Floats:
         """Residuals of the coordinates that were measured [m]; infinite where the simulation is impossible."""
         try:
-            found = (self.trajectory(fitted) - self.measurement.positions)[self.seen]
+            here = self.trajectory(fitted)
         except ValueError:  # beyond what can be modelled: least_squares takes a shorter step
             return np.full(self.seen.sum(), np.inf)
-        return np.where(np.isfinite(found), found, np.inf)
+        return self._less_frame(here, (here - self.measurement.positions)[self.seen])
 
     def jacobian(self, fitted: Floats) -> Floats:
         """Derivative of the residuals by what is fitted, shape (n_seen, p), or (n_seen, p + 1) with a delay."""
         here, *changed = self._simulate(*fitted)
-        return np.stack([(here - other)[self.seen] / DIFFERENCE for other in changed], axis=1)
+        return self._less_frame(here, np.stack([(here - other)[self.seen] / DIFFERENCE for other in changed], axis=1))
+
+    def _less_frame(self, here: Floats, found: Floats) -> Floats:
+        """Residuals, shape (n_seen,), or their derivatives, (n_seen, p), without what an error of the frame explains.
+
+        It is the square root of their precision where the frame has errors of its own. here: Simulated positions.
+        """
+        finite = np.where(np.isfinite(found), found, np.inf)
+        if not self._frame.any() or not np.isfinite(finite).all():
+            return finite
+        axes = np.zeros((3, *here.shape))
+        placed = [node != ORIENTATION for node in self.measurement.nodes]
+        axes[0, :, placed, 0] = axes[1, :, placed, 1] = self._frame[0]
+        axes[2] = self._frame[2] * np.stack([-here[..., 1], here[..., 0]], axis=-1)
+        noise = self._frame[0] * math.sqrt(len(self.measurement.nodes))
+        U, s, _ = np.linalg.svd(axes[:, self.seen].T / noise, full_matrices=False)
+        share = (1.0 - 1.0 / np.sqrt(1.0 + s**2)).reshape(-1, *[1] * (found.ndim - 1))
+        return found - U @ (share * (U.T @ found))
 
     def at(self, rows: Floats) -> tuple[Floats, Floats]:
         """Residuals of several rows, shape (n, n_seen), and their derivatives, (n, n_seen, p); infinite and zero where
@@ -272,9 +297,11 @@ class Residuals:
             found = trajectories(scenes, self.measurement, np.concatenate(delays))
             found = found.reshape(-1, len(self._changes), *self.seen.shape)
             here = found[:, 0, self.seen]
-            values[possible] = here - self.measurement.positions[self.seen]
-            slopes[possible] = np.moveaxis(here[:, None] - found[:, 1:, self.seen], 1, 2) / DIFFERENCE
-        return np.where(np.isfinite(values), values, np.inf), slopes
+            apart = np.moveaxis(here[:, None] - found[:, 1:, self.seen], 1, 2) / DIFFERENCE
+            for k, row in enumerate(np.flatnonzero(possible)):
+                values[row] = self._less_frame(found[k, 0], here[k] - self.measurement.positions[self.seen])
+                slopes[row] = self._less_frame(found[k, 0], apart[k])
+        return values, slopes
 
 
 def estimate_of(found: Found, confidence: float) -> Estimate:
@@ -287,6 +314,8 @@ def estimate_of(found: Found, confidence: float) -> Estimate:
     freedom = residuals.seen.sum() - len(fit.x)
     times = residuals.measurement.time[np.nonzero(residuals.seen)[0]]
     known = uncertainty_of(fit.jac, fit.fun, times)
+    off = np.full(residuals.seen.shape, np.nan)
+    off[residuals.seen] = -fit.fun
     half = student.ppf(0.5 + 0.5 * confidence, freedom) * np.sqrt(np.diag(known.covariance))
     fitted = [*names, DELAY][: len(fit.x)]
     with np.errstate(over="ignore"):
@@ -301,7 +330,7 @@ def estimate_of(found: Found, confidence: float) -> Estimate:
                 for direction, error in zip(known.combinations, known.errors, strict=True)
                 if error > UNTOLD
             ),
-            residuals=residuals.measurement.positions - residuals.trajectory(fit.x),
+            residuals=off,
             scene=residuals.scenes(fit.x)[0],
             delay=Delay(*(fit.x[p] + half[p] * np.array([0.0, -1.0, 1.0])).tolist()) if len(fit.x) > p else None,
         )
