@@ -80,7 +80,8 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
     require_number("--seconds", options.seconds, "s")
     if options.decision_period is not None:
         require_number("--decision-period", options.decision_period, "s")
-    policy, fidelity = learned_policy(options.policy, options.decision_period), options.fidelity or "fast"
+    policy = learned_policy(options.policy, options.decision_period)
+    fidelity: Fidelity = options.fidelity or "fast"
     own: dict[str, Any] = {"decision_period": 0.5, "sight": Sight(), "path": "pentagon"}
     if policy is not None:
         about = policy.description
