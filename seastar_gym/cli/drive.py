@@ -80,7 +80,8 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
     require_number("--seconds", options.seconds, "s")
     if options.decision_period is not None:
         require_number("--decision-period", options.decision_period, "s")
-    policy, fidelity = learned_policy(options.policy, options.decision_period), options.fidelity or "fast"
+    policy = learned_policy(options.policy, options.decision_period)
+    fidelity: Fidelity = options.fidelity or "fast"
     own: dict[str, Any] = {"decision_period": 0.5, "sight": Sight(), "path": "pentagon"}
     if policy is not None:
         about = policy.description
@@ -153,24 +154,24 @@ def _scene_of_plant(options: argparse.Namespace) -> Path | None:
 
 @contextmanager
 def progress(what: str) -> Iterator[None]:
-    """Context that says every second, at a terminal, for how long it has lasted; elsewhere once that it began."""
-    begun, ended, terminal = time.monotonic(), threading.Event(), sys.stderr.isatty()
+    """Context that says what is done and, at a terminal, for how many seconds."""
+    begun, ended = time.monotonic(), threading.Event()
 
     def tick() -> None:
-        while True:
-            seconds, end = time.monotonic() - begun, "\r" if terminal else "\n"
-            print(f"{what}, {seconds:.0f} s", end=end, file=sys.stderr, flush=True)
-            if ended.wait(1.0 if terminal else None):
-                return
+        while not ended.wait(1.0):
+            print(f"\r{time.monotonic() - begun:.0f} s ", end="", flush=True)
 
+    print(what, flush=True)
     ticker = threading.Thread(target=tick, daemon=True)
-    ticker.start()
+    if sys.stdout.isatty():
+        ticker.start()
     try:
         yield
     finally:
         ended.set()
-        ticker.join()
-        print(end="\n" if terminal else "", file=sys.stderr, flush=True)
+        if ticker.ident is not None:
+            ticker.join()
+            print("\r", end="")
 
 
 def plan(options: argparse.Namespace) -> tuple[Policy, Swim, dict[str, Any]]:
@@ -180,7 +181,7 @@ def plan(options: argparse.Namespace) -> tuple[Policy, Swim, dict[str, Any]]:
     policy = load_agent(options.policy, env, options.seed)
     arguments["actions"] = require_seen(policy, env)
     env = PlantSwim(simulated(options, arguments, paced=False), **arguments)
-    with progress("Planning in simulation, whose code is compiled if it is not on the disk"):
+    with progress("The plan is swum in simulation; a new kind of robot is compiled before, for up to a minute."):
         swum = _swim("plan", policy, env, options)
     if env.stopped:
         raise PlantError(

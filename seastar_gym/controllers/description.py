@@ -19,7 +19,7 @@ from seastar_gym.envs.symmetry.symmetry import MOST_PAST
 from seastar_gym.files import parse_json
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror
-from seastar_gym.scene.checks import is_whole_number, require_count, require_kind, shown
+from seastar_gym.scene.checks import as_float, is_whole_number, require_count, require_kind, shown
 from seastar_gym.scene.serial import to_dict
 from seastar_gym.version import __version__
 
@@ -71,7 +71,7 @@ class Description(NamedTuple):
             **self._asdict(),
             "scene": self.scene.to_dict(),
             "sight": None if self.sight is None else to_dict(self.sight),
-            "action_delay": to_dict(late) if isinstance(late, Distribution) else late,
+            "action_delay": to_dict(late) if isinstance(late, Distribution) else as_float(late),
             **more,
         }
         return json.dumps(facts, indent=2, default=str, allow_nan=False)

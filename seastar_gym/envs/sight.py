@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +107,7 @@ def read_camera(file: str | os.PathLike[str]) -> Camera:
     try:
         if not isinstance(data, dict):
             raise ValueError(f"it must be such as {TEMPLATE}, not {shown(data)}")
-        late = data.pop("action_delay", 0.0)
+        late: Any = data.pop("action_delay", 0.0)
         sight = from_dict({"version": VERSION, "kind": Sight.__name__, **data}, Sight)
         late = from_dict({"version": VERSION, **late}, object) if isinstance(late, dict) else as_float(late)
         require_action_delay(late)
