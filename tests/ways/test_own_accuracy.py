@@ -1,4 +1,4 @@
-"""From a scene of one's own to its certificate, the fastest setting below an error, and a training that tells errors."""
+"""From a scene of one's own to its certificate, the fastest setting below an error, and a training there."""
 
 import math
 import re

@@ -48,8 +48,8 @@ def register_task(
 ) -> None:
     """Register a challenge of your own as an id of gymnasium, alone and as a native batch.
 
-    seconds: Time limit of an episode [s]. decision_period: Time between decisions [s]. reward_threshold: Return at which
-    it counts as solved.
+    seconds: Time limit of an episode [s]. decision_period: Time between decisions [s]. reward_threshold: Return that
+        solves it.
     """
     require_number("seconds", seconds, "s")
     require_period(decision_period)
