@@ -494,7 +494,7 @@ def test_effort_is_the_price_of_pulses_and_the_time_limit_truncates(id):
         action = env.action_space.sample()
         *_, terminated, truncated, info = env.step(action)
         assert not terminated and truncated == (k == 1)
-        if table is not None:
+        if table is not None and id not in OF_USERS:
             pulses = pulses_of(np.array([info["heating_time"]]), table[[action]])[0]
             assert info["reward_effort"] == -0.01 * pulses < 0.0
 

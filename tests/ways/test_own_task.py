@@ -12,12 +12,16 @@ from ways.story import ROOT, block, command
 PAGE = "docs/extending.md"
 TRAIN = """
 import gymnasium as gym
+from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 
 import away
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 
-batch = gym.make_vec("SeastarAway-v0", num_envs=32, vectorization_mode="vector_entry_point", fidelity="fast")
+batch = gym.make_vec(
+    "SeastarAway-v0", num_envs=32, vectorization_mode="vector_entry_point", fidelity="fast",
+    autoreset_mode=AutoresetMode.SAME_STEP,
+)
 model = PPO("MlpPolicy", BatchVecEnv(batch), n_steps=32, batch_size=256, gamma=0.8, seed={}, device="cpu")
 model.learn(16384)
 model.save("mine.zip")
@@ -43,7 +47,9 @@ def test_a_task_of_ones_own_is_an_id_that_is_promised_trained_on_and_compared(st
     # PPO learns it, and is compared with a gait and with chance.
     story.runs(TRAIN.format(seed))
     gait = "lagged" if changes else "straight"
-    line = command(PAGE, "seastar benchmark --tasks away:").replace("--agents straight", f"--agents {gait} mine.zip")
+    line = command(PAGE, "seastar benchmark --tasks away:").replace(
+        "--agents straight", f"--agents {gait} mine=mine.zip"
+    )
     story.types(f"{line.replace('--seeds 20', '--seeds 5')} --executor here")
     entries = json.loads((story.folder / "runs/away/results.json").read_text("utf-8"))
     far = {entry["agent"]: sum(entry["scores"]) / 5 for entry in entries["entries"]}
