@@ -192,7 +192,7 @@ def run(options: Options, arguments: Sequence[str]) -> int:
     if robot != Robot():
         training_env(options, robot).close()  # refuses what cannot be trained before there is a folder
     with held(folder, options.resume is None):
-        keep(robot, folder)
+        keep(robot, folder, options.scene)
         write_config(options, arguments, folder)
         print(f"The run is in {folder}.", flush=True)
         return train_and_compare(options, folder)

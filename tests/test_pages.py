@@ -63,6 +63,8 @@ def short_form(monkeypatch, tmp_path):
     monkeypatch.setattr(measure, "MANY_NODES", 17)
     monkeypatch.setattr(paths, "PATHS", dict(paths.PATHS))
     monkeypatch.setattr(numerics, "SCHEME_NAMES", [*numerics.SCHEME_NAMES])
+    monkeypatch.setitem(gym.registry, "SeastarAway-v0", None)
+    del gym.registry["SeastarAway-v0"]  # which the page on extending registers
     monkeypatch.chdir(tmp_path)
 
 

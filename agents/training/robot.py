@@ -6,15 +6,17 @@ from typing import NamedTuple
 from agents.training.options import Options
 from seastar_gym.envs.options import scene_at
 from seastar_gym.envs.randomization import DomainRandomization, Uniform
-from seastar_gym.files import read_json, write_json
+from seastar_gym.files import read_json, write_atomically, write_json
 from seastar_gym.identify.fit import DOUBT
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.scene.scene_file import load_scene, search
+from seastar_gym.scene.serial import has_own_kinds
 
-SCENE, INTERVALS = "scene.json", "intervals.json"
-"""Files in a run's folder, so that a run that is continued has the robot that it began with."""
+SCENE, OWN_SCENE, INTERVALS = "scene.json", "scene.py", "intervals.json"
+"""Files in a run's folder, so that a run that is continued has the robot that it began with. OWN_SCENE is the file of a
+scene with classes of its own, which JSON alone does not bring."""
 
 
 class Robot(NamedTuple):
@@ -62,24 +64,33 @@ def read_intervals(file: Path, anyway: bool = False) -> DomainRandomization:
     return DomainRandomization({name: Uniform(low, high) for name, (low, high) in ends.items()})
 
 
-def keep(robot: Robot, folder: Path) -> None:
-    """Write the robot into the folder of its run; nothing for the chapter's."""
-    if robot.scene is not None:
+def keep(robot: Robot, folder: Path, file: Path | None) -> None:
+    """Write the robot, whose scene is that of a file, into the folder of its run; nothing for the chapter's."""
+    if robot.scene is not None and file is not None:
         write_json(folder / SCENE, robot.scene.to_dict())
+        if has_own_kinds(robot.scene):
+            write_atomically(folder / OWN_SCENE, file.read_text(encoding="utf-8"))
     if robot.draws is not None:
         write_json(folder / INTERVALS, {name: each.bounds for name, each in robot.draws.distributions.items()})
 
 
 def physics(options: Options, folder: Path) -> list[str]:
     """Words of `seastar evaluate` for the robot and the decisions of the run with these options in a folder."""
-    words = ["--fidelity", options.fidelity] if options.scene is None else ["--scene", str(folder / SCENE)]
+    words = ["--fidelity", options.fidelity] if options.scene is None else ["--scene", str(scene_in(folder))]
     period = options.ppo.decision_period
     return words if period is None else [*words, "--decision-period", str(period)]
 
 
+def scene_in(folder: Path) -> Path:
+    """File of the scene in a run's folder."""
+    return folder / OWN_SCENE if (folder / OWN_SCENE).is_file() else folder / SCENE
+
+
 def robot_of(options: Options, folder: Path) -> Robot:
     """Robot of the run with these options in a folder."""
+    if options.scene is not None:
+        search(options.scene.parent)  # for modules that a scene of its own imports
     return Robot(
-        None if options.scene is None else load_scene(folder / SCENE),
+        None if options.scene is None else load_scene(scene_in(folder)),
         None if options.intervals is None else read_intervals(folder / INTERVALS),
     )

@@ -110,7 +110,7 @@ def require_measures(entries: Sequence[Entry]) -> None:
 
 
 class Measured(NamedTuple):
-    """Results so far. code: 2 where an agent did not fit, 1 where a job was lost, INTERRUPTED after Ctrl-C."""
+    """Results so far. code: 2 where an agent did not fit, 1 where a job was lost, INTERRUPTED after Ctrl-C, else 0."""
 
     entries: list[Entry]
     code: int

@@ -11,10 +11,8 @@ files that you trust. The policies of this project (.safetensors, and the model.
 
 import importlib
 import importlib.util
-import os
 import pickle
 import re
-import sys
 import zipfile
 import zlib
 from contextlib import suppress
@@ -27,6 +25,7 @@ import numpy as np
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import reason_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.scene.scene_file import search
 
 _FUNCTION = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
@@ -39,7 +38,7 @@ def is_function(name: str) -> bool:
 def module_file(name: str) -> Path:
     """File of the module of a function of this name. ValueError if there is none."""
     module = name.partition(":")[0]
-    _search_here()
+    search(Path.cwd())
     try:
         spec = importlib.util.find_spec(module)
     except ModuleNotFoundError:
@@ -56,7 +55,7 @@ def call_function(name: str, env: SeastarSwimEnv) -> Policy:
     ValueError, with one sentence, if there is no such function or it returns no policy.
     """
     module, _, function = name.partition(":")
-    _search_here()
+    search(Path.cwd())
     try:
         make = getattr(importlib.import_module(module), function, None)
     except ModuleNotFoundError as missing:
@@ -67,14 +66,6 @@ def call_function(name: str, env: SeastarSwimEnv) -> Policy:
     if not callable(getattr(policy, "predict", None)):
         raise ValueError(f"The agent {name!r} is a {type(policy).__name__}, which has no predict(observation, ...).")
     return policy if _is_batched(policy) else RobotByRobot(policy)
-
-
-def _search_here() -> None:
-    """Have modules of the current folder found, after all others."""
-    here = os.getcwd()
-    if here not in sys.path:
-        sys.path.append(here)
-        importlib.invalidate_caches()
 
 
 def _is_batched(policy: Any) -> bool:

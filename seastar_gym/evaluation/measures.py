@@ -19,12 +19,14 @@ class Measure(NamedTuple):
     """What the episodes of a task are measured by.
 
     of: Function that makes scores, shape (n_episodes,), of episodes.
+    records: Entries of info that it needs, besides those that the package's own do.
     """
 
     name: str
     unit: str
     better: Literal["less", "more"]
     of: Callable[[Episodes], Floats]
+    records: tuple[str, ...] = ()
 
 
 def seconds_to_success(episodes: Episodes) -> Floats:
@@ -54,7 +56,7 @@ MEASURES: dict[type[Any], Measure] = {
     Station: Measure("mean distance", "mm", "less", mean_distance),
     Prizes: Measure("worth of prizes", "1", "more", prizes),
 }
-"""Measures of challenges that are not done at some time."""
+"""Measures of challenges that are not done at some time; those of one's own join them."""
 
 
 def measure_of(env: Any) -> Measure:

@@ -1,10 +1,12 @@
 """Registered environments of this package, by id, and episodes that an agent swims in them, one for each seed."""
 
+import importlib
 import inspect
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
-from gymnasium.envs.registration import load_env_creator
+from gymnasium.envs.registration import EnvSpec, load_env_creator
 
 from seastar_gym.controllers.contract import Policy, actions_in, require_fit
 from seastar_gym.controllers.greedy import Searcher
@@ -12,11 +14,13 @@ from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.sight import told
 from seastar_gym.envs.tasks.numbered import Split
+from seastar_gym.evaluation.measures import measure_of
 from seastar_gym.evaluation.rollout import Batch, Episodes, rollout
 from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.scene.scene_file import search
 
 RECORDED = ("time", "distance", "catches", "taken")
-"""Entries of info that measures need, where a task has them."""
+"""Entries of info that the package's measures need, where a task has them."""
 
 
 def task_ids() -> list[str]:
@@ -24,22 +28,42 @@ def task_ids() -> list[str]:
     return [id for id, spec in gym.registry.items() if str(spec.entry_point).startswith("seastar_gym.")]
 
 
+def known_id(task: str) -> str:
+    """Id of a task, which may be behind the module that registers it, "module:id", as gymnasium takes it.
+
+    The module is imported, also from the current folder. ValueError, with one sentence, if there is none.
+    """
+    module, _, id = task.rpartition(":")
+    if module:
+        search(Path.cwd())
+        try:
+            importlib.import_module(module)
+        except ModuleNotFoundError as missing:
+            raise ValueError(f"There is no task {task!r}: {missing}.") from missing
+    return id
+
+
+def spec_of(task: str) -> EnvSpec:
+    """Gymnasium's specification of a task."""
+    return gym.spec(known_id(task))
+
+
 def require_task(task: str) -> None:
-    """ValueError, with the known ids, for an id that this package has not registered."""
-    if task not in task_ids():
-        raise ValueError(f"There is no task {task!r}: choose of {', '.join(task_ids())}.")
+    """ValueError, with the known ids, for an id that has no environments of this package."""
+    if known_id(task) not in task_ids():
+        raise ValueError(f"There is no task {task!r}: choose of {', '.join(task_ids())}, or module:id.")
 
 
 def make_task(task: str, **arguments: Any) -> gym.Env[Any, Any]:
     """Environment of an id with these arguments instead of its own."""
     require_task(task)
-    env: gym.Env[Any, Any] = gym.make(task, disable_env_checker=True, **arguments)
+    env: gym.Env[Any, Any] = gym.make(spec_of(task), disable_env_checker=True, **arguments)
     return env
 
 
 def parameters_of(task: str) -> set[str]:
     """Names of the arguments of a task's environment."""
-    entry: Any = gym.spec(task).entry_point
+    entry: Any = spec_of(task).entry_point
     return set(inspect.signature(load_env_creator(entry) if isinstance(entry, str) else entry).parameters)
 
 
@@ -58,9 +82,10 @@ def env_of(task: str, **arguments: Any) -> Any:
 
 def make_batch(task: str, n: int, /, threads: int | None = None, **arguments: Any) -> Batch:
     """Batch of a task, the native one where there is one. threads: Of the native one; None means one per processor."""
-    if gym.spec(task).vector_entry_point is None:
-        return gym.make_vec(task, n, vectorization_mode="sync", **arguments)
-    return gym.make_vec(task, n, vectorization_mode="vector_entry_point", threads=threads, **arguments)
+    spec = spec_of(task)
+    if spec.vector_entry_point is None:
+        return gym.make_vec(spec.id, n, vectorization_mode="sync", **arguments)
+    return gym.make_vec(spec.id, n, vectorization_mode="vector_entry_point", threads=threads, **arguments)
 
 
 def require_seen(policy: Policy, env: Any) -> Actions:
@@ -93,10 +118,11 @@ def swim_episodes(
     arguments = held_out(task, fidelity, split)
     plain = env_of(task, **arguments)
     mode = require_seen(policy, plain)
-    limit = max_decisions or gym.spec(task).max_episode_steps
+    limit = max_decisions or spec_of(task).max_episode_steps
     if limit is None:
         raise ValueError(f"The task {task!r} has no time limit.")
     batch = make_batch(task, len(seeds), threads, actions=mode, max_episode_steps=limit, **arguments)
-    episodes = rollout(batch, policy, seeds=seeds, record=RECORDED)
+    records = measure_of(plain).records
+    episodes = rollout(batch, policy, seeds=seeds, record=(*RECORDED, *records))
     batch.close()
     return episodes._replace(limit=limit * plain.decision_period)

@@ -1,6 +1,8 @@
 """`load_scene`: a scene from a file of Python or JSON, as command lines take it."""
 
+import importlib
 import runpy
+import sys
 import traceback
 from os import PathLike
 from pathlib import Path
@@ -13,7 +15,8 @@ from seastar_gym.scene.scene import Scene
 def load_scene(file: str | PathLike[str] | None) -> Scene:
     """Scene of a file of Python or JSON, the chapter's for none.
 
-    A file of Python is executed and defines `scene`; one of JSON is as `Scene.to_dict` writes it.
+    A file of Python is executed and defines `scene`; it may import modules of its folder and of the current one. One of
+    JSON is as `Scene.to_dict` writes it.
     """
     if file is None:
         return Scene()
@@ -26,6 +29,7 @@ def load_scene(file: str | PathLike[str] | None) -> Scene:
             return Scene.from_dict(read_json(file))
         except ValueError as wrong:
             raise ValueError(f"{file} is no scene: {str(wrong).rstrip('.')}.") from wrong
+    search(file.parent, Path.cwd())
     try:
         found = runpy.run_path(str(file)).get("scene")
     except SyntaxError as wrong:
@@ -37,6 +41,14 @@ def load_scene(file: str | PathLike[str] | None) -> Scene:
     if not isinstance(found, Scene):
         raise ValueError(f"{file} must define `scene`, a Scene.")
     return found
+
+
+def search(*folders: Path) -> None:
+    """Have modules of folders found, after all others."""
+    for folder in map(str, map(Path.absolute, folders)):
+        if folder not in sys.path:
+            sys.path.append(folder)
+            importlib.invalidate_caches()
 
 
 def _line(wrong: Exception, file: Path) -> str:

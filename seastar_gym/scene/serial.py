@@ -10,6 +10,8 @@ when it is written. Reading constructs parts of registered classes only: it eval
 """
 
 import inspect
+import json
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache, partial, wraps
@@ -115,6 +117,12 @@ def _written(value: Any, where: str) -> Any:
         f"{where} is a {kind}, which could not be read back: use a part of seastar_gym, or register the class of yours "
         "with the decorator seastar_gym.register_part."
     )
+
+
+def has_own_kinds(part: Any) -> bool:
+    """Whether a part has any of a class from outside the package, which a process has to import before it is read."""
+    kinds = re.findall(r'"kind": "(\w+)"', json.dumps(to_dict(part)))
+    return not all(KINDS[kind].__module__.startswith("seastar_gym.") for kind in {*kinds} & {*KINDS})
 
 
 def _written_items(values: tuple[Any, ...], where: str) -> list[Any]:

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 from numba.core import types
 from numba.core.datamodel import models
+from numba.core.errors import NumbaError
 from numba.core.registry import CPUDispatcher
 from numba.extending import NativeValue, register_model, unbox
 
 from seastar_gym.simd import numpy_lanes
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import borrow
+from seastar_gym.simd.lanes import Rows, borrow, lanes
 
 PACKAGE = "seastar_gym."
 KERNELS: dict[str, Callable] = {}
@@ -72,6 +73,18 @@ def compiled(function: Callable) -> Callable:
 def handed(function: Callable) -> Callable:
     """A kernel as a member of a bundle; with NUMBA_DISABLE_JIT=1 the function that it is."""
     return Handed(function, code_digest(function)) if isinstance(function, CPUDispatcher) else function
+
+
+def require_compiled(name: str, function: Callable) -> None:
+    """ValueError, in one sentence, where a kernel of (rows, row, lanes, lanes) does not compile."""
+    if not isinstance(function, CPUDispatcher):
+        return
+    try:
+        function.compile((Rows(shared=True), types.intp, lanes, lanes))
+    except NumbaError as failure:
+        lines = [line.strip() for line in str(failure).splitlines()]
+        why = next(line for line in lines if line and not line.startswith("Failed in "))
+        raise ValueError(f"{name} does not compile: {' '.join(why.split()).rstrip('.:')}.") from failure
 
 
 def _python(function: Any) -> Any:

@@ -3,6 +3,7 @@
 import copy
 import pickle
 from dataclasses import replace
+from weakref import WeakSet
 
 import gymnasium as gym
 import numpy as np
@@ -308,3 +309,15 @@ def test_rendering_without_a_mode_warns_and_draws_nothing():
         env.reset(seed=0)
         with pytest.warns(UserWarning, match="draws nothing"):
             assert env.render() is None
+
+
+def test_whoever_opens_four_environments_is_told_of_batches_once(monkeypatch):
+    monkeypatch.setattr(seastar_swim, "_open", WeakSet())
+    seastar_swim._tell_of_batches.cache_clear()
+    for _ in range(5):
+        SeastarSwimEnv().close()
+    few = [SeastarSwimEnv() for _ in range(3)]
+    with pytest.warns(UserWarning, match="one compiled call"):
+        few.append(SeastarSwimEnv())
+    few.append(SeastarSwimEnv())
+    assert len(seastar_swim._open) == 5

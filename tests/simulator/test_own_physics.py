@@ -174,6 +174,10 @@ REFUSED = {
     "other numbers": (
         swims(wrong(lambda c, x, y: c * x)), "on lanes, which it does not",
     ),
+    "a list": (
+        swims(wrong(None, lambda c, x, y: (0.5 * c * x * x, [c * x, 0.0 * y], (c, 0.0, 0.0)))), "does not compile: ",
+    ),
+    "a power": (swims(wrong(lambda c, x, y: (0.5 * c * x**2, (c * x, 0.0), (c, 0.0, 0.0)))), "for \\*\\* or pow"),
     "an infinite one": (
         swims(wrong(lambda c, x, y: (c / x, (-c / (x * x), 0.0 * y), (2.0 * c / (x * x * x), 0.0 * c, 0.0 * c)))),
         "is not finite where both",

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.functions import compiled, handed, plain_function
+from seastar_gym.simd.functions import compiled, handed, plain_function, require_compiled
 from seastar_gym.simd.lanes import add_product, load, select
 from seastar_gym.simd.numpy_lanes import Lanes
 
@@ -197,6 +197,7 @@ def check_slopes(name: str, kind: str, function: Callable, numbers: tuple[list[f
                 f"{name}.{kind} must be a function of coefficients and two numbers that returns (value, (slopes), "
                 f"(second slopes xx, xy, yy)) on lanes, which it does not: {str(unfit).rstrip('.')}."
             ) from unfit
+    require_compiled(f"{name}.{kind}", sum_of((Function(function, 0, len(numbers)),)))
     _checked.add(key)
 
 

@@ -2,6 +2,7 @@
 
 from typing import Literal
 
+import gymnasium as gym
 from gymnasium.vector import AutoresetMode
 
 from seastar_gym.envs.commands import Actions
@@ -19,8 +20,9 @@ from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.sim_to_real import SimToReal
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.checks import require_choice, shown
+from seastar_gym.scene.checks import require_choice, require_number, require_period, shown
 from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.scene.serial import to_dict
 
 CHALLENGES: dict[str, Challenge] = {
     "miswired": Miswired(),
@@ -34,6 +36,32 @@ CHALLENGES: dict[str, Challenge] = {
     "sim-to-real": SimToReal(),
 }
 """Challenges by name."""
+
+
+def register_task(
+    id: str,
+    challenge: Challenge,
+    seconds: float,
+    actions: Actions = "joint",
+    decision_period: float = 1.0,
+    reward_threshold: float | None = None,
+) -> None:
+    """Register a challenge of your own as an id of gymnasium, alone and as a native batch.
+
+    seconds: Time limit of an episode [s]. decision_period: Time between decisions [s]. reward_threshold: Return that
+        solves it.
+    """
+    require_number("seconds", seconds, "s")
+    require_period(decision_period)
+    gym.register(
+        id,
+        f"{__name__}:SeastarTaskEnv",
+        vector_entry_point=f"{__name__}:SeastarTaskVectorEnv",
+        max_episode_steps=max(1, round(seconds / decision_period)),
+        reward_threshold=reward_threshold,
+        disable_env_checker=True,
+        kwargs={"task": to_dict(challenge), "actions": actions, "decision_period": decision_period},
+    )
 
 
 def read_challenge(task: Challenge | Plain | str) -> Challenge:
