@@ -1,8 +1,18 @@
-"""A story for every test of a way."""
+"""A story for every test of a way. The first of its parameters are the page's; --slow runs the others, too."""
+
+from pathlib import Path
 
 import pytest
 
 from ways.story import Story
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    for item in items:
+        others = getattr(item, "callspec", None) and any(item.callspec.indices.values())
+        if others and item.path.parent == Path(__file__).parent:
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture

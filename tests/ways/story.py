@@ -28,16 +28,11 @@ def block(page: str, *words: str) -> str:
     return found[0]
 
 
-def command(page: str, *words: str, **changes: str) -> str:
-    """The first line of a page's commands in which all words occur; in it, words are changed into others."""
-    lines = [
-        line for _, code in FENCED.findall((ROOT / page).read_text(encoding="utf-8")) for line in code.splitlines()
-    ]
+def command(page: str, *words: str) -> str:
+    """The first line of a page's commands in which all words occur."""
+    lines = "\n".join(code for _, code in FENCED.findall((ROOT / page).read_text(encoding="utf-8"))).splitlines()
     found = [line.partition("  #")[0] for line in lines if all(word in line for word in words)]
     assert found, f"{page} has no command with {words}."
-    for word, other in changes.items():
-        assert word in found[0], f"{page} has no {word} in {found[0]}."
-        found[0] = found[0].replace(word, other)
     return found[0]
 
 

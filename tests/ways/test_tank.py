@@ -78,7 +78,7 @@ def film(folder, turn, seed):
 
 @pytest.mark.parametrize(
     "n_limbs, period, seed, camera",
-    [(3, "0.2", 0, POSE), pytest.param(4, "0.25", 1, MARKERS, marks=pytest.mark.slow)],
+    [(3, "0.2", 0, POSE), (4, "0.25", 1, MARKERS)],
     ids=["three limbs", "four limbs, markers"],
 )
 def test_a_robot_in_a_tank_is_filmed_fitted_trained_driven_and_put_on_a_board(story, n_limbs, period, seed, camera):
