@@ -92,6 +92,7 @@ class Estimate(NamedTuple):
         a minimum is wrong, or the scene lacks something: then intervals mean little.
     left_out: Number of points that were left out, as another one was taken for them.
     at_end: Names of parameters that are at the end of the search.
+    farthest: Picture [s] and node of the largest residual, and its size [m].
     """
 
     names: tuple[str, ...]
@@ -107,6 +108,7 @@ class Estimate(NamedTuple):
     ratio: float = math.nan
     left_out: int = 0
     at_end: tuple[str, ...] = ()
+    farthest: tuple[float, int, float] | None = None
 
     @property
     def root_mean_square(self) -> float:
@@ -122,6 +124,9 @@ class Estimate(NamedTuple):
         lines += [f"{name} = {value:.5g}   [{lower:.5g}, {upper:.5g}]" for name, value, lower, upper in rows]
         if self.delay is not None:
             lines.append("delay = {:.4f} s   [{:.4f}, {:.4f}]".format(*self.delay))
+        if self.is_doubted and self.farthest is not None:
+            picture, node, off = self.farthest
+            lines.append(f"The largest residual is {1e3 * off:.3g} mm, of node {node} at {picture:.3f} s.")
         lines += [f"{name} is at the end of the search: begin with another first guess." for name in self.at_end]
         for group in self.untold:
             what = f"{group[0]} from the data" if len(group) == 1 else f"{' and '.join(group)} apart by these data"
@@ -194,10 +199,12 @@ def identify(
             f"The best fit is {1e3 * off:.3g} mm off in the root mean square, more than half a limb: are these the "
             "track, the commands and the scene of one swim, in metres and seconds?"
         )
-    at_end = ends_of_search(residuals.names, found.fit.x, bound)
+    at_end, sizes = ends_of_search(residuals.names, found.fit.x, bound), np.linalg.norm(estimate.residuals, axis=2)
+    picture, place = np.unravel_index(np.nanargmax(sizes), sizes.shape)
+    farthest = float(measurement.time[picture]), measurement.nodes[place], float(sizes[picture, place])
     return estimate._replace(
         scene=with_parameters(scene, residuals.names, estimate.values.tolist()), noise=found.noise, ratio=found.ratio,
-        left_out=found.left_out, at_end=at_end,
+        left_out=found.left_out, at_end=at_end, farthest=farthest,
     )  # fmt: skip
 
 
