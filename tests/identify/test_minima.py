@@ -76,7 +76,11 @@ def test_a_scene_that_lacks_something_is_told_and_its_intervals_are_not_trained_
     assert found.is_doubted and "the scene lacks something" in found.report()
     picture, node, off = found.farthest
     there = found.residuals[seen.time.tolist().index(picture), seen.nodes.index(node)]
-    assert f"node {node} at {picture:.3f} s" in found.report() and np.hypot(*there) == off > 3.0 * found.noise
+    assert (
+        f"node {node} at {picture:.3f} s" in found.report()
+        and np.hypot(*there) == pytest.approx(off)
+        and off > 3.0 * found.noise
+    )
     seen.to_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
     (tmp_path / "scene.json").write_text(json.dumps(RINGING.to_dict()))
     file = tmp_path / "intervals.json"
