@@ -13,7 +13,7 @@ def test_the_first_command_ends_with_a_lap_and_a_report(story, options, slowest)
     story.types(f"{train} {options} --no-video --out run")
     laps = dict(re.findall(r"^(learned|script) +\d+ +([\d.]+) +5 of 5", story.told, re.MULTILINE))
     assert float(laps["learned"]) <= slowest, story.told
-    assert float(laps["script"]) == pytest.approx(241.0 if not options else 160.0, rel=0.25)
+    assert float(laps["script"]) == pytest.approx(114.5 if "0.5" in options else 241.0, rel=0.01)
     assert (story.folder / "run/evaluation/report.html").stat().st_size > 10_000
 
 

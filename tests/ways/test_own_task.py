@@ -30,7 +30,7 @@ model.save("mine.zip")
 
 @pytest.mark.parametrize(
     "changes, seed",
-    [({}, 0), ({"seconds=30.0": "seconds=20.0, decision_period=0.5", "price=0.01)": "price=0.002)"}, 4)],
+    [({}, 0), ({"seconds=30.0": "seconds=20.0, decision_period=0.5", "price=0.0005)": "price=0.0002)"}, 4)],
     ids=["the page's", "another"],
 )
 def test_a_task_of_ones_own_is_an_id_that_is_promised_trained_on_and_compared(story, changes, seed):
