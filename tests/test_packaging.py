@@ -23,7 +23,8 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-NOT_FROM_AN_INDEX = {"seastar_gym", "agents", "studies", "train", "rclpy", "geometry_msgs", "std_msgs"}  # ours, ROS 2's
+OURS = {"seastar_gym", "agents", "studies", "train"}
+NOT_REQUIRED = {*OURS, "rclpy", "geometry_msgs", "std_msgs", "cv2"}  # examples of ROS 2 and of OpenCV
 # Where the import name does not say it.
 DISTRIBUTION_OF = {
     "cupy": "cupy-cuda13x",
@@ -86,7 +87,7 @@ def imports_of(*paths: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
             modules.add(node.module)
     own = {path.stem for folder in ("tests", "docs", "examples") for path in (ROOT / folder).rglob("*")}
-    packages = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names - own - NOT_FROM_AN_INDEX
+    packages = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names - own - NOT_REQUIRED
     return {canonicalize_name(DISTRIBUTION_OF.get(package, package)) for package in packages}
 
 

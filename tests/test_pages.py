@@ -115,7 +115,7 @@ def test_examples_in_docstrings_give_what_they_say(file):
 
 def test_no_block_hides_from_the_tests():
     """Python stands in blocks that say so; what they hold is counted, so that none is lost by a new spelling."""
-    known = {"python", "bash", "bibtex", "c", "dockerfile", "markdown", "{toctree}"}
+    known = {"python", "bash", "bibtex", "c", "dockerfile", "json", "markdown", "{toctree}"}
     kinds = [match[1] for page in PAGES for match in FENCED.finditer(page.read_text(encoding="utf-8"))]
     assert set(kinds) <= known, f"pages have blocks of {set(kinds) - known}"
     assert sum(len(blocks(page)) for page in RUN) == kinds.count("python") > 20

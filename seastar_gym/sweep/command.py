@@ -39,7 +39,7 @@ from seastar_gym.sweep.axes import Axis, Range
 from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.controllers import Route
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.result_files import best_result, result_file_of
+from seastar_gym.sweep.result_files import ResultFiles, best_result, result_file_of
 from seastar_gym.sweep.run import Progress, run
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS
 from seastar_gym.sweep.text import axis_of
@@ -142,7 +142,8 @@ def run_sweep(sweep: Sweep, options: argparse.Namespace) -> int:
 
 def keep_best(options: argparse.Namespace) -> None:
     """Write the scene of the best design, and say which it is; nothing where no design has the objective."""
-    best = best_result(options.out, options.objective, not options.minimize)
+    is_empty = not any(ResultFiles(options.out).names())
+    best = None if is_empty else best_result(options.out, options.objective, not options.minimize)
     if best is None:
         return
     file, design = options.out / "best.json", ", ".join(f"{name}={shown(value)}" for name, value in best.design.items())
