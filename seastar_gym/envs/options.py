@@ -23,7 +23,7 @@ from seastar_gym.scene import Scene, SmaWires
 from seastar_gym.scene.checks import as_float, require_flag, require_kind, require_number, shown
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene
-from seastar_gym.scene.serial import Part, from_dict
+from seastar_gym.scene.serial import read
 
 Path = str | ArrayLike
 """Path by its name, or waypoints [m], shape (n, 2)."""
@@ -149,8 +149,3 @@ def scene_at(file: FilePath | None, fidelity: Fidelity) -> Scene | None:
         return None
     scene = load_scene(file)
     return make_scene(scene, None if scene.numerics.named else fidelity)
-
-
-def read(part: Part | Plain, kind: type[Any]) -> Part:
-    """Part that was given as an object or in plain form."""
-    return from_dict(part, kind) if isinstance(part, Mapping) else part

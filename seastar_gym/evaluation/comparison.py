@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from seastar_gym.controllers.contract import Policy, actions_of
 from seastar_gym.controllers.learned import LearnedPolicy, camera_of
 from seastar_gym.envs.commands import decisions_in
-from seastar_gym.envs.options import make_scene, read
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.films import film
@@ -24,6 +24,7 @@ from seastar_gym.extras import require_extra
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_kind
+from seastar_gym.scene.serial import read
 
 if TYPE_CHECKING:
     from seastar_gym.evaluation.report.page import Remarks

@@ -131,6 +131,11 @@ def _written_items(values: tuple[Any, ...], where: str) -> list[Any]:
     return [_written(value, f"{where}[{k}]") for k, value in enumerate(values)]
 
 
+def read(part: Part | Mapping[str, Any], kind: type[Any]) -> Part:
+    """Part that was given as an object or in plain form."""
+    return from_dict(part, kind) if isinstance(part, Mapping) else part
+
+
 def from_dict(data: object, kind: type[Part]) -> Part:
     """Part of the plain data that `to_dict` returned, in any mappings and sequences. ValueError for anything else."""
     if not isinstance(data, Mapping) or "version" not in data:

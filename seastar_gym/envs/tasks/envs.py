@@ -6,7 +6,7 @@ import gymnasium as gym
 from gymnasium.vector import AutoresetMode
 
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.options import Plain, SwimOptions, read
+from seastar_gym.envs.options import Plain, SwimOptions
 from seastar_gym.envs.seastar_swim import RenderMode, SeastarSwimEnv
 from seastar_gym.envs.sight import Drawn, Sight
 from seastar_gym.envs.task_env import arguments_of
@@ -22,7 +22,7 @@ from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.checks import require_choice, require_number, require_period, shown
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.serial import to_dict
+from seastar_gym.scene.serial import read, to_dict
 
 CHALLENGES: dict[str, Challenge] = {
     "miswired": Miswired(),
