@@ -217,6 +217,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "Route": dict(path=PATH, seconds=1.0),
         "Sweep": dict(scene=FAST, axes=(), settling=0, measured=1, robots=1),
         "read_results": dict(folder=folder()),
+        "best_result": dict(folder=folder()),
         "Processes": dict(workers=1),
         "Recorder": dict(env=batch()),
         "BatchVecEnv": dict(env=batch("SameStep")),

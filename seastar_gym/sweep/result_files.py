@@ -13,7 +13,7 @@ import pyarrow.parquet
 
 from seastar_gym.files import within, write_atomically
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_file
+from seastar_gym.scene.checks import require_file, require_flag, require_kind
 from seastar_gym.scene.per_robot import numbers_of, unit_of, with_numbers
 from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS, swim
@@ -118,6 +118,8 @@ def best_result(folder: str | os.PathLike[str], objective: str = "speed", is_lar
 
     Robots whose limbs crossed do not count.
     """
+    require_kind("objective", objective, str, "the name of a column")
+    require_flag("is_largest_best", is_largest_best)
     best, sign = None, 1.0 if is_largest_best else -1.0
     for table in _tables(folder):
         if objective not in table.column_names:
