@@ -70,6 +70,7 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--out", type=Path, default=Path("runs/drive"), help=f"folder of all files {DEFAULT}")
     found.add_argument("--no-window", action="store_true", help="show no picture while the robot swims")
     found.add_argument("--dry", action="store_true", help="end after the dry run")
+    found.add_argument("--unpaced", action="store_true", help="have a simulated plant not keep to real time")
     found.add_argument("--yes", action="store_true", help="do not ask before wires are heated")
     found.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn at random {DEFAULT}")
     return found
@@ -122,7 +123,7 @@ def opened(options: argparse.Namespace, arguments: dict[str, Any], scene: Scene 
     """Context of the plant that the options ask for; whatever ends it, wires are stopped. scene: See `simulated`."""
     with ExitStack() as ports:
         if _is_simulated(options):
-            plant: Plant = simulated(options, arguments, True, scene)
+            plant: Plant = simulated(options, arguments, not options.unpaced, scene)
         else:
             plant = LinePlant(*[ports.enter_context(open_serial(device)) for device in _devices(options)])
         try:
