@@ -256,7 +256,7 @@ ASYMMETRIC = {
     "held": (Scene(STAR, held_nodes=(6,)), None, "held"),
     "loads": (Scene(STAR, loads=((0, 1e-4, 0.0),)), None, "loaded"),
     "gravity": (Scene(replace(STAR, density=1050.0), gravity=(0.0, -9.81)), None, "gravity"),
-    "own terms": (Scene(STAR, terms=(Trap(),)), None, "isotropic"),
+    "own terms": (Scene(STAR, terms=(Trap(k=0.05, x=0.05),)), None, "isotropic"),
     "uniform current": (Scene(STAR, Water(current=UniformCurrent(2e-3))), None, "current"),
     "shear": (Scene(STAR, Water(current=ShearCurrent(0.05))), None, "current"),
     "vortex": (Scene(STAR, Water(current=Vortex(1e-3))), None, "current"),

@@ -35,7 +35,7 @@ SHORTEST = {
         "studies.robustness": {"N_PATHS": 1, "SEEDS": range(1), "OF_SEEDS": ("soft",),
                                "PERIODS": {robustness.CAMERA: 0.2},
                                "CONDITIONS": {"soft": robustness.Condition(modulus=0.5)}},
-        "agents.tasks.learning": {"ENOUGH": 2048},
+        "agents.distillation": {"ENOUGH": 2048},
     }),
     "swim_page": ({""}, {"studies.swim_page": {"record": partial(swim_page.record, "fast", 1)}}),
     "tasks --held-out --tasks SeastarPrizes-v0": (set(), {"studies.tasks": {"held_out": partial(tasks.held_out, n=2)}}),
