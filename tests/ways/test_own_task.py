@@ -23,7 +23,7 @@ batch = gym.make_vec(
     autoreset_mode=AutoresetMode.SAME_STEP,
 )
 model = PPO("MlpPolicy", BatchVecEnv(batch), n_steps=32, batch_size=256, gamma=0.8, seed={}, device="cpu")
-model.learn(16384)
+model.learn({})
 model.save("mine.zip")
 """
 
@@ -45,7 +45,7 @@ def test_a_task_of_ones_own_is_an_id_that_is_promised_trained_on_and_compared(st
     assert "passed" in story.told and "failed" not in story.told
 
     # PPO learns it, and is compared with a gait and with chance.
-    story.runs(TRAIN.format(seed))
+    story.runs(TRAIN.format(seed, 65536 if changes else 16384))
     gait = "lagged" if changes else "straight"
     line = command(PAGE, "seastar benchmark --tasks away:").replace(
         "--agents straight", f"--agents {gait} mine=mine.zip"
