@@ -27,6 +27,9 @@ from seastar_gym.evaluation.report.charts import read_progress
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import PART, is_left_behind, is_part_of, write_json, write_lines
 
+OWN_SCENE = "scene.py"
+"""File in a run's folder of a scene with classes of its own, which JSON alone does not bring."""
+
 
 def write_config(options: Options, arguments: Sequence[str], folder: Path) -> None:
     """Write config.json: options, commands, versions of libraries, and machine."""
@@ -143,4 +146,5 @@ def is_unbegun(folder: Path) -> bool:
 
 def resume_command(folder: Path) -> str:
     """Command that continues the run in a folder."""
-    return shlex.join(["python", "train.py", "--resume", str(folder)])
+    own = ["--run-scene"] if (folder / OWN_SCENE).is_file() else []
+    return shlex.join(["python", "train.py", "--resume", str(folder), *own])

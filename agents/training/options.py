@@ -99,7 +99,11 @@ class Options(Lengths):
     resume: Path | None = None
     """Folder of a run to continue with its own options; strokes, num_threads, device, save_freq, video and publish
     may differ. It is safe to continue a run of others: its files are read as JSON and tensors, and nothing is
-    unpickled. Stable-Baselines3's own PPO.load, however, would execute code in its model.zip."""
+    unpickled or executed without --run-scene. Stable-Baselines3's own PPO.load, however, would execute code in its
+    model.zip."""
+    run_scene: bool = False
+    """Have --resume execute the run's scene.py, which runs of scenes with classes of their own have: for runs that are
+    yours."""
     for_camera: Path | None = None
     """JSON file of a camera. With --resume: train no more, but make a policy for that camera, which `seastar drive`
     takes, by imitation of the run's policy, in a folder of the run that is named as the file (docs/plant.md)."""
@@ -130,7 +134,7 @@ class Options(Lengths):
 
 CHANGEABLE = {
     "strokes", "num_threads", "device", "save_freq", "video", "publish", "publish_anyway", "out", "resume", "quick",
-    "for_camera",
+    "for_camera", "run_scene",
 }  # fmt: skip
 """Names of the options that may change when a run is continued."""
 
@@ -158,7 +162,7 @@ def saved_options(folder: Path) -> Options:
     options = config_of(folder)["options"]
     with faults_of(folder / CONFIG):
         here: dict[str, Any] = {"out": folder, "resume": None, "ppo": hyperparameters_of(options), "seeds": ()}
-        here |= {"publish": False, "publish_anyway": False, "for_camera": None}
+        here |= {"publish": False, "publish_anyway": False, "for_camera": None, "run_scene": False}
         here |= {name: Path(options[name]) for name in ("scene", "intervals") if options[name] is not None}
         return Options(**{**options, **here})
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
+from agents.training.folder import OWN_SCENE
 from agents.training.options import Options
 from seastar_gym.envs.options import scene_at
 from seastar_gym.envs.randomization import DomainRandomization, Uniform
@@ -14,9 +15,8 @@ from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene, search
 from seastar_gym.scene.serial import has_own_kinds
 
-SCENE, OWN_SCENE, INTERVALS = "scene.json", "scene.py", "intervals.json"
-"""Files in a run's folder, so that a run that is continued has the robot that it began with. OWN_SCENE is the file of a
-scene with classes of its own, which JSON alone does not bring."""
+SCENE, INTERVALS = "scene.json", "intervals.json"
+"""Files in a run's folder, so that a run that is continued has the robot that it began with."""
 
 
 class Robot(NamedTuple):
@@ -87,10 +87,13 @@ def scene_in(folder: Path) -> Path:
 
 
 def robot_of(options: Options, folder: Path) -> Robot:
-    """Robot of the run with these options in a folder."""
-    if options.scene is not None:
-        search(options.scene.parent)  # for modules that a scene of its own imports
+    """Robot of the run with these options in a folder. ValueError for code of a run that may not be executed."""
+    file = None if options.scene is None else scene_in(folder)
+    if options.scene is not None and file is not None and file.name == OWN_SCENE:
+        if options.resume is not None and not options.run_scene:
+            raise ValueError(f"{file} is Python, which --resume executes with --run-scene only: see that it is yours.")
+        search(options.scene.parent)  # for modules that it imports
     return Robot(
-        None if options.scene is None else load_scene(scene_in(folder)),
+        None if file is None else load_scene(file),
         None if options.intervals is None else read_intervals(folder / INTERVALS),
     )

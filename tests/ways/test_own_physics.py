@@ -37,7 +37,9 @@ def test_a_robot_with_a_force_of_its_own_is_trained_continued_and_compared(story
     story.has("drag.py", block(PAGE, "class LinearDrag").partition("\nscene = ")[0])
     story.has("my_scene.py", SCENE.format(n_limbs, drag))
     story.types(f"{command('docs/own_robot.md', 'train.py --scene')} {SHORT} {options} --out runs/mine")
-    story.types("python train.py --resume runs/mine --strokes 12288 --no-video")
+    story.types("python train.py --resume runs/mine --strokes 12288 --no-video", ends=2)
+    assert "--run-scene" in story.told  # code of a run is executed for those only who say so
+    story.types("python train.py --resume runs/mine --run-scene --strokes 12288 --no-video")
     period = "--decision-period 0.5" if "0.5" in options else ""
     story.types(f"seastar evaluate --scene runs/mine/scene.py --agents runs/mine/policy.safetensors greedy {period}")
     policy, greedy = re.findall(r"^(?:policy|greedy) .*? (\d) of 5 ", story.told, re.MULTILINE)

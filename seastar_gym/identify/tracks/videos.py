@@ -115,7 +115,7 @@ def _deeplabcut_csv(file: str | Path, form: Form) -> tuple[dict[str, list[str]],
 
 
 def _deeplabcut_hdf5(file: str | Path) -> tuple[dict[str, list[str]], Floats]:
-    """The same of HDF5."""
+    """Headers by their names, and the numbers below, of a table of pandas in HDF5."""
     require_extra("Files of DeepLabCut in HDF5", "tracks", "pandas", "tables")
     import pandas as pd
 
