@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seastar_gym.der.stepping.schemes import SCHEMES, Scheme, scheme_of, tableau
+from seastar_gym.der.stepping.schemes import OWN_SCHEMES, SCHEMES, Scheme, scheme_of, tableau
 from seastar_gym.scene import numerics
 from seastar_gym.scene.checks import shown
 from seastar_gym.scene.scene import Scene
@@ -21,10 +21,11 @@ def register_scheme(name: str, A: ArrayLike, b: ArrayLike) -> None:
     if not isinstance(name, str) or not (name and name.isprintable()):
         raise ValueError(f"A scheme's name must be a text, not {shown(name)}.")
     own = tableau(A, b)
-    known = SCHEMES.get(name, own)
+    known = {**SCHEMES, **OWN_SCHEMES}.get(name, own)
     if not (np.array_equal(known.a, own.a) and np.array_equal(known.b, own.b)):
         raise ValueError(f"There is a scheme {name!r} with other numbers already: give this one another name.")
-    SCHEMES[name] = own
+    if name not in SCHEMES:
+        OWN_SCHEMES[name] = own
     if name not in numerics.SCHEME_NAMES:
         numerics.SCHEME_NAMES.append(name)
 

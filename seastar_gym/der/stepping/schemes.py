@@ -65,6 +65,9 @@ SCHEMES = {
     "implicit-midpoint": _scheme([[0.5]], [1.0]),  # order 2, keeps the amplitude of every oscillation
 }
 
+OWN_SCHEMES: dict[str, Scheme] = {}
+"""Those that a user has registered."""
+
 
 def tableau(A: ArrayLike, b: ArrayLike) -> Scheme:
     """Scheme of a Butcher tableau. ValueError for what the stages of stages.py cannot solve, or what would blow up."""
@@ -97,4 +100,6 @@ def largest_growth(A: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 
 def scheme_of(name: str, damping: float) -> Scheme:
     """Scheme of this name; damping: Of the implicit midpoint rule, see above, 0 for other schemes."""
+    if name in OWN_SCHEMES:
+        return OWN_SCHEMES[name]
     return SCHEMES[name] if damping == 0.0 else _scheme([[0.5 * (1.0 + damping)]], [1.0])
