@@ -13,6 +13,7 @@ from seastar_gym.lazy import lazily
 
 if TYPE_CHECKING:
     from seastar_gym.accuracy.certificate import Certificate as Certificate
+    from seastar_gym.accuracy.chapter import scene_for as scene_for
     from seastar_gym.accuracy.measure import certify as certify
     from seastar_gym.envs.headings import HeadingTargets as HeadingTargets
     from seastar_gym.envs.randomization import DomainRandomization as DomainRandomization

@@ -16,11 +16,13 @@ returns, so it is no bound for all: docs/numerics.md says how many of fresh ones
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
+from os import PathLike
 from pathlib import Path
 
-from seastar_gym.accuracy.certificate import CLASSES_VERSION, Certificate
+from seastar_gym.accuracy.certificate import CLASSES_VERSION, Certificate, as_certificate
 from seastar_gym.accuracy.setting import Setting
-from seastar_gym.scene.checks import require_number
+from seastar_gym.scene import Scene, Seastar
+from seastar_gym.scene.checks import require_flag, require_number
 from seastar_gym.version import __version__
 
 FOLDER = Path(__file__).with_name("shipped")
@@ -41,6 +43,35 @@ def _load(file: Path) -> Certificate:
 def chapters_certificate() -> Certificate:
     """Errors and speeds of the chapter's robot in strokes."""
     return _load(STROKES)
+
+
+def scene_for(
+    error: float,
+    any_gait: bool = False,
+    robot: Seastar | None = None,
+    certificate: Certificate | str | PathLike[str] | None = None,
+) -> Scene:
+    """Scene at the fastest measured setting whose path error is at most `error`.
+
+    The error is that of the hub's path against infinitely many nodes and infinitely short steps, as a fraction of the
+    path's length. ValueError if no measured setting keeps it, or if the robot was not measured.
+
+    any_gait: Require it for the repetition of any command, too, which is harder.
+    robot: The robot. Nodes per limb and a discretisation that it names are kept, others are chosen.
+    certificate: `Certificate` of the scene, or the file of one, whose errors are those of any gait. It lapses where the
+        robot or the version of the package differs. None means the package's own, which is of the chapter's robot and
+        water.
+
+    >>> scene_for(0.002).robot.nodes_per_limb
+    28
+    >>> scene_for(1e-6)
+    Traceback (most recent call last):
+    ValueError: No measured setting keeps the path error below 0.0001 %: the best, ...
+    """
+    require_flag("any_gait", any_gait)
+    known = chapters_certificate() if certificate is None else as_certificate(certificate)
+    classes = known.promised + known.repeated(tuple(known.settings[0].errors)) if any_gait else known.promised
+    return known.for_error(error, classes, robot)
 
 
 def timed_certificate(decision_period: float) -> Certificate | None:

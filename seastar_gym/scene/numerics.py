@@ -118,7 +118,7 @@ PRESETS: dict[Fidelity, Resolution] = {
     "chapter": Resolution("chapter", NODES["chapter"], Numerics("implicit-euler", 3e-3)),
 }
 """`fast` and `balanced` lie on or near the front that `python -m studies.accuracy` measures. `accurate` and `reference`
-have steps so short that longer ones on finer meshes reach their errors faster, see `Scene.for_error`."""
+have steps so short that longer ones on finer meshes reach their errors faster, see `scene_for`."""
 
 DEFAULT_FIDELITY: Fidelity = "balanced"
 DEFAULT = PRESETS[DEFAULT_FIDELITY].numerics

@@ -12,8 +12,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from operator import itemgetter
-from os import PathLike
-from typing import TYPE_CHECKING, Any, cast, get_args
+from typing import Any, cast, get_args
 
 import numpy as np
 
@@ -25,7 +24,6 @@ from seastar_gym.scene.checks import (
     is_finite_number,
     require_choice,
     require_count,
-    require_flag,
     require_numbers,
     shown,
 )
@@ -40,9 +38,6 @@ from seastar_gym.scene.serial import from_dict, register_part, to_dict
 from seastar_gym.scene.shape import cross_at_rest, n_hub_hinges, natural_hub_angle, turn_per_hinge
 from seastar_gym.scene.summary import scene_html, short_repr
 from seastar_gym.scene.terms import is_term
-
-if TYPE_CHECKING:
-    from seastar_gym.accuracy import Certificate
 
 
 @register_part
@@ -341,38 +336,6 @@ class Scene:
             discretisation, nodes_per_limb = self.robot.discretisation, self.robot.nodes_per_limb
         robot = self.robot.resolved(discretisation, nodes_per_limb)
         return replace(self, robot=robot, numerics=self.numerics if self.numerics.named else numerics)
-
-    @classmethod
-    def for_error(
-        cls,
-        error: float,
-        any_gait: bool = False,
-        robot: Seastar | None = None,
-        certificate: Certificate | str | PathLike[str] | None = None,
-    ) -> Scene:
-        """Scene at the fastest measured setting whose path error is at most `error`.
-
-        The error is that of the hub's path against infinitely many nodes and infinitely short steps, as a fraction of
-        the path's length. ValueError if no measured setting keeps it, or if the robot was not measured.
-
-        any_gait: Require it for the repetition of any command, too, which is harder.
-        robot: The robot. Nodes per limb and a discretisation that it names are kept, others are chosen.
-        certificate: `Certificate` of the scene, or the file of one, whose errors are those of any gait. It lapses where
-            the robot or the version of the package differs. None means the package's own, which is of the chapter's
-            robot and water.
-
-        >>> Scene.for_error(0.002).robot.nodes_per_limb
-        28
-        >>> Scene.for_error(1e-6)
-        Traceback (most recent call last):
-        ValueError: No measured setting keeps the path error below 0.0001 %: the best, ...
-        """
-        from seastar_gym.accuracy import as_certificate, chapters_certificate  # these are made of scenes
-
-        require_flag("any_gait", any_gait)
-        known = chapters_certificate() if certificate is None else as_certificate(certificate)
-        classes = known.promised + known.repeated(tuple(known.settings[0].errors)) if any_gait else known.promised
-        return known.for_error(error, classes, robot)
 
     @property
     def is_chapters(self) -> bool:

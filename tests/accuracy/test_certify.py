@@ -14,7 +14,7 @@ import seastar_gym
 from drawn import drawn
 from odd_values import taken
 from refusals import assert_refused, assert_told
-from seastar_gym import Body, Certificate, Contact, Numerics, Scene, Seastar, SmaPulse, SmaWires
+from seastar_gym import Body, Certificate, Contact, Numerics, Scene, Seastar, SmaPulse, SmaWires, scene_for
 from seastar_gym.accuracy import command, commands, measure, timed_certificate
 from seastar_gym.accuracy.certificate import _digest
 from seastar_gym.accuracy.setting import resolved
@@ -133,13 +133,13 @@ def test_for_error_is_the_fastest_setting_that_keeps_it_and_gathers_no_energy(ce
     stable = replace(certificate, settings=tuple(growing))
     assert chosen(stable, max(errors))[1:] != chosen(certificate, max(errors))[1:]
     for given in (certificate, file, str(file)):
-        assert Scene.for_error(max(errors), certificate=given) == certificate.for_error(max(errors))
-    kept = Scene.for_error(0.9, robot=Seastar(limb_length=0.08, nodes_per_limb=9), certificate=certificate)
+        assert scene_for(max(errors), certificate=given) == certificate.for_error(max(errors))
+    kept = scene_for(0.9, robot=Seastar(limb_length=0.08, nodes_per_limb=9), certificate=certificate)
     assert kept.robot.nodes_per_limb == 9 and kept.robot.limb_length == 0.08
 
 
 def other_robot(**numbers):
-    return lambda mine: Scene.for_error(0.9, robot=Seastar(**numbers), certificate=mine)
+    return lambda mine: scene_for(0.9, robot=Seastar(**numbers), certificate=mine)
 
 
 def lapsed(**entries):
@@ -155,8 +155,8 @@ NOT_CHOSEN = [
     (lapsed(classes=7), "certify the scene again"),
     (other_robot(limb_length=0.08, nodes_per_limb=10), "measured with 5, 9 nodes per limb"),
     (other_robot(limb_length=0.07, nodes_per_limb=9), "of another scene"),
-    (lambda mine: Scene.for_error(0.9, robot=SMALL_ROBOT, certificate=replace(mine, version="0.0.1")), "0.0.1"),
-    (lambda mine: Scene.for_error(0.9, certificate="not there.json"), "cannot be read"),
+    (lambda mine: scene_for(0.9, robot=SMALL_ROBOT, certificate=replace(mine, version="0.0.1")), "0.0.1"),
+    (lambda mine: scene_for(0.9, certificate="not there.json"), "cannot be read"),
 ]  # fmt: skip
 
 

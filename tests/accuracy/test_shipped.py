@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import Certificate, Contact, Limb, Numerics, Scene, Seastar, SmaPulse, Strip, Water
+from seastar_gym import Certificate, Contact, Limb, Numerics, Scene, Seastar, SmaPulse, Strip, Water, scene_for
 from seastar_gym.accuracy import Setting, chapters_certificate, timed_certificate
 from seastar_gym.accuracy.chapter import FOLDER, file_of
 from seastar_gym.accuracy.commands import draw_classes
@@ -162,7 +162,7 @@ WANTED = [0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005]
 @pytest.mark.parametrize("any_gait", [False, True])
 @pytest.mark.parametrize("error", WANTED)
 def test_for_error_picks_the_fastest_setting_that_keeps_the_error(error, any_gait):
-    scene = Scene.for_error(error, any_gait)
+    scene = scene_for(error, any_gait)
     chosen, classes = known(scene), ("random", "repeated")[: 1 + any_gait]
     assert scene.is_chapters and scene.numerics.named
     assert chosen.error(classes) <= error
@@ -186,7 +186,7 @@ TEN, NINE = (Seastar(nodes_per_limb=n, discretisation=kind) for n, kind in ((10,
 )
 def test_for_error_refuses_another_robot_and_what_was_not_measured(error, robot, sentence):
     with pytest.raises(ValueError, match=rf"^{sentence}") as refusal:
-        Scene.for_error(error, robot=robot)
+        scene_for(error, robot=robot)
     assert str(refusal.value).endswith(".")
 
 
@@ -194,9 +194,9 @@ def test_for_error_refuses_another_robot_and_what_was_not_measured(error, robot,
 def test_for_error_refuses_what_the_table_cannot_promise_and_names_the_best(any_gait):
     best = min(row.error(("random", "repeated")[: 1 + any_gait]) for row in TABLE.settings)
     with pytest.raises(ValueError, match=r"^No measured setting keeps .*: the best, .* keeps .* %\.$") as refusal:
-        Scene.for_error(0.9 * best, any_gait)
+        scene_for(0.9 * best, any_gait)
     assert f"{100 * best:g} %" in str(refusal.value)
-    assert Scene.for_error(best, any_gait)
+    assert scene_for(best, any_gait)
 
 
 # The promise, kept
@@ -226,7 +226,7 @@ def test_runs_at_a_fidelity_and_at_reference_differ_by_no_more_than_promised(nam
 @pytest.mark.parametrize("error", [0.05, 0.01])
 def test_for_error_keeps_the_error_on_unseen_commands(error, reference):
     batches, exact = reference
-    found = swim(batches[0], Scene.for_error(error))
+    found = swim(batches[0], scene_for(error))
     assert path_errors(found, exact[0]).max() <= error + path_error("reference")
 
 
@@ -254,7 +254,7 @@ def unseen():
 def test_promises_hold_on_200_sequences_that_the_study_did_not_use(name, unseen):
     cases, exact = unseen
     assert len(cases) == 200
-    scene = Scene.preset(name) if isinstance(name, str) else Scene.for_error(name)
+    scene = Scene.preset(name) if isinstance(name, str) else scene_for(name)
     off = path_errors(swim(cases, scene), exact)
     allowed = promised_errors(known(scene), cases.kinds) + promised_errors(known("reference"), cases.kinds)
     broken = [(cases.names[k], off[k], allowed[k]) for k in np.flatnonzero(off > allowed)]
@@ -265,7 +265,7 @@ def test_promises_hold_on_200_sequences_that_the_study_did_not_use(name, unseen)
 @pytest.mark.parametrize("error", [0.1, 0.03])
 def test_for_error_of_any_gait_keeps_it_whatever_command_is_repeated(error):
     exact = swim(gaits(), Scene.preset("reference"))
-    found = swim(gaits(), Scene.for_error(error, any_gait=True))
+    found = swim(gaits(), scene_for(error, any_gait=True))
     assert path_errors(found, exact).max() <= error + known("reference").errors["repeated"]
 
 

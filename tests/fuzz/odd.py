@@ -28,6 +28,7 @@ from seastar_gym import (
     Stiffening,
     Uniform,
     UniformCurrent,
+    scene_for,
 )
 from seastar_gym.accuracy import chapters_certificate, timed_certificate
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -73,7 +74,7 @@ MADE: Calls = {
     "SmaLimb.preset": (SmaLimb.preset, dict(liquid_metal=20)),
     "Numerics.preset": (Numerics.preset, dict(fidelity="fast")),
     "Scene.preset": (Scene.preset, dict(fidelity="fast")),
-    "Scene.for_error": (Scene.for_error, dict(error=0.1, any_gait=True)),
+    "scene_for": (scene_for, dict(error=0.1, any_gait=True)),
     "chapters_certificate().for_error": (chapters_certificate().for_error, dict(error=0.1, classes=("random",))),
     "chapters_certificate().of": (chapters_certificate().of, dict(scene=Scene.preset("fast"))),
     "timed_certificate": (timed_certificate, dict(decision_period=0.2)),

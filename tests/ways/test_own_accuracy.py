@@ -17,12 +17,12 @@ SWIM = """
 import gymnasium as gym
 
 import seastar_gym
-from seastar_gym import Certificate, Scene
+from seastar_gym import Certificate, Scene, scene_for
 from seastar_gym.controllers.learned import load
 from seastar_gym.scene.scene_file import load_scene
 
 certificate, policy = Certificate.load("certificate.json"), load("runs/mine/policy.safetensors")
-scene = Scene.for_error({error}, certificate="certificate.json")
+scene = scene_for({error}, certificate="certificate.json")
 assert scene == load_scene("chosen.json")
 env = gym.make("SeastarSwim-v0", scene=scene, certificate="certificate.json", actions=policy.actions)
 observation, info = env.reset(seed={seed})
