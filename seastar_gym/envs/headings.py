@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene.checks import is_finite_number, require_number, shown
+from seastar_gym.scene.number import make_floats
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
@@ -40,6 +41,7 @@ class HeadingTargets:
     tolerance: float = math.radians(10.0)
 
     def __post_init__(self) -> None:
+        make_floats(self)
         angles = self.target if isinstance(self.target, tuple) else (self.target,)
         is_named = isinstance(self.target, str) and self.target in ("along", "random")
         if not is_named and not (angles and all(map(_is_angle, angles))):

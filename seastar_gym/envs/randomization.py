@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_finite, require_number, shown
+from seastar_gym.scene.number import make_floats
 from seastar_gym.scene.per_robot import numbers_of, with_numbers
 from seastar_gym.scene.serial import register_part
 
@@ -34,6 +35,7 @@ class Uniform:
     high: float
 
     def __post_init__(self) -> None:
+        make_floats(self)
         require_finite("low", self.low, "of its number")
         require_finite("high", self.high, "of its number")
         if not self.low <= self.high:
@@ -60,6 +62,7 @@ class LogUniform:
     high: float
 
     def __post_init__(self) -> None:
+        make_floats(self)
         require_number("low", self.low, "of its number")
         Uniform(self.low, self.high)
 
@@ -83,6 +86,7 @@ class Normal:
     deviation: float
 
     def __post_init__(self) -> None:
+        make_floats(self)
         require_finite("mean", self.mean, "of its number")
         require_number("deviation", self.deviation, "of its number", zero_allowed=True)
 

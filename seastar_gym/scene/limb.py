@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene.checks import is_finite_number, shown
-from seastar_gym.scene.number import Numbers, Profile, as_tuple, check_numbers, finite, positive
+from seastar_gym.scene.number import Numbers, Profile, as_tuple, check_numbers, finite, make_floats, positive
 from seastar_gym.scene.section import AnySection, Cut, cuts
 from seastar_gym.scene.serial import register_part
 
@@ -50,6 +50,7 @@ class Limb:
     section: AnySection | None = None
 
     def __post_init__(self) -> None:
+        make_floats(self)
         if self.direction is not None and not (is_finite_number(self.direction) and 0 <= self.direction < 2 * math.pi):
             raise ValueError(
                 f"A limb's direction must be from 0 to below 2 pi [rad], for all robots, not {shown(self.direction)}."

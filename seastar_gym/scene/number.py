@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene.checks import (
     as_float,
+    as_typed,
     require_count,
+    require_few,
     require_finite,
     require_number,
     require_numbers,
@@ -32,6 +34,8 @@ Typed as Any for the latter, so that code for the scene of one robot may read a 
 """
 Profile: TypeAlias = float | tuple[float, ...]
 """Number, or positive numbers at equally spaced points of a limb from hub to tip (both included), linear in between."""
+MOST_ENTRIES = 100_000
+"""Most entries of a tuple of a part, such as loads or points of a curve; not of numbers of each robot."""
 Range: TypeAlias = tuple[float, float]
 """Smallest and largest number of a uniform draw."""
 
@@ -129,11 +133,31 @@ def declared(kind: Hashable) -> dict[str, Declared]:
     return {name: each for name, each in found.items() if isinstance(each.number, Number)}
 
 
+def make_floats(part: Any) -> None:
+    """Make floats of a dataclass's finite numbers where its annotations say float; refuse tuples that are too long."""
+    for name, hint in annotated(part.__class__).items():
+        value = getattr(part, name)
+        if type(value) is tuple:
+            require_few(name, value, MOST_ENTRIES)
+        object.__setattr__(part, name, as_typed(value, hint))
+
+
+@cache
+def annotated(kind: Hashable) -> dict[str, Any]:
+    """Annotations of a dataclass's fields; none of other classes."""
+    own = fields(kind) if is_dataclass(kind) else ()
+    hints = get_type_hints(kind) if own else {}
+    return {field.name: hints[field.name] for field in own}
+
+
 def check_numbers(part: Any, whose: str = "") -> None:
     """Refuse numbers of a part that are not as it declares, and store those of each robot as `PerRobot`.
 
+    Whole numbers become floats first, where the annotations say float.
+
     whose: Beginning of the names in sentences, such as "Prey.".
     """
+    make_floats(part)
     for name, (number, is_per_robot, is_optional, may_be_profile) in declared(part.__class__).items():
         value = getattr(part, name)
         if value is None and is_optional:

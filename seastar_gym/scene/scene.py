@@ -29,7 +29,7 @@ from seastar_gym.scene.checks import (
 )
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.fluid import Water
-from seastar_gym.scene.number import as_tuple, check_numbers
+from seastar_gym.scene.number import as_tuple, check_numbers, make_floats
 from seastar_gym.scene.numerics import DEFAULT, DEFAULT_FIDELITY, MAX_STEPS, PRESETS, Fidelity, Numerics
 from seastar_gym.scene.per_robot import batch_size, chosen
 from seastar_gym.scene.robot import Seastar
@@ -84,6 +84,7 @@ class Scene:
     terms: tuple[Any, ...] = ()
 
     def __post_init__(self) -> None:
+        make_floats(self)
         for name, value, kinds in (
             ("robot", self.robot, Seastar),
             ("fluid", self.fluid, Water | None),

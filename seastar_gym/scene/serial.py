@@ -14,20 +14,17 @@ import json
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from functools import cache, partial, wraps
-from typing import Any, ClassVar, TypeVar, get_origin, get_type_hints
+from typing import Any, TypeVar
 
 import numpy as np
 
-from seastar_gym.scene.checks import as_typed, is_finite_number, require_few, require_unmasked, shown
-from seastar_gym.scene.number import PerRobot, Unnamed
+from seastar_gym.scene.checks import is_finite_number, require_few, require_unmasked, shown
+from seastar_gym.scene.number import MOST_ENTRIES, PerRobot, Unnamed
 
 VERSION = 1
 """Version of the plain form."""
 DEEPEST = 32
 """Largest depth of nested lists and dicts that is read."""
-MOST_ENTRIES = 100_000
-"""Most entries of a tuple of a part, such as loads or points of a curve; not of numbers of each robot."""
 
 Part = TypeVar("Part")
 
@@ -42,35 +39,13 @@ def register_part(kind: type[Part]) -> type[Part]:
 
     The class must keep its constructor's arguments as attributes of the same names and compare by value, as a dataclass
     does. The arguments may be numbers, texts, None, tuples of at most MOST_ENTRIES, dicts and parts of registered
-    classes. The class must be registered before a scene with it is read. Finite numbers of a dataclass with
-    `__post_init__` become floats before it, where its annotations say float.
+    classes. The class must be registered before a scene with it is read.
     """
     known = KINDS.setdefault(kind.__name__, kind)
     if (known.__module__, known.__qualname__) != (kind.__module__, kind.__qualname__):
         raise ValueError(f"There is a part of the name {kind.__name__} already: give this class another one.")
     KINDS[kind.__name__] = kind
-    if hasattr(kind, "__post_init__"):
-        _make_floats(kind)
     return kind
-
-
-def _make_floats(kind: type) -> None:
-    """Have a dataclass make floats of its numbers before it checks them, where its annotations say float."""
-    check = kind.__post_init__  # type: ignore[attr-defined]
-    arguments_of = cache(partial(_arguments, kind))
-    annotations = cache(lambda: {name: hint for name, hint in get_type_hints(kind).items() if "float" in str(hint)})
-
-    @wraps(check)
-    def floats_first(part: Any, *arguments: Any) -> None:
-        for name in arguments_of():
-            if type(value := getattr(part, name, None)) is tuple:
-                require_few(name, value, MOST_ENTRIES)
-        for name, hint in annotations().items():
-            if get_origin(hint) is not ClassVar and hasattr(part, name):
-                object.__setattr__(part, name, as_typed(getattr(part, name), hint))
-        check(part, *arguments)
-
-    kind.__post_init__ = floats_first  # type: ignore[attr-defined]
 
 
 def _arguments(kind: type) -> list[str]:

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.scene.actuators.actuator import ActuatorBase
 from seastar_gym.scene.actuators.heating import WIRE_POWER, share_of_pulse
 from seastar_gym.scene.checks import require_flag, require_number, require_numbers, shown
-from seastar_gym.scene.number import Numbers, check_numbers, not_negative
-from seastar_gym.scene.serial import MOST_ENTRIES, register_part
+from seastar_gym.scene.number import MOST_ENTRIES, Numbers, check_numbers, not_negative
+from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
 
