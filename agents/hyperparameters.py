@@ -4,8 +4,8 @@ import operator
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from seastar_gym import RewardWeights
 from seastar_gym.envs.commands import Discrete
+from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.scene.checks import (
     require_choice,
     require_count,

@@ -72,7 +72,7 @@ def make_body(robot: Seastar, mesh: Mesh, water: Water, gravity: tuple[float, fl
     assert body is not None
     arms = [limb.root for limb in robot.limb_shapes()]
     mass, drag = body.mass_at(robot.density), body_drag(body, water)
-    fluid, turning = added_mass(body, water)
+    fluid, turning = added_mass_of_body(body, water)
     coefficients = term.coefficients(
         mesh,
         robot.density,
@@ -148,7 +148,7 @@ def outline_strips(shape: Outline, per_area: float) -> Floats:
     return np.array([[*key, c] for key, c in found.items()])
 
 
-def added_mass(body: Body, water: Water) -> tuple[Floats | None, float]:
+def added_mass_of_body(body: Body, water: Water) -> tuple[Floats | None, float]:
     """(xx, xy, yy) [kg] of fluid that moves along with a body, and its moment of inertia [kg m^2]; None, 0 for none."""
     if water.added_mass_coefficient is None:
         return None, 0.0

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.der.mesh import Mesh, Sections, mean
 from seastar_gym.scene.limb import LimbShape
-from seastar_gym.scene.number import along
+from seastar_gym.scene.number import profile_at
 from seastar_gym.scene.shape import turn_per_hinge
 
 Floats = NDArray[np.float64]
@@ -29,8 +29,8 @@ def make_mesh(limbs: Sequence[LimbShape], nodes_per_limb: int, density: float) -
         limb_lengths=[limb.length for limb in limbs],
         at_edges=sections(limbs, density, at_edges, (-1,)),
         at_nodes=sections(limbs, density, at_nodes, (n_limbs, nodes_per_limb)),
-        modulus_at_edges=np.concatenate([along(limb.youngs_modulus, at_edges) for limb in limbs]),
-        modulus_at_nodes=np.array([along(limb.youngs_modulus, at_nodes) for limb in limbs]),
+        modulus_at_edges=np.concatenate([profile_at(limb.youngs_modulus, at_edges) for limb in limbs]),
+        modulus_at_nodes=np.array([profile_at(limb.youngs_modulus, at_nodes) for limb in limbs]),
         natural_turn=[turn_per_hinge(limb, nodes_per_limb) for limb in limbs],
     )
 

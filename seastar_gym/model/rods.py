@@ -27,11 +27,11 @@ from seastar_gym.der.terms import (
 from seastar_gym.model.body import body_rim, make_body
 from seastar_gym.model.currents import current_rows
 from seastar_gym.model.mesh import make_mesh
+from seastar_gym.scene import Scene
 from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.fluid import Water
 from seastar_gym.scene.numerics import ADAPTATION, MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP
 from seastar_gym.scene.per_robot import chosen, of_robot
-from seastar_gym.scene.scene import Scene
 from seastar_gym.scene.shape import natural_hub_angle
 
 VACUUM = Water(density=0.0, drag_coefficient=0.0)

@@ -9,7 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene.checks import require_numbers, shown
-from seastar_gym.scene.number import Numbers, Profile, along, as_tuple, check_numbers, not_negative, positive, within
+from seastar_gym.scene.number import (
+    Numbers,
+    Profile,
+    as_tuple,
+    check_numbers,
+    not_negative,
+    positive,
+    profile_at,
+    within,
+)
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
@@ -49,7 +58,7 @@ class AlongLimb:
         points = as_tuple(self.profile)
         n_edges = nodes_per_limb - 1
         s = np.union1d(np.linspace(0.0, 1.0, nodes_per_limb), np.linspace(0.0, 1.0, max(len(points), 2)))
-        p, length = np.array(along(points, s)), np.diff(s)
+        p, length = np.array(profile_at(points, s)), np.diff(s)
         edge = np.minimum((0.5 * (s[1:] + s[:-1]) * n_edges).astype(int), n_edges - 1)
         outer = np.stack([s[:-1], s[1:]]) * n_edges - edge
         ends = np.stack([p[:-1], p[1:]])

@@ -184,7 +184,7 @@ def as_tuple(profile: Profile) -> tuple[float, ...]:
     return profile if isinstance(profile, tuple) else (profile,)
 
 
-def along(profile: tuple[float, ...], share: NDArray[np.float64]) -> list[float]:
+def profile_at(profile: tuple[float, ...], share: NDArray[np.float64]) -> list[float]:
     """Values of a profile at fractions of the length from hub to tip."""
     if len(profile) == 1:
         return [*profile] * len(share)

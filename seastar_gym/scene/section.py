@@ -13,7 +13,7 @@ from typing import Annotated, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.number import Numbers, PerRobot, Profile, along, as_tuple, check_numbers, positive
+from seastar_gym.scene.number import Numbers, PerRobot, Profile, as_tuple, check_numbers, positive, profile_at
 from seastar_gym.scene.serial import register_part
 
 BROADSIDE = ((0.1, 2.23), (0.2, 1.98), (0.5, 1.70), (1.0, 1.51), (2.0, 1.36), (5.0, 1.21), (10.0, 1.14))
@@ -187,8 +187,8 @@ def broadside(height_over_width: float) -> float:
 def cuts(section: AnySection, moduli: tuple[float, ...], density: float, share: NDArray[np.float64]) -> list[Cut]:
     """Cuts of one robot's limb at fractions of its length from hub to tip; moduli: Profile of Young's modulus [Pa]."""
     numbers = [getattr(section, field.name) for field in dataclasses.fields(section)]
-    places = [[None] * len(share) if number is None else along(as_tuple(number), share) for number in numbers]
-    return [section.cut(E, density, *place) for E, *place in zip(along(moduli, share), *places, strict=True)]
+    places = [[None] * len(share) if number is None else profile_at(as_tuple(number), share) for number in numbers]
+    return [section.cut(E, density, *place) for E, *place in zip(profile_at(moduli, share), *places, strict=True)]
 
 
 def _is_less(inner: Profile | Numbers, outer: Profile | Numbers) -> bool:
@@ -198,4 +198,4 @@ def _is_less(inner: Profile | Numbers, outer: Profile | Numbers) -> bool:
     if isinstance(inner, PerRobot) or isinstance(outer, PerRobot):
         return max(as_tuple(inner)) < min(as_tuple(outer))
     corners = np.concatenate([np.linspace(0.0, 1.0, len(as_tuple(each))) for each in (inner, outer)])
-    return bool(np.less(along(as_tuple(inner), corners), along(as_tuple(outer), corners)).all())
+    return bool(np.less(profile_at(as_tuple(inner), corners), profile_at(as_tuple(outer), corners)).all())
