@@ -15,18 +15,15 @@ error in about 95 % of strokes of the robot that needs the largest, as `python -
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
 from seastar_gym.scene.per_robot import column
 from seastar_gym.simulator.state import State
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from seastar_gym.simulator.watch import Floats, Mask, Swimmers, Watch
 
 FACTORS: dict[str, float] = {
     "implicit-midpoint": 4.5, "sdirk2": 5.0, "sdirk3": 7.5, "implicit-euler": 9.0,
@@ -38,23 +35,6 @@ OF_ONE_MESH = (
     "Held nodes and loads belong to one mesh, so this scene has no twin of shorter edges that would tell its error: "
     "use error_bars=False."
 )
-
-
-class Swimmers(Protocol):
-    """What a twin does, as a `Simulator` does it."""
-
-    scene: Scene
-
-    def advance(self, duration: float, commands: ArrayLike | None = None) -> object: ...
-    def reset(self, mask: ArrayLike | None = None, heading: ArrayLike = 0.0) -> None: ...
-    def get_state(self) -> State: ...
-    def set_state(self, state: State) -> None: ...
-    def set_scene(self, scene: Scene, mask: ArrayLike | None = None) -> None: ...
-    def set_limb_strengths(self, strengths: ArrayLike) -> None: ...
-    def hub_position(self) -> Floats: ...
-    @property
-    def failed(self) -> Mask: ...
-    def close(self) -> None: ...
 
 
 class Snapshot(NamedTuple):
@@ -85,7 +65,7 @@ def factor(scene: Scene) -> float:
     return FACTOR_OF_CHAPTER if scene.robot.discretisation == "chapter" else FACTORS[scene.numerics.scheme]
 
 
-class ErrorBars:
+class ErrorBars(Watch):
     """Error estimates of a batch of robots, and the twin that they come from.
 
     twin: As many robots of their `twin_scene`, at rest.
@@ -96,33 +76,45 @@ class ErrorBars:
         self._largest = np.zeros(n_robots)  # distance of the two hubs since the reset [m], NaN where unknown
 
     @property
-    def estimate(self) -> Floats:
+    def told(self) -> Floats:
         """Estimate of the hub's error [m], shape (n_robots,); 0 at rest, NaN where unknown until the next reset."""
         scene = self.twin.scene
         floor = scene.numerics.newton_tolerance * column(scene.robot.limb_length, n_axes=0)
         return np.asarray(factor(scene) * np.where(self._largest > 0.0, self._largest + floor, self._largest))
 
-    def compare(self, hub: Floats, failed: Mask) -> None:
-        """Compare hubs [m], shape (n_robots, 2), with those of the twin, after an interval of both."""
-        distance = np.linalg.norm(hub - self.twin.hub_position(), axis=1)
+    def begin(self, duration: float, commands: Floats | None) -> None:
+        self.twin.advance(duration, commands)
+
+    def end(self, robots: Swimmers, failed: Mask) -> None:
+        distance = np.linalg.norm(robots.hub_position() - self.twin.hub_position(), axis=1)
         known = ~(failed | self.twin.failed)
         self._largest = np.maximum(self._largest, np.where(known, distance, np.nan))  # NaN stays until the reset
 
     def reset(self, chosen: Mask, heading: Floats) -> None:
-        """Put robots at rest, see `Simulator.reset`."""
         self.twin.reset(chosen, heading)
         self._largest[chosen] = 0.0
 
     def lose(self) -> None:
-        """Know no estimate until the next reset: robots were put into a state that has no like on the twin's mesh."""
+        """Know no estimate until the next reset: the state has no like on the twin's mesh."""
         self.twin.reset()
         self._largest[:] = np.nan
 
+    def checked(self, scene: Scene) -> Scene:
+        return twin_scene(scene)
+
+    def set_scene(self, scene: Any, chosen: Mask) -> None:
+        self.twin.set_scene(scene, chosen)
+
+    def set_limb_strengths(self, strengths: Floats) -> None:
+        self.twin.set_limb_strengths(strengths)
+
     def save(self) -> Snapshot:
-        """Copies for `restore`."""
         return Snapshot(self.twin.get_state(), self._largest.copy())
 
-    def restore(self, before: Snapshot) -> None:
+    def restore(self, before: Any) -> None:
         """Undo an interval. Robots on which the solver failed before swim again in the twin, but have no estimate."""
         self.twin.set_state(before.twin)
         self._largest = before.largest
+
+    def close(self) -> None:
+        self.twin.close()

@@ -7,15 +7,12 @@ first strokes. Energies go with the square of commands, so each counts over that
 """
 
 import warnings
-from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import DAMPING, PRESETS, Resolution
-
-Floats = NDArray[np.float64]
+from seastar_gym.simulator.watch import Floats, Mask, Swimmers, Watch
 
 WINDOW = 20
 """First strokes of a swim, in periods of the actuator, whose largest energy later ones are compared with."""
@@ -37,7 +34,7 @@ def is_watched(scene: Scene) -> bool:
     )
 
 
-class EnergyGrowth:
+class EnergyGrowth(Watch):
     """Growth of the kinetic energy of a batch of robots.
 
     period: Of the actuator [s]. Energies are taken once in a period while any robot swims its first strokes.
@@ -51,29 +48,33 @@ class EnergyGrowth:
         self._growth, self._is_early = np.ones(n_robots), np.ones(n_robots, bool)
 
     @property
-    def growth(self) -> Floats:
+    def told(self) -> Floats:
         """Growth of every robot's energy, shape (n_robots,); 1 in the first strokes."""
         return self._growth.copy()
 
-    def reset(self, chosen: NDArray[np.bool_] | slice = slice(None)) -> None:
+    def lose(self) -> None:
+        self._forget(slice(None))
+
+    def reset(self, chosen: Mask, heading: Floats) -> None:
+        self._forget(chosen)
+
+    def _forget(self, chosen: Mask | slice) -> None:
         """Forget the swims of some robots."""
         self._begin[chosen] = np.nan
         self._early[chosen] = self._largest[chosen] = 0.0
         self._growth[chosen], self._is_early[chosen] = 1.0, True
 
     def begin(self, duration: float, commands: Floats | None) -> None:
-        """Begin an interval [s] with commands, shape (n_robots, n_limbs), None for none."""
         self._duration = duration
         self._commands = np.zeros(len(self._begin)) if commands is None else np.abs(commands).max(axis=1)
 
-    def end(self, energy: Callable[[], Floats], time: Floats) -> None:
-        """End an interval. energy: Returns the energies [J], if they are due. time: [s]. Both of shape (n_robots,)."""
+    def end(self, robots: Swimmers, failed: Mask) -> None:
         self._largest = np.maximum(self._largest, self._commands)
         self._elapsed += self._duration
         periods = 1 if self._is_early.any() else EVERY
         if self._elapsed >= periods * self._period * (1.0 - 1e-9):
             self._elapsed = 0.0
-            self._note(energy(), time)
+            self._note(robots.kinetic_energy(relative_to_water=True), robots.time)
 
     def _note(self, energy: Floats, time: Floats) -> None:
         commanded = self._largest > 0.0

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.der.rods import Work
 from seastar_gym.der.terms.hub import Actuation
+from seastar_gym.interrupts import held_back
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.processors import processors
 from seastar_gym.scene import Scene
@@ -32,6 +33,7 @@ from seastar_gym.simulator.pauses import completed
 from seastar_gym.simulator.report import StrokeReport, make_report, warn_of_overlap
 from seastar_gym.simulator.schedule import ends_at, ends_of_parts
 from seastar_gym.simulator.state import State, checked_state
+from seastar_gym.simulator.watch import Watch
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +46,7 @@ class Snapshot(NamedTuple):
     rows: dict[str, Any]
     clock: dict[str, Any]
     drive: dict[str, Any]
-    bars: Any
+    watches: list[Any]
 
 
 class Simulator:
@@ -88,14 +90,14 @@ class Simulator:
         self._clock = Clock(self.n_robots)
         self._lock = StrokeLock()
         self._known_duration: float | None = None  # of the last interval [s]
-        watched = is_watched(scene) and device == "cpu"
-        self._growth: EnergyGrowth | None = EnergyGrowth(self.n_robots, scene.actuator.period) if watched else None
         self._may_warn_of_overlap = scene.contact is not None
-        self._bars: ErrorBars | None = None
+        self._watches: dict[str, Watch] = {}  # by the field of a report that each tells
+        if is_watched(scene) and device == "cpu":
+            self._watches["energy_growth"] = EnergyGrowth(self.n_robots, scene.actuator.period)
         if error_bars:
             twin = Simulator(twin_scene(scene), self.n_robots, self.threads, device=device)
-            twin._growth, twin._may_warn_of_overlap = None, False
-            self._bars = ErrorBars(twin, self.n_robots)
+            twin._watches, twin._may_warn_of_overlap = {}, False
+            self._watches["error_estimate"] = ErrorBars(twin, self.n_robots)
         self.set_limb_strengths(scene.limb_strengths or 1.0)
 
     @property
@@ -129,10 +131,10 @@ class Simulator:
         """
         chosen = self._checked_mask(mask)
         with self._lock.change():
-            of_twin = None if self._bars is None else twin_scene(scene)  # may refuse, before anything changes
+            watches = [(watch, watch.checked(scene)) for watch in self._watches.values()]  # before anything changes
             self.coefficients.set_scene(scene, chosen)
-            if self._bars is not None and of_twin is not None:
-                self._bars.twin.set_scene(of_twin, chosen)
+            for watch, own in watches:
+                watch.set_scene(own, chosen)
             if scene.actuator != self.scene.actuator:
                 self._drive.set_actuator(scene.actuator)
             self.scene = scene
@@ -144,8 +146,8 @@ class Simulator:
             if self._lock.broken and of_all:
                 self._batch.coefficients = Coefficients(self.scene, self.n_robots)
                 self._drive.set_actuator(self.scene.actuator)
-                if self._bars is not None:
-                    self._bars.twin.set_scene(twin_scene(self.scene))
+                for watch in self._watches.values():
+                    watch.set_scene(watch.checked(self.scene), np.ones(self.n_robots, bool))
             elif self._lock.broken:
                 raise RuntimeError(BROKEN_OFF)
             yield
@@ -159,15 +161,15 @@ class Simulator:
     def close(self) -> None:
         """End the threads. A later stroke starts them again."""
         self._batch.workers.close()
-        if self._bars is not None:
-            self._bars.twin.close()
+        for watch in self._watches.values():
+            watch.close()
 
     def __getstate__(self) -> dict[str, Any]:
         self._lock.require_intact()
         drive = {name: getattr(self._drive, name) for name in ("state", "strengths", "commands", "phase")}
         arguments = (self.scene, self.n_robots, self.threads, False, self._batch.effort.size > 0, self.device)
         rows = self._batch.rows()
-        watched = {"bars": self._bars, "growth": self._growth, "may_warn": self._may_warn_of_overlap}
+        watched = {"watches": self._watches, "may_warn": self._may_warn_of_overlap}
         return {"arguments": arguments, "rows": rows, "clock": self._clock, "drive": drive, **watched}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -176,7 +178,7 @@ class Simulator:
         vars(self._clock).update(vars(state["clock"]))
         for name, value in state["drive"].items():
             setattr(self._drive, name, value)
-        self._bars, self._growth, self._may_warn_of_overlap = (state[each] for each in ("bars", "growth", "may_warn"))
+        self._watches, self._may_warn_of_overlap = state["watches"], state["may_warn"]
 
     def reset(self, mask: ArrayLike | None = None, heading: ArrayLike = 0.0) -> None:
         """Put robots at rest, with the hub at the origin and limb 1 in the direction `heading`.
@@ -195,10 +197,8 @@ class Simulator:
                 self._batch.put_at_rest(robot, angles[robot])
             self._drive.put_at_rest(chosen)
             self._clock.set(chosen, 0.0)
-            if self._bars is not None:
-                self._bars.reset(chosen, angles)
-            if self._growth is not None:
-                self._growth.reset(chosen)
+            for watch in self._watches.values():
+                watch.reset(chosen, angles)
 
     def get_state(self) -> State:
         """Copy of the state. After `set_state` with it, intervals give the same bits, if none was under way."""
@@ -221,10 +221,8 @@ class Simulator:
             self._batch.put_state(positions, velocities, orientation, spin)
             self._clock.set(slice(None), time)
             self._drive.put(actuators, commands, phase)
-            if self._bars is not None:
-                self._bars.lose()
-            if self._growth is not None:
-                self._growth.reset()
+            for watch in self._watches.values():
+                watch.lose()
 
     @property
     def actuators(self) -> Floats:
@@ -256,8 +254,8 @@ class Simulator:
         checked = self._drive.checked_strengths(strengths)
         with self._lock.change():
             self._drive.strengths = checked
-            if self._bars is not None:
-                self._bars.twin.set_limb_strengths(checked)
+            for watch in self._watches.values():
+                watch.set_limb_strengths(checked)
 
     @property
     def positions(self) -> Floats:
@@ -313,14 +311,18 @@ class Simulator:
 
         0 at rest after a reset. NaN without `error_bars`, and until the next reset after `set_state` or a failure.
         """
-        return np.full(self.n_robots, np.nan) if self._bars is None else self._bars.estimate
+        return self._told("error_estimate")
 
     @property
     def energy_growth(self) -> Floats:
         """Kinetic energy relative to the water over the largest in the first strokes, shape (n_robots,), as in the last
         StrokeReport. NaN where it is not watched, 1 in the first strokes.
         """
-        return np.full(self.n_robots, np.nan) if self._growth is None else self._growth.growth
+        return self._told("energy_growth")
+
+    def _told(self, field: str) -> Floats:
+        """What a watch tells now, shape (n_robots,); NaN without one."""
+        return self._watches[field].told if field in self._watches else np.full(self.n_robots, np.nan)
 
     def hub_position(self) -> Floats:
         """Position of the hub [m], world frame, shape (n_robots, 2)."""
@@ -422,8 +424,8 @@ class Simulator:
             self._known_duration = float(duration)
         checked = None if commands is None else checked_commands(commands, self.scene, self._drive.strengths)
         interval = self._lock.acquire(intact=True)
-        bars = None if self._bars is None else self._bars.save()
-        before = Snapshot(self._batch.save(), dict(vars(self._clock)), dict(vars(self._drive)), bars)
+        watches = [watch.save() for watch in self._watches.values()]
+        before = Snapshot(self._batch.save(), dict(vars(self._clock)), dict(vars(self._drive)), watches)
         try:
             self._begin_interval(float(duration), checked)
             if ends_of is None:
@@ -451,38 +453,30 @@ class Simulator:
             self._lock.resume(interval)
 
     def _restore(self, interval: object, before: Snapshot) -> None:
-        """Undo an interval, unless robots were put into another state since."""
-        try:
+        """Undo an interval, unless robots were put into another state since. Another Ctrl-C waits for its end."""
+        with held_back():
             if self._lock.resume(interval):
                 self._batch.restore(before.rows)
                 vars(self._clock).update(before.clock)
                 vars(self._drive).update(before.drive)
-                if self._bars is not None:
-                    self._bars.restore(before.bars)
+                for watch, saved in zip(self._watches.values(), before.watches, strict=True):
+                    watch.restore(saved)
                 self._lock.release()
-        except BaseException:  # interrupted once more: the robots are put back all the same
-            self._restore(interval, before)
-            raise
 
     def _begin_interval(self, duration: float, commands: Floats | None) -> None:
         self._batch.begin(*self._drive.begin(duration, commands))
         self._clock.begin(duration)
-        if self._growth is not None:
-            self._growth.begin(duration, commands)
-        if self._bars is not None:
-            self._bars.twin.advance(duration, commands)
+        for watch in self._watches.values():
+            watch.begin(duration, commands)
 
     def _end_interval(self) -> StrokeReport:
         rows = self._batch.end()
         failed = rows["status"] > 0
         self._clock.end(failed, rows["covered"])
         self._drive.advance(len(self._batch.times) - 1)
-        if self._bars is not None:
-            self._bars.compare(self.hub_position(), failed)
-            rows["error_estimate"] = self.error_estimate
-        if self._growth is not None:
-            self._growth.end(lambda: self.kinetic_energy(relative_to_water=True), self.time)
-            rows["energy_growth"] = self.energy_growth
+        for field, watch in self._watches.items():
+            watch.end(self, failed)
+            rows[field] = watch.told
         if self._may_warn_of_overlap and rows["largest_overlap"].max() > LARGEST_OVERLAP:
             self._may_warn_of_overlap = False
             warn_of_overlap(rows["largest_overlap"])

@@ -61,7 +61,9 @@ def test_the_estimate_is_at_least_what_newton_leaves(lengths):
     simulator = Simulator(replace(FAST, robot=robot, numerics=numerics), 2, error_bars=True)
     assert not simulator.error_estimate.any()
     estimate = simulator.stroke(COMMANDS[0, :2]).error_estimate
-    distance = np.linalg.norm(simulator.hub_position() - simulator._bars.twin.hub_position(), axis=1)
+    distance = np.linalg.norm(
+        simulator.hub_position() - simulator._watches["error_estimate"].twin.hub_position(), axis=1
+    )
     floor = 1e-3 * np.broadcast_to(lengths, 2)
     assert (distance > 0.0).all()
     np.testing.assert_allclose(estimate, error_bars.FACTORS["implicit-midpoint"] * (distance + floor), rtol=1e-12)
@@ -111,7 +113,7 @@ def test_a_reset_repairs_the_twin_where_one_was_interrupted(monkeypatch, repair)
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(simulator._bars.twin._batch, "put_at_rest", interrupt)
+        patch.setattr(simulator._watches["error_estimate"].twin._batch, "put_at_rest", interrupt)
         with pytest.raises(KeyboardInterrupt):
             simulator.reset()
     with pytest.raises(RuntimeError, match="call reset"):
@@ -139,7 +141,7 @@ def test_a_state_from_elsewhere_has_no_estimate_until_the_reset():
 @pytest.mark.parametrize("whose", ["robot", "twin"])
 def test_a_robot_that_fails_or_whose_twin_fails_has_no_estimate_until_its_reset(whose):
     simulator = swimmers(n_strokes=1)
-    ill = simulator if whose == "robot" else simulator._bars.twin
+    ill = simulator if whose == "robot" else simulator._watches["error_estimate"].twin
     ill.v[0, 0, 2] = np.nan
     for commands in COMMANDS[1:3]:
         report = simulator.stroke(commands)

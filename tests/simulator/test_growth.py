@@ -117,7 +117,11 @@ def test_the_energy_in_a_current_is_that_of_the_same_motion_in_still_water(name,
 
 def test_fidelities_of_the_chapters_robot_and_twins_are_not_watched_and_everything_else_is():
     simulator, growth = swim(FAST, 25, error_bars=True)
-    assert not is_watched(FAST) and np.isnan(growth).all() and np.isnan(simulator._bars.twin.energy_growth).all()
+    assert (
+        not is_watched(FAST)
+        and np.isnan(growth).all()
+        and np.isnan(simulator._watches["error_estimate"].twin.energy_growth).all()
+    )
     assert all(
         is_watched(replace(FAST, **other))
         for other in (
