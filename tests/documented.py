@@ -221,7 +221,6 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "Processes": dict(workers=1),
         "Recorder": dict(env=batch()),
         "BatchVecEnv": dict(env=batch("SameStep")),
-        "native_batch": dict(context=dict(num_envs=2, scene=FAST)),
         "Hyperparameters": dict(vars(training())),
         "make_model": dict(env=training_env(), hyperparameters=training(), seed=0),
         "make_training_env": dict(hyperparameters=training(), path=PATH, random_heading=False, scene=FAST, threads=1,

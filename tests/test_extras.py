@@ -68,7 +68,7 @@ PORT = (
 SWEEP = "-m", "seastar_gym.cli", "sweep", "robot.limb_length=0.08:0.1:3", "--out", os.devnull
 WITHOUT = [
     ("studies", OF_STUDIES, ("-m", "studies", "--help")),
-    *(("train", OF_TRAIN, ("-m", command, "--help")) for command in ("agents.cards", "agents.rllib", "agents.tasks")),
+    *(("train", OF_TRAIN, ("-m", command, "--help")) for command in ("agents.cards", "agents.tasks")),
     *(("train", missing, ("train.py", "--help"))
       for missing in (("tyro",), ("tensorboard",), ("torch", "stable_baselines3"), ("plotly",))),
     ("sweep", ("pyarrow",), SWEEP),

@@ -172,3 +172,12 @@ def test_skrl_learns_for_an_iteration():
     assert first == rewards[:8]
     weights = [list(agent.models["policy"].parameters()) for agent in (once, twice)]
     assert any(not torch.equal(one, other) for one, other in zip(*weights, strict=True))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_rllib_learns_for_an_iteration():
+    """In an environment of its own, see .ci/learners."""
+    pytest.importorskip("ray")
+    pytest.importorskip("tree")  # which RLlib needs, and Ray does not
+    found = example("rllib")["learner_of"](0, 64, max_episode_steps=5).train()
+    assert np.isfinite(found["env_runners"]["episode_return_mean"])
