@@ -29,7 +29,7 @@ MOTIVE = (
 )
 DEEPLABCUT = "scorer,s,s,s\nbodyparts,a,a,a\ncoords,x,y,likelihood\n0,1,2,1\n"
 MADE_BY_THE_PACKAGE = {
-    "Setting", "Episode", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Progress",
+    "Setting", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Progress",
     "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
     "Plant", "PlantError", "Sighting", "Derivatives", "Motion", "Gradient", "Record",
     "Track",
@@ -219,7 +219,6 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "read_results": dict(folder=folder()),
         "best_result": dict(folder=folder()),
         "Processes": dict(workers=1),
-        "Recorder": dict(env=batch()),
         "BatchVecEnv": dict(env=batch("SameStep")),
         "Hyperparameters": dict(vars(training())),
         "make_model": dict(env=training_env(), hyperparameters=training(), seed=0),
@@ -260,7 +259,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     yield "Range", named("Range")("a", 0.0, 1.0).spaced, dict(n=3)
     yield "Range", named("Range")("a", 0.0, 1.0).at, dict(share=0.5)
     yield "Buffers", lambda out: batch_to_step().step(np.zeros((2, 5), int), out=out), dict(out=None)
-    for name in ("VectorFrameStack", "Recorder"):
+    for name in ("VectorFrameStack",):
         yield name, of_batch(name).reset, dict(seed=0, options=None)
         yield name, of_batch(name).step, dict(actions=np.zeros(2, int))
     yield "BatchVecEnv", of_batch("BatchVecEnv", "SameStep").step, dict(actions=np.zeros(2, int))

@@ -13,7 +13,7 @@ from seastar_gym.command import run_command
 
 ROOT = Path(__file__).resolve().parent.parent
 OF_STUDIES = ("matplotlib", "rich", "tqdm", "tyro")
-OF_EXTRAS = ("h5py", "imageio", "matplotlib", "minari", "onnx", "optuna", "pandas", "PIL", "plotly", "pyarrow",
+OF_EXTRAS = ("h5py", "imageio", "matplotlib", "onnx", "optuna", "pandas", "PIL", "plotly", "pyarrow",
              "pygame", "rich", "serial", "sqlalchemy", "stable_baselines3", "tables", "tensorboard", "tqdm",
              "tyro")  # fmt: skip
 OF_TRAIN = ("imageio", "plotly", "stable_baselines3", "tensorboard", "torch", "tyro")

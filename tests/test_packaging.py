@@ -107,9 +107,9 @@ def test_every_extra_is_in_the_table_of_the_guide():
     [
         (
             ["seastar_gym"],
-            ["render", "studies", "train", "search", "ray", "slurm", "data", "tracks", "export", "gpu", "plant"],
+            ["render", "studies", "train", "search", "ray", "slurm", "tracks", "export", "gpu", "plant"],
         ),
-        (["studies"], ["train", "sweep", "test", "data"]),
+        (["studies"], ["train", "sweep", "test"]),
         (["agents", "train.py"], ["train"]),
         (["tests"], ["test", "browser", "ray", "learners"]),
         (["docs", "examples"], ["docs", "learners", "ray"]),

@@ -38,7 +38,7 @@ SHORTEST = {
         "agents.distillation": {"ENOUGH": 2048},
     }),
     "swim_page": ({""}, {"studies.swim_page": {"record": partial(swim_page.record, "fast", 1)}}),
-    "tasks --held-out --tasks SeastarPrizes-v0": (set(), {"studies.tasks": {"held_out": partial(tasks.held_out, n=2)}}),
+    "tasks --tasks SeastarPrizes-v0": (set(), {"studies.tasks": {"held_out": partial(tasks.held_out, n=2)}}),
 }  # fmt: skip
 """Commands, files that they write, "" for the one that --out names, and what of them is made shorter."""
 
