@@ -107,7 +107,7 @@ def test_every_extra_is_in_the_table_of_the_guide():
     [
         (
             ["seastar_gym"],
-            ["render", "studies", "train", "search", "ray", "slurm", "tracks", "export", "gpu", "plant"],
+            ["render", "studies", "train", "search", "ray", "slurm", "dask", "tracks", "export", "gpu", "plant"],
         ),
         (["studies"], ["train", "sweep", "test"]),
         (["agents", "train.py"], ["train"]),

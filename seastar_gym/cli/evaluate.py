@@ -106,13 +106,18 @@ def limit_of(options: argparse.Namespace, scene: Scene | None = None) -> int:
     return decisions_in(options.seconds, options.decision_period, scene)
 
 
+def fidelities(options: argparse.Namespace) -> list[Fidelity]:
+    """Accuracies of swims on paths."""
+    return options.fidelity or ["balanced"]
+
+
 def compared(options: argparse.Namespace, command: str) -> int:
     """Let the agents swim the path; returns the exit code, 2 where one that was named does not fit.
 
     command: What was typed.
     """
     require_sound(options)
-    (fidelity,) = options.fidelity or ("balanced",)
+    fidelity = fidelities(options)[0]
     path, own = load_path(options.path), scene_at(options.scene, fidelity)
     agents, left_out = fitting_agents(options.agents, options.seed, fidelity, options.decision_period, own)
     print("".join(f"{sentence}\n" for sentence in left_out), end="", file=sys.stderr)
@@ -137,11 +142,7 @@ def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: 
     if options.runs:
         progress = {folder.name: read_progress(folder) for folder in options.runs}
     commands = dict.fromkeys(command for how in trainings.values() for command in how.get("commands", ()))
-    swum = (
-        f'Computed at fidelity "{(options.fidelity or ["balanced"])[0]}".'
-        if options.scene is None
-        else f"Swum in {options.scene}."
-    )
+    swum = f'Computed at fidelity "{fidelities(options)[0]}".' if options.scene is None else f"Swum in {options.scene}."
     return Remarks(
         title=f"Evaluation: {options.path}",
         sentences=[swum],
@@ -155,7 +156,7 @@ def swum_often(options: argparse.Namespace) -> int:
     """Let the agents swim the sets; returns the exit code."""
     require_sound(options)
     rows, period = list[Row](), options.decision_period
-    for fidelity in options.fidelity or ("balanced",):
+    for fidelity in fidelities(options):
         agents = load_agents(options.agents or OF_TRIALS, options.seed, fidelity, period)
         rows += trials(
             agents, options.sets, options.swims, fidelity=fidelity, seed=options.seed, decision_period=period,

@@ -67,14 +67,14 @@ def measured(
     """
     label, names = policies_of(agent)
     env = env_of(task, **held_out(task, fidelity))
-    measure, found = measure_of(env), dict[int, tuple[float, bool, float, int]]()
+    measure, found = measure_of(env), dict[int, tuple[Any, ...]]()
     for turn, name in enumerate(names[:seeds]):
         own = list(range(HELD_OUT_SEED, HELD_OUT_SEED + seeds))[turn :: len(names)]
         policy = load_agent(name, env, own[0])
         swum = swim_episodes(task, policy, own, fidelity=fidelity, max_decisions=max_decisions, threads=threads)
-        columns = measure.of(swum), swum.success, swum.returns, swum.decisions
-        found |= zip(own, zip(*(column.tolist() for column in columns), strict=True), strict=True)
-    columns = map(list, zip(*(found[seed] for seed in sorted(found)), strict=True))
+        rows = (column.tolist() for column in (measure.of(swum), swum.success, swum.returns, swum.decisions))
+        found |= zip(own, zip(*rows, strict=True), strict=True)
+    columns: Any = map(list, zip(*(found[seed] for seed in sorted(found)), strict=True))
     return Scores(task, label, fidelity, measure.name, measure.unit, measure.better, sorted(found), *columns)
 
 
