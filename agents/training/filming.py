@@ -12,7 +12,6 @@ from pathlib import Path
 import seastar_gym
 from agents.training.options import Options
 from agents.training.robot import physics
-from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.processors import processors
 
 LOWEST = 19
@@ -33,7 +32,7 @@ def filmed_beside(agent: str | None, options: Options, folder: Path) -> Iterator
         yield lambda: None
         return
     with tempfile.TemporaryDirectory(prefix="seastar-film-", ignore_cleanup_errors=True) as place:
-        words = ["--agents", agent, *physics(options, folder.resolve()), "--seconds", str(TIME_LIMIT)]
+        words = ["--agents", agent, *physics(options, folder.resolve()), "--seconds", str(options.seconds)]
         process = _begun([*words, "--video", "--out", place])
 
         def film() -> Path | None:
