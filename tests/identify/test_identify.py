@@ -251,11 +251,11 @@ def line(n_pictures: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def coverage(memory: float, n_pictures: int = 400) -> np.ndarray:
-    """Share of 400 fits whose 95 % interval has the truth, shape (p,). memory: Of errors, from picture to picture."""
+    """Share of 200 fits whose 95 % interval has the truth, shape (p,). memory: Of errors, from picture to picture."""
     times, jacobian = line(n_pictures)
     rng, held = np.random.default_rng(0), []
     fit = np.linalg.pinv(jacobian)
-    for _ in range(400):
+    for _ in range(200):
         errors = np.empty((n_pictures, 2))
         errors[0] = rng.normal(size=2)
         for picture in range(1, n_pictures):
