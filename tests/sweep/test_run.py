@@ -49,8 +49,7 @@ def of_slurm(tmp_path):
 
 EXECUTORS = {
     "threads": lambda tmp_path: ThreadPoolExecutor(2),
-    "one process": lambda tmp_path: Processes(1),
-    "two processes": lambda tmp_path: Processes(2),
+    "processes": lambda tmp_path: Processes(2),
     "ray": lambda tmp_path: of_ray(),
     "slurm": of_slurm,
     "dask": lambda tmp_path: of_dask(),
