@@ -20,11 +20,10 @@ for absent in ("agents", "studies", "train", "torch", "stable_baselines3", "matp
 
 command = Path(sys.executable).parent / "seastar"
 told = subprocess.run([command, "--help"], capture_output=True, text=True, check=True).stdout
-commands = "swim", "play", "evaluate", "benchmark", "data", "train", "export", "certify", "track2csv", "identify"
+commands = "swim", "play", "evaluate", "train", "export", "certify", "track2csv", "identify"
 assert all(name in told for name in commands)
 for arguments, missing in (
     ("swim --film swim.mp4", "[render]"),
-    ("data", "[data]"),
     ("train", "checkout"),
     ("certify", "[studies]"),
 ):

@@ -1,4 +1,4 @@
-"""Training: PPO on the native batch, imitation, RLlib on several machines, and cards of the policies.
+"""Training: PPO on the native batch, imitation, and cards of the policies.
 
 Controllers, evaluation and the adapter of Stable-Baselines3 are in the package, in `seastar_gym`.
 """

@@ -1,4 +1,4 @@
-"""Blocks of pages that no study makes: ids, contracts of environments, the leaderboard, and numbers that tests keep."""
+"""Blocks of pages that no study makes: ids, contracts of environments, and numbers that tests keep."""
 
 import importlib
 import inspect
@@ -9,7 +9,6 @@ from typing import Any
 
 import gymnasium as gym
 
-from seastar_gym.benchmark import page, results
 from studies.frame import DOCS, Study
 from studies.pages import markdown
 
@@ -43,14 +42,6 @@ def contracts() -> str:
     return "\n\n".join(sections)
 
 
-def leaderboard() -> str:
-    """Bundled policies beside greedy rules, from the committed benchmark, in fewer words than its own page has."""
-    entries = results.read(DOCS / "leaderboard" / "results.json")
-    tasks = {each.task for each in entries if each.agent == "learned"}
-    shown = page.table([each for each in entries if each.task in tasks and each.agent in ("learned", "greedy")])
-    return re.sub(r" \[([\d.]+), \1\]|Seastar|-v0, `fast`| until done|, (?:less|more) is better", "", shown)
-
-
 def exact(name: str) -> str:
     """Comparisons that tests/exact makes: `pytest tests/exact --update` writes them."""
     kept = DOCS.parent / "tests" / "golden" / "exact" / f"{name}.json"
@@ -58,7 +49,7 @@ def exact(name: str) -> str:
 
 
 TABLES = {
-    "contracts": contracts, "environments": environments, "leaderboard": leaderboard,
+    "contracts": contracts, "environments": environments,
     **{f"exact {name}": partial(exact, name) for name in ("elastica", "frequencies", "drag", "waves", "published")},
 }  # fmt: skip
 STUDY = Study("contracts", tables={name: lambda _, of=of: of() for name, of in TABLES.items()})  # type: ignore[misc]

@@ -1,12 +1,4 @@
-"""Greedy rules of the tasks, and Minari datasets of three qualities: random actions, these rules, a learned policy.
-
-    python -m studies.tasks --episodes 100 --out data
-    python -m studies.tasks --held-out
-
-The learned policy is the bundled one. A dataset that is there is not made again, so the command goes on where it
-stopped. Read them with MINARI_DATASETS_PATH=OUT, under the names TASK/random-v0, TASK/greedy-v0 and TASK/learned-v0.
-With --held-out the rules swim the held-out episodes of docs/tasks.md, whose column "greedy" is printed.
-"""
+"""Greedy rules of the tasks, on the held-out episodes of docs/tasks.md, whose column "greedy" is printed."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,11 +10,6 @@ from numpy.typing import NDArray
 from seastar_gym import TASKS
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.greedy import Searcher, displacement_map, waypoints_of
-from seastar_gym.controllers.learned import load
-from seastar_gym.controllers.scripted import scripted
-from seastar_gym.data.command import name_of, write_to
-from seastar_gym.data.dataset import summary, write
-from seastar_gym.data.recorder import Episode, Recorder
 from seastar_gym.envs.commands import unless_strokes
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.reward import RewardWeights
@@ -34,13 +21,10 @@ from seastar_gym.envs.tasks.station import Station
 from seastar_gym.evaluation.measures import measure_of_challenge
 from seastar_gym.evaluation.rollout import Batch, rollout
 from seastar_gym.evaluation.tasks import RECORDED, make_batch
-from seastar_gym.extras import require_extra
-from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
 from studies.frame import Floats, Results, Study, require_known
 from studies.pages import markdown, show
 
-QUALITIES = ("random", "greedy", "learned")
 FIDELITY: Fidelity = "fast"
 HELD_OUT = 64
 """Held-out episodes of the page: the first of the split "test"."""
@@ -132,65 +116,20 @@ def held_out(id: str, n: int = HELD_OUT) -> float:
     return float(measure_of_challenge(inner.challenge).of(limited).mean())
 
 
-# Datasets
-
-
-def agent_of(quality: str, id: str, recorder: Recorder) -> Policy:
-    """Agent of a quality."""
-    if quality == "random":
-        return scripted("random", TASKS[id][1], rng=np.random.default_rng(0))
-    if quality == "greedy":
-        return greedy(recorder)
-    from agents.tasks.command import file_of
-
-    return load(file_of(id))
-
-
-def record(id: str, quality: str, n_episodes: int) -> list[Episode]:
-    """Episodes of a task, each from its reset to its end."""
-    recorder = Recorder(make_batch(id, n_episodes, split="train", fidelity=FIDELITY))
-    rollout(recorder, agent_of(quality, id, recorder), seeds=list(range(n_episodes)))
-    recorder.close()
-    return recorder.episodes(only_first=True)
-
-
 @dataclass(frozen=True)
 class Options:
-    """Greedy rules of the tasks, and Minari datasets of three qualities."""
+    """Greedy rules of the tasks, on the held-out episodes of docs/tasks.md."""
 
     tasks: tuple[str, ...] = tuple(TASKS)
     """Environments."""
-    episodes: int = 100
-    """Episodes of every dataset, of the split "train", with the seeds 0, 1, ..."""
-    held_out: bool = False
-    """Measure the greedy rules on held-out episodes, and write no datasets."""
 
     def __post_init__(self) -> None:
-        require_count("episodes", self.episodes, 1, 100_000)
         require_known("task", self.tasks, TASKS)
 
 
 def run(options: Options, results: Results) -> None:
-    """Measure the greedy rules, or write the datasets that are missing; says a line on each."""
-    if options.held_out:
-        show(markdown(["task", "greedy"], [[id, f"{held_out(id):.3g}"] for id in options.tasks]))
-        return
-    require_extra("Datasets", "data", "minari", "h5py")
-    import minari
-
-    write_to(results.out)
-    there = minari.list_local_datasets()
-    for id in options.tasks:
-        for quality in QUALITIES:
-            name = name_of(id, quality)
-            if name in there:
-                print(f"{name} is there already.")
-                continue
-            episodes = record(id, quality, options.episodes)
-            write(
-                episodes, name, id, quality, "Written by python -m studies.tasks", split="train", fidelity=FIDELITY
-            )  # fmt: skip
-            print(f"{name}: {summary(episodes)}", flush=True)
+    """Measure the greedy rules; prints the column of the page."""
+    show(markdown(["task", "greedy"], [[id, f"{held_out(id):.3g}"] for id in options.tasks]))
 
 
-STUDY = Study("tasks", run, Options, out=Path("runs/data"))
+STUDY = Study("tasks", run, Options, out=Path("runs/tasks"))

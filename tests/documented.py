@@ -29,13 +29,13 @@ MOTIVE = (
 )
 DEEPLABCUT = "scorer,s,s,s\nbodyparts,a,a,a\ncoords,x,y,likelihood\n0,1,2,1\n"
 MADE_BY_THE_PACKAGE = {
-    "Setting", "Episode", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Progress",
-    "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
+    "Setting", "Episodes", "Estimate", "Score", "Swim", "Progress",
+    "Actuator", "ActuatorBase", "Policy", "Challenge", "Numbered", "Swimming",
     "Plant", "PlantError", "Sighting", "Derivatives", "Motion", "Gradient", "Record",
     "Track",
 }  # fmt: skip
 """Records that functions return, protocols, and bases of classes of one's own."""
-UNCALLED = {*MADE_BY_THE_PACKAGE, "Here", "RayTasks", "SlurmArrays", "chapters_certificate",
+UNCALLED = {*MADE_BY_THE_PACKAGE, "RayTasks", "SlurmJobs", "dask_client", "chapters_certificate",
             "LinePlant", "open_serial", "serve"}  # fmt: skip
 """What takes no arguments, or needs Ray, submitit or a serial line, is not called either."""
 UNCHECKED = {"route", "tensorboard_log"}
@@ -162,8 +162,8 @@ def name_of_path(name: Any) -> None:
         PATHS.update(before)
 
 
-def ran(cells: Any, folder: Any, executor: Any, progress: Any) -> None:
-    named("run")(cells, folder, executor, progress)
+def ran(cells: Any, folder: Any, executor: Any, progress: Any, at_once: Any) -> None:
+    named("run")(cells, folder, executor, progress, at_once=at_once)
 
 
 @cache
@@ -219,9 +219,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "read_results": dict(folder=folder()),
         "best_result": dict(folder=folder()),
         "Processes": dict(workers=1),
-        "Recorder": dict(env=batch()),
         "BatchVecEnv": dict(env=batch("SameStep")),
-        "native_batch": dict(context=dict(num_envs=2, scene=FAST)),
         "Hyperparameters": dict(vars(training())),
         "make_model": dict(env=training_env(), hyperparameters=training(), seed=0),
         "make_training_env": dict(hyperparameters=training(), path=PATH, random_heading=False, scene=FAST, threads=1,
@@ -251,7 +249,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     yield "film", film_of, dict(picture=np.zeros((4, 4, 3), np.uint8))
     yield "register_path", name_of_path, dict(name="odd")
     yield "register_path", registered, dict(make=lambda rng: PATH)
-    yield "run", ran, dict(cells=[], folder=folder(), executor=named("Here")(), progress=None)
+    yield "run", ran, dict(cells=[], folder=folder(), executor=None, progress=None, at_once=1)
     for policy in (straight(), learned(), named("RandomPolicy")(rng(0))):
         yield type(policy).__name__, policy.predict, dict(
             observation=observations(), state=None, episode_start=None, deterministic=True)  # fmt: skip
@@ -261,7 +259,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     yield "Range", named("Range")("a", 0.0, 1.0).spaced, dict(n=3)
     yield "Range", named("Range")("a", 0.0, 1.0).at, dict(share=0.5)
     yield "Buffers", lambda out: batch_to_step().step(np.zeros((2, 5), int), out=out), dict(out=None)
-    for name in ("VectorFrameStack", "Recorder"):
+    for name in ("VectorFrameStack",):
         yield name, of_batch(name).reset, dict(seed=0, options=None)
         yield name, of_batch(name).step, dict(actions=np.zeros(2, int))
     yield "BatchVecEnv", of_batch("BatchVecEnv", "SameStep").step, dict(actions=np.zeros(2, int))

@@ -1,22 +1,24 @@
 """Executors that lose workers, or during whose run somebody presses Ctrl-C."""
 
 import itertools
+from concurrent.futures import Executor, Future
 
-from seastar_gym.executors import Outcome
-from seastar_gym.executors.here import Here
-
-LOST = "Its worker was lost: NodeDied."
+LOST = "NodeDied."
 
 
-class Losing:
+class Losing(Executor):
     """An executor that loses the workers of some tasks. is_lost: Whether it loses that of a task."""
 
     def __init__(self, is_lost):
         self.is_lost = is_lost
 
-    def run(self, work, tasks):
-        for outcome in Here().run(work, tasks):
-            yield Outcome(outcome.task, None, LOST) if self.is_lost(outcome.task) else outcome
+    def submit(self, work, *arguments):
+        future = Future()
+        if self.is_lost(arguments[-1]):
+            future.set_exception(RuntimeError(LOST))
+        else:
+            future.set_result(work(*arguments))
+        return future
 
 
 def first(number):
@@ -25,12 +27,14 @@ def first(number):
     return lambda task: next(asked) < number
 
 
-class Interrupted:
+class Interrupted(Losing):
     """An executor during whose run somebody presses Ctrl-C, after so many tasks."""
 
     def __init__(self, after):
-        self.after = after
+        self.left = itertools.count(after, -1)
+        super().__init__(lambda task: False)
 
-    def run(self, work, tasks):
-        yield from Here().run(work, itertools.islice(tasks, self.after))
-        raise KeyboardInterrupt
+    def submit(self, work, *arguments):
+        if next(self.left) == 0:
+            raise KeyboardInterrupt
+        return super().submit(work, *arguments)

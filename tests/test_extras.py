@@ -1,19 +1,21 @@
 """Without an optional dependency there is one sentence with the command that installs it, and no traceback."""
 
+import json
 import os
 import re
 import subprocess
 import sys
+from argparse import Namespace
 from pathlib import Path
 
 import pytest
 
-from seastar_gym.cli.main import COMMANDS
 from seastar_gym.command import run_command
+from seastar_gym.extras import MissingExtra
 
 ROOT = Path(__file__).resolve().parent.parent
 OF_STUDIES = ("matplotlib", "rich", "tqdm", "tyro")
-OF_EXTRAS = ("h5py", "imageio", "matplotlib", "minari", "onnx", "optuna", "pandas", "PIL", "plotly", "pyarrow",
+OF_EXTRAS = ("h5py", "imageio", "matplotlib", "onnx", "optuna", "pandas", "PIL", "plotly", "pyarrow",
              "pygame", "rich", "serial", "sqlalchemy", "stable_baselines3", "tables", "tensorboard", "tqdm",
              "tyro")  # fmt: skip
 OF_TRAIN = ("imageio", "plotly", "stable_baselines3", "tensorboard", "torch", "tyro")
@@ -68,12 +70,12 @@ PORT = (
 SWEEP = "-m", "seastar_gym.cli", "sweep", "robot.limb_length=0.08:0.1:3", "--out", os.devnull
 WITHOUT = [
     ("studies", OF_STUDIES, ("-m", "studies", "--help")),
-    *(("train", OF_TRAIN, ("-m", command, "--help")) for command in ("agents.cards", "agents.rllib", "agents.tasks")),
+    *(("train", OF_TRAIN, ("-m", command, "--help")) for command in ("agents.cards", "agents.tasks")),
     *(("train", missing, ("train.py", "--help"))
-      for missing in (("tyro",), ("tensorboard",), ("torch", "stable_baselines3"), ("plotly",))),
+      for missing in (("tyro",), ("torch", "stable_baselines3"))),
     ("sweep", ("pyarrow",), SWEEP),
     ("search", ("optuna", "sqlalchemy"), (*SWEEP, "--optuna", "2")),
-    ("studies", ("matplotlib",), ("-m", "seastar_gym.cli", "identify", "--synthetic", "--picture", "fit.png")),
+    ("studies", ("matplotlib",), ("-m", "seastar_gym.cli", "identify", "a.csv", "b.csv", "--picture", "fit.png")),
     ("render", ("pygame",), ("-c", PICTURE)),
     ("plant", ("serial",), ("-c", PORT)),
 ]  # fmt: skip
@@ -85,11 +87,14 @@ def test_a_command_without_its_extra_says_how_to_get_it(extra, missing, command,
     assert_says(python(tmp_path, missing, *command), extra, missing)
 
 
-@pytest.mark.parametrize("extra, module", [("ray", "ray"), ("slurm", "submitit")])
-def test_an_executor_without_its_extra_says_how_to_get_it(extra, module, tmp_path):
-    done = python(tmp_path, (module,), *SWEEP, "--executor", extra)  # which has counted designs, and begun a bar
-    assert done.returncode == 2
-    assert done.stderr.splitlines()[-1].endswith(f'need {module}: pip install "seastar-gym[{extra}]".')
+@pytest.mark.parametrize("extra, module", [("ray", "ray"), ("slurm", "submitit"), ("dask", "distributed")])
+def test_an_executor_without_its_extra_says_how_to_get_it(extra, module, tmp_path, monkeypatch):
+    executors = pytest.importorskip("seastar_gym.sweep.executors")
+    monkeypatch.setitem(sys.modules, module, None)
+    options = Namespace(executor=extra, workers=None, address=None, partition=None, out=tmp_path)
+    install = re.escape(f'need {module}: pip install "seastar-gym[{extra}]".')
+    with pytest.raises(MissingExtra, match=install), executors.executor_of(options):
+        pass
 
 
 def test_sweeps_need_no_optuna(tmp_path):
@@ -97,12 +102,28 @@ def test_sweeps_need_no_optuna(tmp_path):
     assert counted.returncode == 0 and counted.stdout.startswith("3 designs in "), counted.stderr
 
 
-@pytest.mark.parametrize("command", sorted(COMMANDS))
-def test_help_of_every_command_needs_no_extra_or_says_which(command, tmp_path):
+HELPS = """
+import contextlib, io, json
+from seastar_gym.cli.main import COMMANDS, main
+found = {}
+for command in COMMANDS:
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            code = main([command, "--help"])
+        except SystemExit as ended:
+            code = ended.code
+    found[command] = code, out.getvalue(), err.getvalue()
+print(json.dumps(found))
+"""
+
+
+def test_help_of_every_command_needs_no_extra_or_says_which(tmp_path):
     """With the base dependencies alone."""
-    done = python(tmp_path, OF_EXTRAS, "-m", "seastar_gym.cli", command, "--help")
-    if done.returncode:
-        extra = {"sweep": "sweep", "train": "train"}[command]
-        assert_says(done, extra, OF_EXTRAS)
-    else:
-        assert done.stdout.startswith(f"usage: seastar {command} ") and not done.stderr
+    found = json.loads(python(tmp_path, OF_EXTRAS, "-c", HELPS).stdout)
+    for command, (code, told, error) in found.items():
+        if code:
+            assert error.endswith(f': pip install "seastar-gym[{command}]".\n') and not told, command
+        else:
+            assert told.startswith(f"usage: seastar {command} ") and not error, command
+    assert {command for command, (code, *_) in found.items() if code} == {"sweep", "train"}

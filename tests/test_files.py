@@ -5,7 +5,6 @@ import re
 import stat
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,14 +14,12 @@ from refusals import assert_refused
 from seastar_gym import Seastar
 from seastar_gym.accuracy import timed_certificate
 from seastar_gym.accuracy.command import draw
-from seastar_gym.benchmark.command import publish
-from seastar_gym.benchmark.results import Entry
 from seastar_gym.controllers.learned import load, save
+from seastar_gym.evaluation import scores
 from seastar_gym.evaluation.films import film
-from seastar_gym.evaluation.many import HELD_OUT_SEED
-from seastar_gym.evaluation.measures import SECONDS
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.results import results, write_csv
+from seastar_gym.evaluation.scores import Scores
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import beside, is_left_behind, part_name, read_json, write_atomically, write_json
 from seastar_gym.identify.measurement import Measurement
@@ -134,9 +131,7 @@ def measured():
     return Measurement(np.array([0.5]), np.zeros((1, 1, 2)), (0,), np.zeros((1, 5)))
 
 
-ENTRY = Entry(
-    "SeastarSwim-v0", "a", "", SECONDS.name, "s", "less", [HELD_OUT_SEED], [1.0], [True], [1.0], [1]
-)  # fmt: skip
+SCORES = [Scores("SeastarSwim-v0", "a", None, "time", "s", "less", [1000], [1.0], [True], [1.0], [1])]
 WRITERS = {
     "evaluation.csv": lambda file: write_csv(results(swims()), file),
     "traces.png": lambda file: draw_traces(swims(), 0.01, file),
@@ -147,9 +142,8 @@ WRITERS = {
     "commands.csv": lambda file: measured().to_csv(file.with_name("other.csv"), file),
     "policy.safetensors": lambda file: save(load(), file),
     "policy.json": lambda file: save(load(), file.with_suffix(".safetensors")),
-    "results.json": lambda file: publish([ENTRY], file.parent, "command"),
-    "benchmark.md": lambda file: publish([ENTRY], file.parent, "command"),
-    "profiles.png": lambda file: publish([ENTRY, replace(ENTRY, agent="b")], file.parent, "command"),
+    "scores.json": lambda file: scores.write(SCORES, file),
+    "scores.csv": lambda file: scores.write(SCORES, file),
     "config.json": lambda file: write_json(file, {"a": 1}),
     "certificate.json": lambda file: timed_certificate(0.2).save(file),
     "certificate.png": lambda file: draw(timed_certificate(0.2), file),

@@ -107,12 +107,12 @@ def test_every_extra_is_in_the_table_of_the_guide():
     [
         (
             ["seastar_gym"],
-            ["render", "studies", "train", "search", "ray", "slurm", "data", "tracks", "export", "gpu", "plant"],
+            ["render", "studies", "train", "search", "ray", "slurm", "dask", "tracks", "export", "gpu", "plant"],
         ),
-        (["studies"], ["train", "sweep", "test", "data"]),
-        (["agents", "train.py"], ["train", "rllib"]),
+        (["studies"], ["train", "sweep", "test"]),
+        (["agents", "train.py"], ["train"]),
         (["tests"], ["test", "browser", "ray", "learners"]),
-        (["docs", "examples"], ["docs", "learners"]),
+        (["docs", "examples"], ["docs", "learners", "ray"]),
     ],
 )
 def test_every_import_has_its_requirement(folders, extras):
@@ -155,12 +155,6 @@ def test_constraints_pin_all_that_gets_installed_within_the_declared_ranges():
     assert installed_with(requirements("test")) <= set(pinned)
     for one in requirements("test", "browser", "docs", "release"):
         assert pinned[canonicalize_name(one.name)] in one.specifier, one.name
-
-
-def test_rllib_s_environment_differs_by_its_gymnasium_alone():
-    usual, its_own = pins("constraints.txt"), pins("constraints-rllib.txt")
-    assert {name for name in its_own if usual.get(name, its_own[name]) != its_own[name]} == {"gymnasium"}
-    assert all(its_own[canonicalize_name(one.name)] in one.specifier for one in requirements("rllib"))
 
 
 def test_lowest_versions_are_those_of_the_declared_ranges():

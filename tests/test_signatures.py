@@ -2,20 +2,15 @@
 
 import inspect
 from contextlib import suppress
-from importlib.util import find_spec
 
 import seastar_gym
 from documented import documented, named
-
-OF_EXTRAS = {"seastar_gym.executors.on_ray": "ray", "seastar_gym.executors.slurm": "submitit"}
-"""Modules of the reference that import what may not be installed."""
 
 
 def signatures():
     """Signatures of what the package and the reference name, and of its methods, by name."""
     public = {name: getattr(seastar_gym, name) for name in seastar_gym.__all__}
-    there = {name: module for name, module in documented().items() if find_spec(OF_EXTRAS.get(module, "numpy"))}
-    for name, what in {**public, **{name: named(name) for name in there}}.items():
+    for name, what in {**public, **{name: named(name) for name in documented()}}.items():
         methods = vars(what) if inspect.isclass(what) else {}
         called = {f"{name}.{method}": each for method, each in methods.items() if method[0] != "_" and callable(each)}
         for each_name, each in {name: what, **called}.items():

@@ -12,7 +12,6 @@ import os
 import re
 import shlex
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -214,17 +213,12 @@ def test_a_run_that_is_not_finished_teaches_no_policy_for_a_camera(has_policy, f
     assert_told(capsys, "is not finished, after", "of 1024 decisions")
 
 
-@pytest.mark.parametrize("how", ["a plain run", "joint", "limbs, no symmetry"])
-def test_a_policy_for_a_camera_is_compared_with_that_of_its_run(
-    how, finished, tmp_path, capsys, short_swims, monkeypatch
-):
+def test_a_policy_for_a_camera_is_compared_with_that_of_its_run(tmp_path, short_swims, monkeypatch):
+    """Here of limbs and without symmetry; ways/test_tank.py has that of a plain run."""
     monkeypatch.setattr("agents.training.camera.ENOUGH", 3 * 4096)
     folder, file = tmp_path / "run", tmp_path / "camera.json"
-    own = {"joint": ["--actions", "joint"], "limbs, no symmetry": ["--actions", "limbs", "--no-symmetry"]}
-    if how in own:
-        assert train.main([*TINY, *own[how], "--strokes", "256", "--out", str(folder)]) == 0
-    else:
-        shutil.copytree(finished, folder)
+    own = ["--actions", "limbs", "--no-symmetry"]
+    assert train.main([*TINY, *own, "--strokes", "256", "--out", str(folder)]) == 0
     file.write_text(json.dumps({"delay": 0.1, "sees": 1}))
     assert train.main(["--resume", str(folder), "--for-camera", str(file), "--quick", "--no-video"]) == 0
     rows = (folder / "camera" / "evaluation" / "evaluation.csv").read_text().splitlines()
@@ -234,14 +228,14 @@ def test_a_policy_for_a_camera_is_compared_with_that_of_its_run(
     assert "seastar drive" in (folder / "camera" / "evaluation" / "report.html").read_text()
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_leaves_a_usable_model_and_says_how_to_go_on(tmp_path, stop, short_swims):
+def test_a_training_that_is_asked_to_end_leaves_a_usable_model_and_says_how_to_go_on(tmp_path, short_swims):
+    """By SIGTERM; ways/test_own_robot.py presses Ctrl-C."""
     folder, deadline = tmp_path / "stopped", time.monotonic() + 120
     command = [sys.executable, "train.py", *TINY, "--strokes", "10000000", "--out", str(folder)]
     with subprocess.Popen(command, cwd=REPOSITORY, stdout=subprocess.PIPE, text=True) as process:
         while not (folder / "checkpoints").exists() and time.monotonic() < deadline:
             time.sleep(0.1)
-        os.kill(process.pid, stop)
+        process.terminate()
         output, _ = process.communicate(timeout=60)
     assert process.returncode == 130
     assert f"python train.py --resume {folder}" in output
@@ -364,24 +358,6 @@ def test_a_damaged_folder_is_refused_in_a_sentence(name, finished, tmp_path, cap
     assert [(file.name, file.read_text()) for file in (tmp_path / "somebody").iterdir()] == [("file", "work")]
 
 
-def test_a_run_killed_before_its_first_checkpoint_or_in_one_is_continued_from_where_it_was(finished, tmp_path):
-    (tmp_path / "first").mkdir()
-    (tmp_path / "first" / "config.json").write_bytes((finished / "config.json").read_bytes())
-    assert train.main(["--resume", str(tmp_path / "first")]) == 0
-    first, again = (policies.load(folder / "policy.safetensors") for folder in (finished, tmp_path / "first"))
-    for name, array in first.weights.items():
-        np.testing.assert_array_equal(again.weights[name], array)
-    assert len(again.training["commands"]) == 2
-    folder = tmp_path / "tiny"
-    shutil.copytree(finished, folder)
-    lines = (finished / "progress.csv").read_text().splitlines()
-    (folder / "progress.csv").write_text("\n".join(lines[:-1]) + "\n")
-    (folder / "checkpoints" / "model_000000512.zip").unlink()
-    assert train.main(["--resume", str(folder)]) == 0
-    assert (folder / "progress.csv").read_text() == (finished / "progress.csv").read_text()
-    assert (folder / "checkpoints" / "model_000000512.zip").is_file()
-
-
 # What cannot be
 
 
@@ -396,8 +372,8 @@ def test_a_folder_that_cannot_be_is_refused_in_a_sentence(out, tmp_path, capsys,
 @pytest.mark.parametrize(
     "call, at, code",
     [
-        *(("mkdir", 1, code) for code in (errno.ENOSPC, errno.EROFS, errno.EACCES, errno.EIO, errno.EDQUOT)),
-        *(("fsync", at, errno.ENOSPC) for at in (1, 2, 6)),
+        *(("mkdir", 1, code) for code in (errno.EROFS, errno.EACCES, errno.EDQUOT)),
+        ("fsync", 2, errno.ENOSPC),
         ("replace", 3, errno.ENOSPC),
     ],
 )
@@ -567,17 +543,6 @@ def test_a_training_that_is_stopped_ends_the_process_that_films(tmp_path, monkey
     (process,) = begun
     assert process.poll() is not None and not list(tmp_path.glob("seastar-film-*"))
     assert not (tmp_path / "run" / "evaluation").exists()
-
-
-@pytest.mark.slow
-def test_the_short_form_of_the_training_command_goes_all_the_way(tmp_path):
-    command = [sys.executable, "train.py", "--quick", "--out", str(tmp_path / "quick")]
-    output = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=True).stdout
-    assert "Report: " in output
-    with (tmp_path / "quick" / "evaluation" / "evaluation.csv").open() as file:
-        learned, script = csv.DictReader(file)
-    assert int(learned["strokes_to_finish"]) < int(script["strokes_to_finish"])
-    assert (tmp_path / "quick" / "evaluation" / "learned.mp4").stat().st_size > 10_000
 
 
 def test_a_timed_training_is_evaluated_and_kept_in_its_own_decisions(tmp_path, monkeypatch, short_cards):

@@ -1,6 +1,6 @@
 """Options of a training run: from the command line, or from the folder of a run that is continued."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,34 +31,8 @@ ENOUGH, ENOUGH_IN_TIME = 98_304, 300_000
 """Length of a training [strokes], after which more gain nothing (docs/training.md), and of one in time [decisions]."""
 
 
-class Lengths:
-    """How long a training with these options is, and its evaluated swims."""
-
-    strokes: int | None
-    ppo: Hyperparameters
-
-    @property
-    def length(self) -> int:
-        """Length of the training [strokes, or decisions]."""
-        if self.strokes is not None:
-            return self.strokes
-        return ENOUGH if self.ppo.decision_period is None else ENOUGH_IN_TIME
-
-    @property
-    def seconds(self) -> float:
-        """Time limit of an evaluated swim [s]."""
-        return TIME_LIMIT
-
-    def limit(self, scene: Scene | None = None) -> int:
-        """Time limit of an evaluated swim [decisions]; the scripted gait takes 241 s round the pentagon.
-
-        scene: Of the robot. None means the chapter's.
-        """
-        return decisions_in(self.seconds, self.ppo.decision_period, scene)
-
-
 @dataclass(frozen=True)
-class Options(Lengths):
+class Options:
     """Train a swimmer with PPO and compare it with the scripted pentagon gait."""
 
     strokes: int | None = None
@@ -131,6 +105,25 @@ class Options(Lengths):
             raise ValueError("--publish is for policies of the chapter's robot, without --scene and --intervals.")
         make_path(self.path, np.random.default_rng(0))
 
+    @property
+    def length(self) -> int:
+        """Length of the training [strokes, or decisions]."""
+        if self.strokes is not None:
+            return self.strokes
+        return ENOUGH if self.ppo.decision_period is None else ENOUGH_IN_TIME
+
+    @property
+    def seconds(self) -> float:
+        """Time limit of an evaluated swim [s]."""
+        return TIME_LIMIT
+
+    def limit(self, scene: Scene | None = None) -> int:
+        """Time limit of an evaluated swim [decisions]; the scripted gait takes 241 s round the pentagon.
+
+        scene: Of the robot. None means the chapter's.
+        """
+        return decisions_in(self.seconds, self.ppo.decision_period, scene)
+
 
 CHANGEABLE = {
     "strokes", "num_threads", "device", "save_freq", "video", "publish", "publish_anyway", "out", "resume", "quick",
@@ -146,15 +139,10 @@ def read_options(arguments: Sequence[str]) -> Options:
         return replace(options, strokes=32_768, fidelity="fast") if options.quick else options
     saved = replace(saved_options(options.resume), out=options.resume, resume=options.resume)
     options = tyro.cli(Options, prog="python train.py", args=arguments, default=saved)
-    require_same(options, saved, CHANGEABLE - {"strokes"} if options.for_camera else CHANGEABLE)
-    return replace(options, out=options.resume)
-
-
-def require_same(options: Any, saved: Any, changeable: Collection[str]) -> None:
-    """ValueError where a run would continue with another option than those that may change. saved: Those of the run."""
-    changed = [name for name in saved.__dict__ if getattr(options, name) != getattr(saved, name)]
-    if forbidden := sorted(set(changed) - set(changeable)):
+    changed = {name for name in vars(saved) if getattr(options, name) != getattr(saved, name)}
+    if forbidden := sorted(changed - CHANGEABLE | (changed & {"strokes"} if options.for_camera else set())):
         raise ValueError(f"The run in {options.resume} cannot continue with another {', '.join(forbidden)}.")
+    return replace(options, out=options.resume)
 
 
 def saved_options(folder: Path) -> Options:
@@ -169,7 +157,11 @@ def saved_options(folder: Path) -> Options:
 
 def config_of(folder: Path) -> dict[str, Any]:
     """Entries of the config.json of a run: its options, commands, versions and machine."""
-    with config_in(folder) as config:
+    file = folder / CONFIG
+    if not file.is_file():
+        raise FileNotFoundError(f"There is no run to continue in {folder}: it has no {CONFIG}.")
+    with faults_of(file):
+        config = read_json(file)
         commands = config["commands"]
         if not isinstance(commands, list) or not all(isinstance(command, str) for command in commands):
             raise ValueError(f"its commands must be texts, not {shown(commands)}")
@@ -177,16 +169,6 @@ def config_of(folder: Path) -> dict[str, Any]:
             if not isinstance(config[name], dict):
                 raise ValueError(f"its {name} must be names with values, not {shown(config[name])}")
         return dict(config)
-
-
-@contextmanager
-def config_in(folder: Path) -> Iterator[dict[str, Any]]:
-    """Context with what the config.json of a run has, in which a fault of it becomes a ValueError with one sentence."""
-    file = folder / CONFIG
-    if not file.is_file():
-        raise FileNotFoundError(f"There is no run to continue in {folder}: it has no {CONFIG}.")
-    with faults_of(file):
-        yield read_json(file)
 
 
 def hyperparameters_of(options: dict[str, Any]) -> Hyperparameters:

@@ -3,12 +3,17 @@
 --video writes a film of every agent into that folder, --report a page with all results and with playbacks of the swims.
 
 With --sets, agents swim many paths, nominal and disturbed: a table of means with confidence intervals and, with --out,
-a CSV file of them. For registered tasks, see `seastar benchmark`.
+a CSV file of them.
+
+With --task, agents swim held-out episodes of registered tasks, one for each seed: a table of mean scores with
+confidence intervals and, with --out, a file of them, .csv, or .json with every episode. LABEL=A,B,C is one agent whose
+seeds are swum by policies A, B, C in turn, as by ten trainings.
 
 A named agent that does not fit the robot is left out with a sentence, and the exit code is 2.
 """
 
 import argparse
+import itertools
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
@@ -22,10 +27,13 @@ from seastar_gym.controllers.registry import DEFAULTS, HELP, fitting_agents, loa
 from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import scene_at
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
+from seastar_gym.evaluation import scores
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.results import Row, write_csv
+from seastar_gym.evaluation.scores import Scores, measured, policies_of
 from seastar_gym.evaluation.swim import TIME_LIMIT
+from seastar_gym.evaluation.tasks import require_task, task_ids
 from seastar_gym.evaluation.trials import SETS, as_text, trials
 from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
@@ -35,19 +43,23 @@ from seastar_gym.scene.numerics import Fidelity
 if TYPE_CHECKING:
     from seastar_gym.evaluation.report.page import Remarks
 
-OF_TRIALS = ("learned", "greedy", "pentagon")
-"""Agents of trials unless others are named."""
+OF_TRIALS, OF_TASKS = ("learned", "greedy", "pentagon"), ("learned", "greedy", "random")
+"""Agents of trials and of tasks unless others are named."""
 
 
 def parser() -> argparse.ArgumentParser:
     """Parser of the options."""
     flag = argparse.BooleanOptionalAction
     found = command_parser("seastar evaluate", __doc__)
-    found.add_argument("--agents", nargs="+", help=f"{HELP} {DEFAULTS}; with --sets: {' '.join(OF_TRIALS)}")
+    found.add_argument(
+        "--agents",
+        nargs="+",
+        help=f"{HELP} {DEFAULTS}; others with --sets or --task",
+    )
     found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {DEFAULT}")
     found.add_argument(
-        "--fidelity", nargs="+", choices=get_args(Fidelity), default=["balanced"],
-        help="accuracy, several with --sets (default: balanced)",
+        "--fidelity", nargs="+", choices=get_args(Fidelity),
+        help="accuracy, several with --sets (default: balanced, or that of the task)",
     )  # fmt: skip
     found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
     found.add_argument("--decision-period", type=float, help="time between decisions [s] (default: a stroke of 1 s)")
@@ -56,7 +68,7 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--waypoint-radius", type=float, default=WAYPOINT_RADIUS, help=radius)
     found.add_argument("--random-heading", action=flag, default=False, help="turn the robot at random at the start")
     found.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn at random {DEFAULT}")
-    found.add_argument("--out", type=Path, help="folder for evaluation.csv and traces.png; with --sets a CSV file")
+    found.add_argument("--out", type=Path, help="folder for evaluation.csv and traces.png, or a file")
     found.add_argument("--video", action=flag, default=False, help="write a video of every agent")
     found.add_argument("--report", action=flag, default=False, help="write report.html, one page with all of it")
     found.add_argument(
@@ -68,6 +80,10 @@ def parser() -> argparse.ArgumentParser:
     many = found.add_argument_group("many swims")
     many.add_argument("--sets", nargs="+", choices=SETS, help="named paths; random paths or the pentagon, disturbed")
     many.add_argument("--swims", type=int, default=1000, help=f"number of random paths of every set {DEFAULT}")
+    tasks = found.add_argument_group("registered tasks")
+    tasks.add_argument("--task", nargs="+", metavar="ID", help="ids, module:id for one of your own, or all")
+    tasks.add_argument("--seeds", type=int, default=10, help=f"number of held-out episodes {DEFAULT}")
+    tasks.add_argument("--decisions", type=int, help="time limit [decisions] (default: that of the task)")
     many.add_argument("--num-threads", type=int, help="threads of the simulator (default: one for every processor)")
     return found
 
@@ -78,15 +94,21 @@ def require_sound(options: argparse.Namespace) -> None:
     require_number("--waypoint-radius", options.waypoint_radius, "m")
     require_count("--swims", options.swims, 1, 1_000_000)
     require_period(options.decision_period, "--decision-period")
-    if options.sets is None and len(options.fidelity) > 1:
+    if options.sets is None and len(options.fidelity or ()) > 1:
         raise ValueError("Several fidelities are for --sets: name one.")
-    if (options.video or options.report or options.trajectory) and (options.out is None or options.sets is not None):
-        raise ValueError("A video, a report or a trajectory needs a folder, --out, and a path, no --sets.")
+    is_path = options.sets is None and options.task is None
+    if (options.video or options.report or options.trajectory) and (options.out is None or not is_path):
+        raise ValueError("A video, a report or a trajectory needs a folder, --out, and a path, no --sets or --task.")
 
 
 def limit_of(options: argparse.Namespace, scene: Scene | None = None) -> int:
     """Time limit [decisions]."""
     return decisions_in(options.seconds, options.decision_period, scene)
+
+
+def fidelities(options: argparse.Namespace) -> list[Fidelity]:
+    """Accuracies of swims on paths."""
+    return options.fidelity or ["balanced"]
 
 
 def compared(options: argparse.Namespace, command: str) -> int:
@@ -95,7 +117,7 @@ def compared(options: argparse.Namespace, command: str) -> int:
     command: What was typed.
     """
     require_sound(options)
-    (fidelity,) = options.fidelity
+    fidelity = fidelities(options)[0]
     path, own = load_path(options.path), scene_at(options.scene, fidelity)
     agents, left_out = fitting_agents(options.agents, options.seed, fidelity, options.decision_period, own)
     print("".join(f"{sentence}\n" for sentence in left_out), end="", file=sys.stderr)
@@ -120,7 +142,7 @@ def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: 
     if options.runs:
         progress = {folder.name: read_progress(folder) for folder in options.runs}
     commands = dict.fromkeys(command for how in trainings.values() for command in how.get("commands", ()))
-    swum = f'Computed at fidelity "{options.fidelity[0]}".' if options.scene is None else f"Swum in {options.scene}."
+    swum = f'Computed at fidelity "{fidelities(options)[0]}".' if options.scene is None else f"Swum in {options.scene}."
     return Remarks(
         title=f"Evaluation: {options.path}",
         sentences=[swum],
@@ -134,7 +156,7 @@ def swum_often(options: argparse.Namespace) -> int:
     """Let the agents swim the sets; returns the exit code."""
     require_sound(options)
     rows, period = list[Row](), options.decision_period
-    for fidelity in options.fidelity:
+    for fidelity in fidelities(options):
         agents = load_agents(options.agents or OF_TRIALS, options.seed, fidelity, period)
         rows += trials(
             agents, options.sets, options.swims, fidelity=fidelity, seed=options.seed, decision_period=period,
@@ -146,9 +168,40 @@ def swum_often(options: argparse.Namespace) -> int:
     return 0
 
 
+def measured_on_tasks(options: argparse.Namespace) -> int:
+    """Let the agents swim held-out episodes of tasks; returns the exit code, 2 where one did not fit."""
+    require_sound(options)
+    require_count("--seeds", options.seeds, 1, 10_000)
+    if options.decisions is not None:
+        require_count("--decisions", options.decisions, 1, 1_000_000)
+    if options.sets is not None or options.scene is not None or options.decision_period is not None:
+        raise ValueError("A task has its own robot, paths and decisions: leave out --sets, --scene, --decision-period.")
+    agents, tasks = options.agents or OF_TASKS, task_ids() if options.task == ["all"] else options.task
+    labels = [policies_of(agent)[0] for agent in agents]
+    if len(set(labels)) < len(labels):
+        raise ValueError(f"Two agents are called {max(labels, key=labels.count)}: name them with LABEL=AGENT.")
+    for task in tasks:
+        require_task(task)
+    found, fidelity = list[Scores](), (options.fidelity or [None])[0]
+    for task, agent in itertools.product(tasks, agents):
+        try:
+            found.append(measured(task, agent, options.seeds, fidelity=fidelity, max_decisions=options.decisions,
+                                  threads=options.num_threads))  # fmt: skip
+        except (ValueError, FileNotFoundError) as unfit:
+            print(f"{agent} does not swim {task}: {unfit}", file=sys.stderr)
+            continue
+        if options.out is not None:
+            scores.write(found, options.out)  # now: tasks may take an hour each
+    if found:
+        print(scores.as_text(found))
+    return 0 if len(found) == len(tasks) * len(agents) else 2
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     options = parser().parse_args(given)
     command = shlex.join(["seastar", "evaluate", *given])
+    if options.task is not None:
+        return answered(lambda: measured_on_tasks(options))
     return answered(lambda: compared(options, command) if options.sets is None else swum_often(options))

@@ -21,9 +21,10 @@ COMMANDS = {
     "swim": Command("seastar_gym.cli.swim", "watch an agent on a path or a task, in a window or as a film"),
     "play": Command("seastar_gym.cli.play", "steer the robot with the keyboard"),
     "drive": Command("seastar_gym.cli.drive", "let a policy drive a robot in a tank, or a simulated one in its place"),
-    "evaluate": Command("seastar_gym.cli.evaluate", "compare agents on a path: a table, a CSV file, a picture"),
-    "benchmark": Command("seastar_gym.benchmark.command", "measure agents on registered tasks over ten seeds"),
-    "data": Command("seastar_gym.data.command", "write Minari datasets of agents on registered tasks"),
+    "evaluate": Command(
+        "seastar_gym.cli.evaluate",
+        "compare agents on paths or registered tasks: a table, a file, a picture",
+    ),
     "train": Command("seastar_gym.cli.train", "train a policy, in a checkout of the repository"),
     "export": Command("seastar_gym.cli.export", "write a learned policy as a file of C or ONNX"),
     "certify": Command("seastar_gym.accuracy.command", "measure what speed costs a scene in accuracy"),

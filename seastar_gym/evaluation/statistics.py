@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 
 CONFIDENCE, RESAMPLES = 0.95, 2000
-ENDS = (50.0 * (1.0 - CONFIDENCE), 100.0 - 50.0 * (1.0 - CONFIDENCE))
-"""Percentiles at the ends of an interval."""
 
 
 class Estimate(NamedTuple):
@@ -85,17 +83,3 @@ def _bootstrapped(samples: tuple[Floats, ...], statistic: Callable[..., Any], **
         rng=np.random.default_rng(0), **how,
     ).confidence_interval  # fmt: skip
     return float(found.low), float(found.high)
-
-
-def profile(scores: ArrayLike, levels: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Performance profile: share of the scores, shape (seeds, tasks), that reach each level; every task counts alike.
-
-    Returns the shares and the ends of their stratified bootstrap intervals of 95 %, as in rliable.
-    """
-    scores, levels = np.asarray(scores, float), np.asarray(levels, float)
-    rng, (n_seeds, n_tasks) = np.random.default_rng(0), scores.shape
-    shares = (scores[..., None] >= levels).mean(axis=(0, 1))
-    drawn = rng.integers(n_seeds, size=(RESAMPLES, n_seeds, n_tasks))
-    reached = np.take_along_axis(scores[None], drawn, axis=1)[..., None] >= levels
-    low, high = np.percentile(reached.mean(axis=(1, 2)), ENDS, axis=0)
-    return shares, low, high

@@ -13,8 +13,6 @@ Parameters are positive numbers of the scene, by name: fluid.drag_coefficient, r
 robot.limbs.0.length, actuator.peak_angle, or actuator.angles.2, a point of a measured curve. Their first guesses are
 the values of the scene: a Python file that defines `scene` (it is executed), a JSON file as `Scene.to_dict` writes it,
 or none for the chapter's.
-
-With `--synthetic`, the data are simulated with known parameters and 1 mm of noise, to show that the fit finds them.
 """
 
 import argparse
@@ -29,12 +27,11 @@ from seastar_gym.extras import require_extra
 from seastar_gym.files import save_figure, write_json
 from seastar_gym.identify.fit import DOUBT, Estimate, identify
 from seastar_gym.identify.measurement import ARM, ORIENTATION, Measurement
-from seastar_gym.identify.trajectories import synthetic
 from seastar_gym.scene import Numerics
 from seastar_gym.scene.scene_file import load_scene
 
-TRUTH = {"fluid.drag_coefficient": 1.3, "robot.youngs_modulus": 1.4e6, "actuator.peak_angle": 0.55}
-"""Parameters of the synthetic data."""
+FITTED = ["fluid.drag_coefficient", "robot.youngs_modulus", "actuator.peak_angle"]
+"""Parameters that are fitted unless others are named."""
 LABELS = {0: "hub", ORIENTATION: f"orientation, at {1e3 * ARM:.0f} mm"}
 """Names of what is tracked, other than nodes, in the picture."""
 STEP = 5e-3
@@ -68,11 +65,7 @@ def fit(options: argparse.Namespace) -> None:
     scene = asked
     if options.step is not None or not scene.numerics.named:
         scene = replace(scene, numerics=Numerics("implicit-midpoint", options.step or STEP))
-    if options.synthetic:
-        measurement = synthetic(scene, TRUTH)
-        print("truth:", ", ".join(f"{name} = {value:g}" for name, value in TRUTH.items()))
-    else:
-        measurement = Measurement.from_csv(options.trajectory, options.commands)
+    measurement = Measurement.from_csv(options.trajectory, options.commands)
     begin = time.perf_counter()
     estimate = identify(scene, options.fit, measurement, largest_delay=options.delay)
     print(estimate.report(), f"{time.perf_counter() - begin:.1f} s", sep="\n")
@@ -89,12 +82,12 @@ def fit(options: argparse.Namespace) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = command_parser("seastar identify", __doc__)
-    parser.add_argument("trajectory", nargs="?", type=Path, help="CSV file with a first line time,x0,y0,..")
-    parser.add_argument("commands", nargs="?", type=Path, help="CSV file with one line of commands per stroke")
+    parser.add_argument("trajectory", type=Path, help="CSV file with a first line time,x0,y0,..")
+    parser.add_argument("commands", type=Path, help="CSV file with one line of commands per stroke")
     delay = "fit how late the trajectory's clock is, too, up to this many seconds either way (default: not at all)"
     parser.add_argument("--delay", type=float, metavar="LARGEST", help=delay)
-    names = f"names of the parameters to fit (default: {' '.join(TRUTH)})"
-    parser.add_argument("--fit", nargs="+", default=list(TRUTH), metavar="PARAMETER", help=names)
+    names = f"names of the parameters to fit (default: {' '.join(FITTED)})"
+    parser.add_argument("--fit", nargs="+", default=FITTED, metavar="PARAMETER", help=names)
     parser.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
     step = "time step of the implicit midpoint rule [s] (default: the scene's own numerics, or 0.005)"
     parser.add_argument("--step", type=float, help=step)
@@ -102,8 +95,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
     intervals = "JSON file for the confidence intervals by name, from which train.py --intervals draws robots"
     parser.add_argument("--intervals", type=Path, help=intervals)
     parser.add_argument("--picture", type=Path, help="file for a picture of the fit")
-    parser.add_argument("--synthetic", action="store_true", help="fit simulated data with known parameters")
     options = parser.parse_args(arguments)
-    if not options.synthetic and options.commands is None:
-        parser.error("give a trajectory and its commands, or --synthetic")
     return answered(lambda: fit(options))

@@ -1,4 +1,4 @@
-"""Sweeps: many designs, simulated batch by batch on processes, Ray or SLURM. `seastar sweep --help`.
+"""Sweeps: many designs, simulated batch by batch on any executor. `seastar sweep --help`.
 
 sweep = Sweep(Scene.preset("fast"), (Range("robot.limb_length", 0.05, 0.15), Choices("robot.n_limbs", (3, 5))), samples=1000)
 run(sweep.batches(), "runs/limbs", Processes(2))

@@ -28,7 +28,6 @@ from tqdm import tqdm
 from seastar_gym.command import DEFAULT, INTERRUPTED, answered
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.swim import TIME_LIMIT
-from seastar_gym.executors.options import add_options, executor_of
 from seastar_gym.extras import require_extra
 from seastar_gym.files import within, write_json
 from seastar_gym.scene import Scene
@@ -39,6 +38,7 @@ from seastar_gym.sweep.axes import Axis, Range
 from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.controllers import Route
 from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.executors import add_options, executor_of
 from seastar_gym.sweep.result_files import ResultFiles, best_result, result_file_of
 from seastar_gym.sweep.run import Progress, run
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS
@@ -74,7 +74,7 @@ def make_parser() -> argparse.ArgumentParser:
         "--device", choices=("cpu", *DEVICES), default="cpu",
         help=f"where robots swim, to the same bits: cuda is a GPU, with --robots 16384 --workers 1 {DEFAULT}",
     )  # fmt: skip
-    add_options(parser, "batches", "processes")
+    add_options(parser)
     parser.add_argument("--count", action="store_true", help="say how many designs and batches there are, and stop")
     return parser
 
@@ -133,8 +133,8 @@ def run_sweep(sweep: Sweep, options: argparse.Namespace) -> int:
     if options.count:
         return 0
     work = work_of(options)
-    with tqdm(total=sweep.n_batches, unit="batch") as bar:
-        tally = run(sweep.batches(), options.out, executor_of(options), bar_of(sweep.n_batches, bar), work)
+    with tqdm(total=sweep.n_batches, unit="batch") as bar, executor_of(options) as executor:
+        tally = run(sweep.batches(), options.out, executor, bar_of(sweep.n_batches, bar), work)
     print(as_text(tally, options.out))
     keep_best(options)
     return 1 if tally.problems else 0
@@ -163,9 +163,9 @@ def search(sweep: Sweep, options: argparse.Namespace) -> int:
         within(options.out, file.name)  # SQLite writes through links
     storage = options.storage or f"sqlite:///{options.out}/study.db"
     wanted = Search(options.objective, not options.minimize, options.seed, options.stale_after)
-    with tqdm(total=options.optuna, unit="design") as bar:
-        explore(sweep, wanted, storage, options.optuna, options.out, executor_of(options),
-                lambda tally: bar.update(tally.designs - bar.n), work)  # fmt: skip
+    with tqdm(total=options.optuna, unit="design") as bar, executor_of(options) as executor:
+        explore(sweep, wanted, storage, options.optuna, options.out, executor,
+                lambda tally: bar.update(tally.designs - bar.n), work, options.workers)  # fmt: skip
     keep_best(options)
     return 0
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterator
+from concurrent.futures import Executor
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,11 +17,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
-from seastar_gym.executors import Executor, Outcome, Work, sentence_of
+from seastar_gym.processors import processors
 from seastar_gym.scene.checks import require_choice, require_count, require_number
 from seastar_gym.sweep.axes import Range
 from seastar_gym.sweep.batches import Batch
 from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.executors import Outcome, Work, outcomes, sentence_of
 from seastar_gym.sweep.result_files import ResultFiles, result_file_of
 from seastar_gym.sweep.run import OnProgress, Progress
 from seastar_gym.sweep.swimming import units_of
@@ -77,17 +79,18 @@ def _texts(sweep: Sweep) -> Iterator[str]:
 
 
 def explore(
-    sweep: Sweep, search: Search, storage: str, designs: int, folder: str | os.PathLike[str], executor: Executor,
-    progress: OnProgress | None = None, work: Work[Batch] = result_file_of,
+    sweep: Sweep, search: Search, storage: str, designs: int, folder: str | os.PathLike[str],
+    executor: Executor | None = None, progress: OnProgress | None = None, work: Work = result_file_of,
+    at_once: int | None = None,
 ) -> optuna.Study:  # fmt: skip
     """Propose and simulate until a study has results of so many designs. Every batch has `sweep.robots` at most.
 
-    work: What makes a part of a batch.
+    executor, work, at_once: As of `run`, but proposals depend on results: None means a batch for every processor.
     """
     require_count("designs", designs, 1, 10_000_000)
     proposals = Proposals(sweep, study_of(sweep, search, storage), search, designs)
     parts, tally = ResultFiles(folder), Progress()
-    for outcome in executor.run(work, proposals.batches()):
+    for outcome in outcomes(executor, work, proposals.batches(), at_once or processors()):
         if outcome.part is None:
             tally.losses += 1
         else:
@@ -145,7 +148,7 @@ class Proposals:
         numbers |= {axis.name: float(axis.values[places[axis.name]]) for axis in sweep.of_robots}
         return tuple(places[axis.name] for axis in sweep.of_configurations), numbers
 
-    def tell(self, outcome: Outcome[Batch]) -> None:
+    def tell(self, outcome: Outcome) -> None:
         """Tell the study what came of a batch. Proposals of a lost one are put back."""
         trials = self._waiting.pop(outcome.task.name)
         if outcome.part is None:

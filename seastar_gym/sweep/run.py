@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from seastar_gym.command import refused_by_disk
-from seastar_gym.executors import Executor, Outcome, Work
-from seastar_gym.scene.checks import require_callable, require_file, require_kind, shown
+from seastar_gym.scene.checks import require_callable, require_count, require_file, require_kind, shown
 from seastar_gym.sweep.batches import Batch
+from seastar_gym.sweep.executors import Outcome, Work, outcomes
 from seastar_gym.sweep.result_files import ResultFiles, result_file_of
 
+AT_ONCE = 1000
+"""Batches that an executor has at a time, unless somebody says it."""
 ATTEMPTS = 3
 """How often a batch is tried whose worker is lost."""
 MOST_LOST = 1000
@@ -50,24 +53,28 @@ OnProgress = Callable[[Progress], None]
 
 
 def run(
-    batches: Iterable[Batch], folder: str | os.PathLike[str], executor: Executor, progress: OnProgress | None = None,
-    work: Work[Batch] = result_file_of,
+    batches: Iterable[Batch], folder: str | os.PathLike[str], executor: Executor | None = None,
+    progress: OnProgress | None = None, work: Work = result_file_of, at_once: int = AT_ONCE,
 ) -> Progress:  # fmt: skip
     """Run the batches that have no part in the folder; those that were lost again at the end.
 
     An interrupt, such as Ctrl-C, leaves the parts of all finished batches. A part that the disk refuses costs its
     batch, which is lost; OSError if the disk refuses UNWRITTEN in a row.
 
-    work: What makes a part of a batch.
+    executor: Any of `concurrent.futures`; None runs batches in this process, one after the other. A lost worker costs
+        its batch alone, but where its executor is broken then, as ProcessPoolExecutor is: the same run goes on with
+        another. work: What makes a part of a batch. at_once: Batches that the executor has at a time at most.
     """
     require_file("folder", folder)
-    require_kind("executor", executor, Executor, "an executor, such as Processes()")
+    require_count("at_once", at_once, 1, 1_000_000)
+    if executor is not None:
+        require_kind("executor", executor, Executor, "an executor of concurrent.futures, such as Processes()")
     if progress is not None:
         require_callable("progress", progress)
     parts, tally = ResultFiles(folder), Progress()
-    waiting, lost = unfinished(batches, parts, tally), list[Outcome[Batch]]()
+    waiting, lost = unfinished(batches, parts, tally), list[Outcome]()
     for _ in range(ATTEMPTS):
-        lost = _attempt(executor.run(work, waiting), parts, tally, progress)
+        lost = _attempt(outcomes(executor, work, waiting, at_once), parts, tally, progress)
         if not lost:
             return tally
         waiting = iter([outcome.task for outcome in lost])
@@ -92,12 +99,12 @@ def unfinished(batches: Iterable[Batch], parts: ResultFiles, tally: Progress) ->
 
 
 def _attempt(
-    outcomes: Iterator[Outcome[Batch]], parts: ResultFiles, tally: Progress, progress: OnProgress | None
-) -> list[Outcome[Batch]]:
+    found: Iterator[Outcome], parts: ResultFiles, tally: Progress, progress: OnProgress | None
+) -> list[Outcome]:
     """Write the parts of outcomes; returns those without."""
-    lost = list[Outcome[Batch]]()
+    lost = list[Outcome]()
     refused = 0
-    for outcome in outcomes:
+    for outcome in found:
         try:
             if outcome.part is not None:
                 parts.write(outcome.task.name, outcome.part)
@@ -113,7 +120,7 @@ def _attempt(
     return lost
 
 
-def _count(outcome: Outcome[Batch], lost: list[Outcome[Batch]], tally: Progress) -> None:
+def _count(outcome: Outcome, lost: list[Outcome], tally: Progress) -> None:
     """Count an outcome. ValueError if too many are lost."""
     if outcome.part is not None:
         tally.count(outcome.task)

@@ -172,3 +172,32 @@ def test_skrl_learns_for_an_iteration():
     assert first == rewards[:8]
     weights = [list(agent.models["policy"].parameters()) for agent in (once, twice)]
     assert any(not torch.equal(one, other) for one, other in zip(*weights, strict=True))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_rllib_learns_for_an_iteration():
+    """In an environment of its own, see .ci/learners."""
+    pytest.importorskip("ray")
+    pytest.importorskip("tree")  # which RLlib needs, and Ray does not
+    found = example("rllib")["learner_of"](0, 64, max_episode_steps=5).train()
+    assert np.isfinite(found["env_runners"]["episode_return_mean"])
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_recorded_dataset_is_swum_again_to_the_bit_and_cloned(tmp_path, monkeypatch):
+    minari = pytest.importorskip("minari")
+    pytest.importorskip("h5py")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    offline = example("offline")
+    offline["record"]("SeastarSwim/learned-v0", "learned", 2, fidelity="fast", max_episode_steps=20)
+    dataset = minari.load_dataset("SeastarSwim/learned-v0")
+    env, (_, second) = dataset.recover_environment(), dataset.iterate_episodes()
+    observation, info = env.reset(seed=1)
+    for step, action in enumerate(second.actions):
+        np.testing.assert_array_equal(second.observations[step], observation)
+        np.testing.assert_array_equal(second.infos["hub_position"][step], info["hub_position"])
+        observation, reward, *_, info = env.step(action)
+        assert reward == second.rewards[step]
+    seen, actions = offline["decisions_of"](dataset)
+    network = offline["clone"](seen, actions, 300)
+    assert (network(seen).argmax(1) == actions).float().mean() > 0.7

@@ -1,21 +1,14 @@
 """The scripted gaits do what the chapter says, in every action mode, alone and in batches."""
 
 import hashlib
-from typing import Any
 
 import numpy as np
 import pytest
 
-from seastar_gym import HeadingTargets, Numerics, Scene, Simulator
+from seastar_gym import Numerics, Scene, Simulator
 from seastar_gym.controllers.scripted import GAITS, RandomPolicy, scripted, to_actions
-from seastar_gym.controllers.turning import TurnThenSwim
-from seastar_gym.envs.commands import action_space, command_table, to_commands
-from seastar_gym.envs.layout import HEADINGS, Layout
-from seastar_gym.envs.options import make_scene
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry import transform_commands
-from seastar_gym.evaluation.swim import swim
-from seastar_gym.gaits import pentagon_gait, straight_gait, turning_wave
+from seastar_gym.envs.commands import action_space, to_commands
+from seastar_gym.gaits import pentagon_gait, straight_gait
 
 OBSERVATION = np.zeros(186, np.float32)
 SECOND_ORDER = Scene(numerics=Numerics(scheme="sdirk2", step=10e-3))
@@ -105,71 +98,3 @@ def test_random_actions_reach_every_choice_and_are_shares_in_continuous():
         assert action.dtype == np.float32
     shares = to_actions([[0.5, -0.25]], "continuous", 2)
     assert shares.dtype == np.float32 and shares.tolist() == [[0.5, -0.25]]
-
-
-# An agent that turns to the asked heading by a gait, and swims once it has it.
-
-
-AT = Layout.of(Scene(), entries=HEADINGS)
-CLOCKWISE = np.array([[1, -1, 0, 0, 0], [0, 0, 1, -1, 0], [0, 0, 0, 0, 1]], float)
-SWIMS = np.array([0, 1, 0, 0, -1], float)
-
-
-class Swimmer:
-    """Policy of pairs that swims straight, and keeps what it was shown."""
-
-    def __init__(self) -> None:
-        self.shown: list[Any] = []
-
-    def predict(self, observation, state=None, episode_start=None, deterministic=False):
-        assert deterministic
-        self.shown.append(observation)
-        return np.int64((command_table("pairs", 5) == SWIMS).all(axis=1).argmax()), None
-
-
-def seen(left: float) -> np.ndarray:
-    """Observation of a robot that has to turn by so much [rad]."""
-    numbers = np.random.default_rng(0).normal(size=AT.size).astype(np.float32)
-    numbers[AT.headings] = np.cos(left), np.sin(left), 1.0, 0.0
-    return numbers
-
-
-def agent(swimmer: Swimmer | None = None) -> TurnThenSwim:
-    return TurnThenSwim(CLOCKWISE, swimmer or Swimmer(), "pairs", Scene(), HeadingTargets(tolerance=0.2), 0.5)
-
-
-def commands_of(policy: TurnThenSwim, lefts: list[float]) -> list[list[float]]:
-    """Commands of decisions, one after the other, with so much left to turn [rad]."""
-    state, found = None, []
-    for left in lefts:
-        action, state = policy.predict(seen(left), state)
-        found.append(command_table("joint", 5)[action].tolist())
-    return found
-
-
-def test_it_turns_by_the_gait_to_the_side_of_the_heading_and_then_swims():
-    """Turning begins above nine tenths of the tolerance and ends below four; the swimmer sees nothing of headings."""
-    assert commands_of(agent(), [-1.0] * 4) == [*CLOCKWISE.tolist(), CLOCKWISE[0].tolist()]
-    mirrored = transform_commands(CLOCKWISE, 9)
-    assert commands_of(agent(), [1.0] * 4) == [*mirrored.tolist(), mirrored[0].tolist()]
-    assert mirrored[0].tolist() == [-1, 0, 0, 0, 1]  # limb 1 stays, and 2 becomes 5
-    for side in (-1.0, 1.0):
-        swimmer, lefts = Swimmer(), [0.179, 0.181, 0.1, 0.081, 0.079, 0.1, 0.179, 0.2]
-        found = commands_of(agent(swimmer), [side * left for left in lefts])
-        turns = [command != SWIMS.tolist() for command in found]
-        assert turns == [False, True, True, True, False, False, False, True]
-        assert found[1] == found[7]  # the gait begins anew
-        np.testing.assert_array_equal(swimmer.shown[0], np.delete(seen(side * 0.179), AT.headings))
-        assert len(swimmer.shown) == 4
-
-
-@pytest.mark.parametrize("asked", [0.5, -0.5])
-def test_a_robot_turns_to_the_side_that_is_asked_for_and_then_swims(asked):
-    scene, headings = make_scene(None, "fast", 0.2), HeadingTargets(asked)
-    policy = TurnThenSwim(turning_wave(0.2), scripted("rest", "pairs"), "pairs", scene, headings, 0.2)
-    env = SeastarSwimEnv([[0.3, 0.0]], "joint", "fast", decision_period=0.2, headings=headings)
-    done = swim("turn", policy, env, max_strokes=40)
-    heated = done.limbs_heated > 0
-    last = int(np.flatnonzero(heated)[-1])
-    assert heated[:last].all() and 10 < last < 30 and not heated[last + 1 :].any()
-    assert env._task.facts()["heading"][0] == pytest.approx(asked, abs=headings.tolerance)

@@ -69,7 +69,7 @@ def test_what_cannot_be_copied_is_shared_and_what_is_batched_is_not_wrapped(here
     assert type(call_function("mine_batched:make", None)) is type(scripted("pentagon"))
 
 
-@pytest.mark.parametrize("words", [("benchmark", "--tasks", "SeastarSwim-v0", "--seeds", "2", "--decisions", "3"),
+@pytest.mark.parametrize("words", [("evaluate", "--task", "SeastarSwim-v0", "--seeds", "2", "--decisions", "3"),
                                    ("evaluate", "--seconds", "3")])  # fmt: skip
 def test_a_fresh_process_finds_it_in_the_current_folder(here, words):
     env = {**os.environ, "PYTHONPATH": str(Path(seastar_gym.__file__).parents[1])}

@@ -33,7 +33,7 @@ from seastar_gym import (
 )
 from seastar_gym.identify import Measurement, get_parameter, identify, synthetic, trajectory, with_parameters
 from seastar_gym.identify import command as its_command
-from seastar_gym.identify.command import TRUTH, main
+from seastar_gym.identify.command import main
 from seastar_gym.identify.covariance import uncertainty_of
 from seastar_gym.identify.fit import Residuals, estimate_of
 from seastar_gym.identify.search import Found
@@ -44,6 +44,7 @@ from seastar_gym.scene.scene_file import load_scene
 stats = Later("scipy.stats")
 
 SCENE = Scene(numerics=Numerics("implicit-midpoint", 0.01))
+TRUTH = {"fluid.drag_coefficient": 1.3, "robot.youngs_modulus": 1.4e6, "actuator.peak_angle": 0.55}
 
 
 @pytest.fixture(scope="module")
@@ -219,10 +220,10 @@ def test_the_command_takes_a_scene_with_its_own_steps_or_those_it_is_given(tmp_p
         raise ValueError("enough")
 
     monkeypatch.setattr(its_command, "identify", fitted)
-    monkeypatch.setattr(its_command, "synthetic", lambda scene, truth: None)
+    monkeypatch.setattr(its_command.Measurement, "from_csv", lambda *files: None)
     (tmp_path / "mine.json").write_text(json.dumps(SCENE.to_dict()))
-    own = ["--synthetic", "--scene", str(tmp_path / "mine.json")]
-    for line in (["--synthetic"], own, [*own, "--step", "0.02"]):
+    own = ["a.csv", "b.csv", "--scene", str(tmp_path / "mine.json")]
+    for line in (own[:2], own, [*own, "--step", "0.02"]):
         assert main(line) == 2
     assert steps == [0.005, 0.01, 0.02]
     for line in ([], ["path.csv"]):
@@ -250,11 +251,11 @@ def line(n_pictures: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def coverage(memory: float, n_pictures: int = 400) -> np.ndarray:
-    """Share of 400 fits whose 95 % interval has the truth, shape (p,). memory: Of errors, from picture to picture."""
+    """Share of 200 fits whose 95 % interval has the truth, shape (p,). memory: Of errors, from picture to picture."""
     times, jacobian = line(n_pictures)
     rng, held = np.random.default_rng(0), []
     fit = np.linalg.pinv(jacobian)
-    for _ in range(400):
+    for _ in range(200):
         errors = np.empty((n_pictures, 2))
         errors[0] = rng.normal(size=2)
         for picture in range(1, n_pictures):

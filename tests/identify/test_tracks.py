@@ -402,7 +402,7 @@ def with_body(tmp_path):
 
 def test_trackers_poses_and_markers_become_nodes_and_the_hub_s_orientation(tmp_path, golden):
     for name, text, given in (
-        ("pose_turned", POSE, ["--from", "pose"]), ("pose_aligned", POSE, ["--from", "pose", "--aligned"]),
+        ("pose_turned", POSE, ["--from", "table"]), ("pose_aligned", POSE, ["--from", "table", "--aligned"]),
         ("any_node", MOTIVE, ["--from", "motive", "--aligned", "--nodes", "Seastar:Marker 001=tip1", "Seastar=hub"]),
     ):  # fmt: skip
         code, csv = converted(tmp_path, text, *given, *with_body(tmp_path))
@@ -530,7 +530,7 @@ def test_one_swim_is_the_same_whatever_has_tracked_it(tmp_path, made):
 
 
 def test_an_orientation_tells_where_a_robot_without_a_body_begins_and_is_left_out(tmp_path, capsys):
-    code, csv = converted(tmp_path, "time,x,y,theta\n0,0.1,0.2,0.3\n0.1,0.2,0.2,0.3\n", "--from", "pose")
+    code, csv = converted(tmp_path, "time,x,y,theta\n0,0.1,0.2,0.3\n0.1,0.2,0.2,0.3\n", "--from", "table")
     assert code == 0 and "orientation, which is that of a body, is left out." in capsys.readouterr().out
     names, _, last = csv.splitlines()
     assert names == "time,x0,y0"
@@ -539,7 +539,7 @@ def test_an_orientation_tells_where_a_robot_without_a_body_begins_and_is_left_ou
 
 
 def test_pictures_from_before_the_begin_are_left_out_and_counted(tmp_path, capsys):
-    code, csv = converted(tmp_path, POSE, "--from", "pose", "--begin", "0.1")
+    code, csv = converted(tmp_path, POSE, "--from", "table", "--begin", "0.1")
     assert code == 0 and csv.splitlines()[1].startswith("0.0,0,0") and len(csv.splitlines()) == 2
     assert "1 pictures in 0 s" in (said := capsys.readouterr().out) and "3 pictures from before were left out." in said
 
@@ -588,26 +588,26 @@ def test_a_dataset_of_movement_becomes_a_trajectory(tmp_path, ends):
 @pytest.mark.parametrize(
     "text, given, words",
     [
-        (POSE, ["--from", "pose", "--up", "z"], "Files of pose have no use for --up."),
+        (POSE, ["--from", "table", "--up", "z"], "Files of table have no use for --up."),
         (POSE, ["--from", "table", "--individual", "a"], "Files of table have no use for --individual."),
         (MOTIVE, ["--from", "motive", "--likelihood", "0.5"], "Files of motive have no use for --likelihood."),
         (MOTIVE, ["--from", "motive", "--rate", "30"], "Files of motive have no use for --rate."),
         (DEEPLABCUT, ["--from", "deeplabcut", "--y-down"], "Files of deeplabcut have no use for --y-down."),
-        (POSE, ["--from", "pose", "--only", "tag"], "--only must be such as id=3, not tag."),
-        (POSE, ["--from", "pose", "--begin", "now"], "--begin must be a time of the file or the word first, not now."),
+        (POSE, ["--from", "table", "--only", "tag"], "--only must be such as id=3, not tag."),
+        (POSE, ["--from", "table", "--begin", "now"], "--begin must be a time of the file or the word first, not now."),
         (DEEPLABCUT, ["--from", "deeplabcut"], "Files of deeplabcut have no times: give --rate"),
         (DEEPLABCUT, ["--from", "deeplabcut", "--rate", "30", "--nodes", "hub=hub"], "The track is in pixels: give"),
         (SLEAP, ["--from", "sleap", "--rate", "0"], "rate must be a positive, finite number"),
         (SLEAP, ["--from", "sleap", "--rate", "9", "--metres-per-pixel", "1e-3"], "Say which points are which nodes"),
-        (POSE, ["--from", "pose", "--unit", "px", "--metres-per-pixel", "1", "--homography", "x"], "not both"),
-        (POSE, ["--from", "pose", "--metres-per-pixel", "1"], "The track is in metres, not in pixels: --unit px"),
-        (POSE, ["--from", "pose", "--nodes", "tag"], "--nodes must be such as nose=hub"),
-        (POSE, ["--from", "pose", "--nodes", "x=tip"], "Nodes must be such as nose=hub, left=tip1 or left=11, not x"),
-        (POSE, ["--from", "pose", "--nodes", "x=tip6"], "x=tip6: the robot has 5 limbs and 56 nodes"),
-        (POSE, ["--from", "pose", "--rest", "-1"], "rest must be"),
+        (POSE, ["--from", "table", "--unit", "px", "--metres-per-pixel", "1", "--homography", "x"], "not both"),
+        (POSE, ["--from", "table", "--metres-per-pixel", "1"], "The track is in metres, not in pixels: --unit px"),
+        (POSE, ["--from", "table", "--nodes", "tag"], "--nodes must be such as nose=hub"),
+        (POSE, ["--from", "table", "--nodes", "x=tip"], "Nodes must be such as nose=hub, left=tip1 or left=11, not x"),
+        (POSE, ["--from", "table", "--nodes", "x=tip6"], "x=tip6: the robot has 5 limbs and 56 nodes"),
+        (POSE, ["--from", "table", "--rest", "-1"], "rest must be"),
         (DEEPLABCUT, ["--from", "deeplabcut", "--rate", "9", "--likelihood", "2"], "likelihood must be from 0 to 1"),
-        (POSE.replace("0.1,0.11", "0.05,0.11"), ["--from", "pose"], "the clock went back"),
-        (POSE.replace("0.11", "2000"), ["--from", "pose"], "within 1000 m of the origin"),
+        (POSE.replace("0.1,0.11", "0.05,0.11"), ["--from", "table"], "the clock went back"),
+        (POSE.replace("0.11", "2000"), ["--from", "table"], "within 1000 m of the origin"),
     ],
 )
 def test_the_command_says_what_is_wrong_in_a_sentence(tmp_path, capsys, text, given, words):

@@ -518,12 +518,9 @@ FOUR = Scene(Seastar(n_limbs=4), actuator=SmaWires(heating_time=0.08))
     [(swim, {"sight": Sight(sees="nodes")}, "sees no nodes"), (swim, {"action_delay": 0.5}, "late"),
      (swim, {"randomization": DENSITIES}, "randomization"), (swim, {"random_heading": True}, "at random"),
      (swim, {"limits": Limits(0.05)}, "the guard allows 0.05 s"), (swim, {"scene": FOUR}, "has 5 limbs"),
-     (swim, {"plant": 3}, "must be a Plant"), (simulation, {"sight": Sight(sees="nodes")}, "sees no nodes"),
-     (simulation, {"simulator": Simulator(SCENE, 2)}, "one robot with wires"), (simulation, {"seed": -1}, "seed"),
-     (simulation, {"simulator": Simulator(Scene(actuator=SmaPulse()))}, "one robot with wires"),
-     (simulation, {"paced": 1}, "paced"), (simulation, {"simulator": SCENE}, "a Simulator"),
-     (simulation, {"sight": 30}, "a Sight"),
-     *((Limits, {name: 0.0}, f"Limits.{name}") for name in ("longest_pulse", "patience", "oldest"))],
+     (simulation, {"sight": Sight(sees="nodes")}, "sees no nodes"),
+     (simulation, {"simulator": Simulator(SCENE, 2)}, "one robot with wires"),
+     (simulation, {"simulator": Simulator(Scene(actuator=SmaPulse()))}, "one robot with wires")],
 )  # fmt: skip
 def test_what_no_plant_can_be_or_do_is_refused(make, arguments, words):
     with assert_refused(words):

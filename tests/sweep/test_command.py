@@ -1,8 +1,6 @@
 """The command line of sweeps, from its words to its results."""
 
 import json
-import os
-import signal
 import subprocess
 import sys
 import time
@@ -126,22 +124,13 @@ def finished(tmp_path, n_batches, process):
         time.sleep(0.05)
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
-def test_a_stopped_sweep_goes_on_where_it_was(stop, tmp_path, monkeypatch):
-    """Ctrl-C goes to all processes of a terminal, a kill to one."""
+def test_a_killed_sweep_goes_on_where_it_was(tmp_path, monkeypatch):
+    """Its workers end with it. ways/test_many_designs.py presses Ctrl-C."""
     words = "robot.limb_length=0.05:0.15:400", "--robots", "1", "--measured", "1", "--settling", "0", "--workers", "1"
     process = command(tmp_path, *words)
     finished(tmp_path, 3, process)
-    if stop == signal.SIGINT:
-        os.killpg(process.pid, stop)
-    else:
-        process.kill()
-    told = process.communicate(timeout=60)[1]
-    if stop == signal.SIGINT:
-        assert process.returncode == 130
-        last = told.strip().splitlines()[-1]
-        assert last.startswith("Interrupted: all finished batches are in") and "and the same command goes on" in last
-        assert "Traceback" not in told
+    process.kill()
+    process.communicate(timeout=60)  # whoever holds its pipes has ended
     names = set(ResultFiles(tmp_path).names())
     assert len(names) >= 3
     assert all(ResultFiles(tmp_path).file(name).read_bytes()[-4:] == b"PAR1" for name in names)

@@ -13,11 +13,10 @@ import pytest
 
 from losing import Losing, first
 from refusals import assert_refused
-from seastar_gym.executors import Outcome
-from seastar_gym.executors.here import Here
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.axes import Choices, Range
 from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.executors import Outcome
 from seastar_gym.sweep.proposals import Proposals, Search, explore, put_back, put_back_stale, study_of
 from seastar_gym.sweep.result_files import ResultFiles, read_results, result_file_of
 from seastar_gym.sweep.run import run
@@ -76,24 +75,24 @@ def states(study):
 
 
 def test_proposals_are_simulated_and_told(storage, tmp_path):
-    study = explore(SWEEP, Search(), storage, 10, tmp_path, Here())
+    study = explore(SWEEP, Search(), storage, 10, tmp_path)
     assert states(study) == ["COMPLETE"] * 10
     batches = list(ResultFiles(tmp_path).names())
     assert len(batches) >= 3
     best, folder = study.best_trial, tmp_path / "again"
     axes = tuple(Choices(name, (value,)) for name, value in best.params.items())
     again = Sweep(SWEEP.scene, axes, settling=0, measured=1)
-    run(again.batches(), folder, Here())
+    run(again.batches(), folder)
     assert read_results(folder).column("speed").to_pylist() == [best.value]
     assert best.value == max(trial.value for trial in study.trials)
 
 
 def test_a_search_goes_on_where_it_was_and_keeps_to_its_number(sqlite, tmp_path):
-    explore(SWEEP, Search(), sqlite, 5, tmp_path, Here())
+    explore(SWEEP, Search(), sqlite, 5, tmp_path)
     seen = []
-    study = explore(SWEEP, Search(), sqlite, 8, tmp_path, Here(), lambda tally: seen.append(tally.designs))
+    study = explore(SWEEP, Search(), sqlite, 8, tmp_path, None, lambda tally: seen.append(tally.designs))
     assert len(study.trials) == 8 and seen[-1] == 3
-    assert len(explore(SWEEP, Search(), sqlite, 8, tmp_path, Here()).trials) == 8
+    assert len(explore(SWEEP, Search(), sqlite, 8, tmp_path).trials) == 8
 
 
 def test_another_sweep_or_another_file_of_a_controller_is_another_study(sqlite, tmp_path):
@@ -127,7 +126,7 @@ def test_stale_proposals_are_put_back_once(storage, tmp_path):
     assert put_back_stale(study, 1e-3) == 4
     assert put_back_stale(study, 1e-3) == 0
     assert states(study) == ["FAIL"] * 4 + ["WAITING"] * 4
-    found = explore(SWEEP, Search("ahead"), storage, 4, tmp_path, Here())
+    found = explore(SWEEP, Search("ahead"), storage, 4, tmp_path)
     assert states(found) == ["FAIL"] * 4 + ["COMPLETE"] * 4
     assert [trial.params for trial in found.trials[:4]] == [trial.params for trial in found.trials[4:]]
 

@@ -6,6 +6,7 @@ import json
 import os
 import resource
 import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -15,14 +16,12 @@ import pytest
 import works
 from losing import Interrupted
 from refusals import assert_refused
-from seastar_gym.executors import Outcome
-from seastar_gym.executors.here import Here
-from seastar_gym.executors.processes import Processes
 from seastar_gym.scene import Scene, Seastar, SmaPulse
 from seastar_gym.simulator import Simulator
 from seastar_gym.sweep.axes import Choices, Range
 from seastar_gym.sweep.command import as_text
 from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.executors import Outcome, Processes, RayTasks, SlurmJobs, dask_client, outcomes
 from seastar_gym.sweep.result_files import ResultFiles, read_results, result_file_of
 from seastar_gym.sweep.run import ATTEMPTS, run
 from seastar_gym.sweep.swimming import REFUSED, swim
@@ -30,25 +29,30 @@ from seastar_gym.sweep.swimming import REFUSED, swim
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def ray_tasks(tmp_path):
-    pytest.importorskip("ray")
-    from seastar_gym.executors.on_ray import RayTasks
+@contextlib.contextmanager
+def of_dask():
+    """Executor of a Dask cluster of this machine."""
+    pytest.importorskip("distributed")
+    with dask_client(workers=2) as client:
+        yield client.get_executor()
 
+
+def of_ray():
+    pytest.importorskip("ray")
     return RayTasks(workers=2)
 
 
-def jobs(tmp_path):
+def of_slurm(tmp_path):
     pytest.importorskip("submitit")
-    from seastar_gym.executors.slurm import SlurmArrays
-
-    return SlurmArrays(tmp_path / "jobs", "local", 2, tasks_per_job=2)
+    return SlurmJobs(tmp_path / "jobs", 2, "local")
 
 
 EXECUTORS = {
-    "one process": lambda tmp_path: Processes(1),
-    "two processes": lambda tmp_path: Processes(2),
-    "ray": ray_tasks,
-    "slurm": jobs,
+    "threads": lambda tmp_path: ThreadPoolExecutor(2),
+    "processes": lambda tmp_path: Processes(2),
+    "ray": lambda tmp_path: of_ray(),
+    "slurm": of_slurm,
+    "dask": lambda tmp_path: of_dask(),
 }
 
 
@@ -68,7 +72,7 @@ def test_only_cells_without_parts_are_run(tmp_path, sweep):
         run(sweep.batches(), tmp_path, Interrupted(2), work=works.named)
     assert len(list(ResultFiles(tmp_path).names())) == 2
     seen = []
-    run(sweep.batches(), tmp_path, Here(), lambda now: seen.append((now.done, now.kept, now.designs, now.intervals)),
+    run(sweep.batches(), tmp_path, None, lambda now: seen.append((now.done, now.kept, now.designs, now.intervals)),
         works.named)  # fmt: skip
     assert seen == [(1, 2, 4, 4), (2, 2, 8, 8)]
     assert set(ResultFiles(tmp_path).names()) == {batch.name for batch in sweep.batches()}
@@ -86,14 +90,14 @@ def test_a_part_that_the_disk_refuses_costs_its_cell_alone(tmp_path, sweep, larg
     batches = list(sweep.batches())
     monkeypatch.setenv("SWOLLEN", batches[1].name)
     largest_file(100_000)
-    tally = run(iter(batches), tmp_path, Here(), work=works.swollen)
+    tally = run(iter(batches), tmp_path, None, work=works.swollen)
     assert tally.done == 3 and tally.losses == ATTEMPTS
     (sentence,) = tally.problems.values()
     assert sentence.startswith("Cannot write or read ") and sentence.endswith(": file too large.")
     written = [file for file in ResultFiles(tmp_path).folder.rglob("*") if file.is_file()]
     assert all(file.suffix == ".parquet" for file in written)
     monkeypatch.setenv("SWOLLEN", "")
-    again = run(iter(batches), tmp_path, Here(), work=works.swollen)
+    again = run(iter(batches), tmp_path, None, work=works.swollen)
     assert (again.done, again.kept, again.problems) == (1, 3, {})
 
 
@@ -104,7 +108,7 @@ def test_parts_are_not_written_through_links(tmp_path, sweep):
     for place in (tmp_path / "parts", tmp_path / "parts" / batches[0].name[:2]):
         place.symlink_to(others)
         with assert_refused("is a link, and nothing is written through links"):
-            run(iter(batches), tmp_path, Here(), lambda _: pytest.fail("simulated"), works.swollen)
+            run(iter(batches), tmp_path, None, lambda _: pytest.fail("simulated"), works.swollen)
         place.unlink()
         (tmp_path / "parts").mkdir(exist_ok=True)
     assert not list(others.iterdir())
@@ -117,7 +121,7 @@ def test_a_full_disk_keeps_what_is_there_and_the_same_run_goes_on(sweep, small_d
     assert tally.done == 3 and tally.losses == ATTEMPTS
     assert "no space left on device" in next(iter(tally.problems.values()))
     grow()
-    again = run(sweep.batches(), place, Here(), work=works.sized)
+    again = run(sweep.batches(), place, None, work=works.sized)
     assert (again.done, again.kept, again.problems) == (1, 3, {})
 
 
@@ -134,42 +138,44 @@ def test_a_disk_that_is_full_for_good_ends_the_run(refused, tmp_path, sweep, mon
     monkeypatch.setattr(ResultFiles, "write", full)
     monkeypatch.setattr("seastar_gym.sweep.run.UNWRITTEN", 2)
     with pytest.raises(OSError, match="No space left") if len(refused) > 2 else contextlib.nullcontext():
-        tally = run(sweep.batches(), tmp_path, Here(), work=works.named)
+        tally = run(sweep.batches(), tmp_path, None, work=works.named)
         assert tally.done == 4 and tally.losses == 2 and not tally.problems
     assert len(list(ResultFiles(tmp_path).names())) == (1 if len(refused) > 2 else 4)
 
 
 def test_a_full_disk_of_a_worker_is_the_cell_s_problem(tmp_path, sweep):
-    tally = run(sweep.batches(), tmp_path, Here(), work=works.refusing)
+    tally = run(sweep.batches(), tmp_path, None, work=works.refusing)
     assert tally.done == 0 and tally.losses == 4 * ATTEMPTS
     assert set(tally.problems) == {batch.name for batch in sweep.batches()}
     assert set(tally.problems.values()) == {"Cannot write or read a file: no space left on device."}
 
 
-@pytest.mark.parametrize("name", EXECUTORS)
+@pytest.mark.parametrize("name", [name for name in EXECUTORS if name != "threads"])
 def test_a_lost_worker_costs_its_cell_alone(name, tmp_path, sweep, monkeypatch):
-    executor = EXECUTORS[name](tmp_path)
+    """Dask runs the cell again by itself."""
     monkeypatch.setenv("DEADLY", str(tmp_path))
     batches = list(sweep.batches())
     (tmp_path / batches[1].name).touch()
-    outcomes = list(executor.run(works.deadly_once, iter(batches)))
-    lost = {outcome.task.name for outcome in outcomes if outcome.part is None}
-    job = {batches[0].name, batches[1].name} if name == "slurm" else {batches[1].name}  # a job has two batches there
-    assert lost == job and len(outcomes) == len(batches), outcomes
-    tally = run(sweep.batches(), tmp_path / "out", executor, work=works.deadly_once)
+    with EXECUTORS[name](tmp_path) as executor:
+        found = list(outcomes(executor, works.deadly_once, iter(batches), 2))
+        assert len(found) == len(batches), found
+        assert {outcome.task.name for outcome in found if outcome.part is None} <= {batches[1].name}
+        (tmp_path / f"{batches[1].name}.died").unlink()
+        tally = run(sweep.batches(), tmp_path / "out", executor, work=works.deadly_once)
     assert tally.done == len(batches) and not tally.problems
+    assert tally.losses == (0 if name == "dask" else 1)
 
 
 def test_a_cell_that_kills_every_worker_is_given_up(tmp_path, sweep):
     tally = run(itertools.islice(sweep.batches(), 1), tmp_path, Processes(1), work=works.always_deadly)
     assert tally.losses == ATTEMPTS
-    assert "exit code -9" in next(iter(tally.problems.values()))
+    assert "Its worker was lost" in next(iter(tally.problems.values()))
 
 
 def test_a_sweep_whose_cells_all_fail_is_ended(tmp_path, sweep, monkeypatch):
     monkeypatch.setattr("seastar_gym.sweep.run.MOST_LOST", 2)
     with pytest.raises(ValueError, match="More than 2 batches failed"):
-        run(sweep.batches(), tmp_path, Here(), work=works.refusing)
+        run(sweep.batches(), tmp_path, None, work=works.refusing)
 
 
 def test_cells_are_taken_as_there_is_room_for_them(sweep):
@@ -181,24 +187,26 @@ def test_cells_are_taken_as_there_is_room_for_them(sweep):
             taken.append(batch)
             yield batch
 
-    outcomes = Processes(2).run(works.named, batches())
-    assert isinstance(next(outcomes), Outcome)
-    assert len(taken) <= 4
-    outcomes.close()
+    with Processes(2) as executor:
+        found = outcomes(executor, works.named, batches(), 3)
+        assert isinstance(next(found), Outcome)
+        assert len(taken) <= 4
+        found.close()
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_there_are_no_more_processes_than_workers(workers, sweep):
     batches = list(sweep.batches()) * 3
-    found = {outcome.part for outcome in Processes(workers).run(works.numbered, iter(batches))}
+    with Processes(workers) as executor:
+        found = {outcome.part for outcome in outcomes(executor, works.numbered, iter(batches), 12)}
     assert len(found) <= workers
 
 
 @pytest.mark.parametrize("name", EXECUTORS)
 def test_results_are_the_same_bits_on_every_executor(name, tmp_path, sweep):
-    executor = EXECUTORS[name](tmp_path)
-    for folder, each in (("here", Here()), (name, executor)):
-        run(sweep.batches(), tmp_path / folder, each)
+    run(sweep.batches(), tmp_path / "here")
+    with EXECUTORS[name](tmp_path) as executor:
+        run(sweep.batches(), tmp_path / name, executor)
     assert bits(tmp_path / name) == bits(tmp_path / "here") and len(bits(tmp_path / name)) == 4
 
 
@@ -279,7 +287,7 @@ DAMAGES = {
 def test_a_damaged_part_is_named_left_out_and_simulated_again(name, tmp_path, batches):
     with pytest.raises(ValueError, match="no results"):
         read_results(tmp_path)
-    assert run(iter(batches), tmp_path, Here()).done == 2
+    assert run(iter(batches), tmp_path).done == 2
     whole, (file, other) = read_results(tmp_path), (ResultFiles(tmp_path).file(batch.name) for batch in batches)
     sound = file.read_bytes()
     file.write_bytes(DAMAGES[name](sound, other.read_bytes()))
@@ -288,7 +296,7 @@ def test_a_damaged_part_is_named_left_out_and_simulated_again(name, tmp_path, ba
     with pytest.warns(UserWarning, match=words) as told:
         assert read_results(tmp_path).num_rows == batches[1].n_robots
     assert [warning.filename for warning in told] == [__file__]  # where the results are asked for
-    again = run(iter(batches), tmp_path, Here())
+    again = run(iter(batches), tmp_path)
     assert (again.done, again.kept, again.damaged) == (1, 1, [file])
     assert as_text(again, tmp_path).endswith(f"Damaged before, and simulated again: {file}.")
     assert file.read_bytes() == sound and read_results(tmp_path).equals(whole)

@@ -38,7 +38,7 @@ def test_the_best_of_many_designs_is_trained_and_filmed(story, n_limbs, options)
 
 
 def test_an_executor_of_ones_own_gives_the_same_designs(story):
-    story.runs(block("docs/cluster.md", "class Threads"))
+    story.runs(block("docs/cluster.md", "ThreadPoolExecutor", "Sweep"))
     speed = re.findall(r"the fastest swims ([\d.]+) mm/s", story.told)
     story.types("seastar sweep robot.limb_length=0.05:0.15 robot.n_limbs=3,5 --latin 2 --measured 1 --executor here")
     (again,) = re.findall(r"Best speed: ([\d.e-]+) m/s", story.told)

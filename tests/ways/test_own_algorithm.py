@@ -1,5 +1,6 @@
 """From an algorithm of one's own, in a file, a zip or a loop, to a row in a table beside those of the package."""
 
+import json
 import re
 
 import pytest
@@ -17,10 +18,12 @@ def test_a_class_with_predict_swims_beside_the_policy_and_the_script(story):
     story.has("nearest.py", block(page, "class Nearest") + block(page, "def make(env)"))
     story.types(command(page, "seastar evaluate --agents nearest:make") + " planner --fidelity fast")
     assert rows(story.told) == dict.fromkeys(["nearest:make", "learned", "pentagon", "planner"], "5")
-    benchmark = f"{command(page, 'seastar benchmark --agents nearest:make')} --fidelity fast --seeds 2 --executor here"
-    story.types(f"{benchmark} --tasks SeastarSwim-v0 --decisions 20 --out rows")
-    table = (story.folder / "rows/benchmark.md").read_text("utf-8")
-    assert "| nearest:make | learned | greedy |" in table, table
+    table = command(page, "seastar evaluate --task all --agents nearest:make").replace(
+        "--task all", "--task SeastarSwim-v0"
+    )
+    story.types(f"{table} pentagon planner --fidelity fast --seeds 2 --decisions 20")
+    assert re.findall(r"^(\S+) +SeastarSwim-v0 ", story.told, re.MULTILINE) == [
+        "nearest:make", "learned", "pentagon", "planner"]  # fmt: skip
 
 
 def test_it_swims_a_robot_of_three_limbs_too(story):
@@ -47,13 +50,11 @@ for seed in range(10):
 
 def test_ten_zips_are_one_row(story):
     story.runs(block("docs/training.md", "BatchVecEnv", "gym.make_vec").partition("model = ")[0] + LEARN)
-    label = "mine=" + ",".join(f"{seed}.zip" for seed in range(10)) + " learned"
-    benchmark = command("docs/controllers.md", "seastar benchmark --agents my_module:make").replace(
-        "my_module:make", label
-    )
-    story.types(f"{benchmark} --tasks SeastarSwim-v0 --seeds 10 --decisions 30 --executor here")
-    table = (story.folder / "runs/mine/benchmark.md").read_text("utf-8")
-    assert "| mine | learned |" in table, table
+    zips = ",".join(f"{seed}.zip" for seed in range(10))
+    table = command("docs/controllers.md", "mine=A.zip,B.zip,C.zip").replace("A.zip,B.zip,C.zip", zips)
+    story.types(f"{table.replace('SeastarPrey', 'SeastarSwim')} --seeds 10 --decisions 30")
+    mine, learned = json.loads((story.folder / "runs/prey.json").read_text("utf-8"))
+    assert (mine["agent"], learned["agent"], len(mine["returns"])) == ("mine", "learned", 10), story.told
 
 
 @pytest.mark.parametrize("seed", [0, 5])

@@ -47,15 +47,13 @@ def test_a_task_of_ones_own_is_an_id_that_is_promised_trained_on_and_compared(st
     # PPO learns it, and is compared with a gait and with chance.
     story.runs(TRAIN.format(seed, 65536 if changes else 16384))
     gait = "lagged" if changes else "straight"
-    line = command(PAGE, "seastar benchmark --tasks away:").replace(
-        "--agents straight", f"--agents {gait} mine=mine.zip"
-    )
-    story.types(f"{line.replace('--seeds 20', '--seeds 5')} --executor here")
-    entries = json.loads((story.folder / "runs/away/results.json").read_text("utf-8"))
-    far = {entry["agent"]: sum(entry["scores"]) / 5 for entry in entries["entries"]}
+    line = command(PAGE, "seastar evaluate --task away:").replace("--agents straight", f"--agents {gait} mine=mine.zip")
+    story.types(line.replace("--seeds 20", "--seeds 5"))
+    rows = json.loads((story.folder / "runs/away.json").read_text("utf-8"))
+    far = {row["agent"]: sum(row["scores"]) / 5 for row in rows}
     assert far["mine"] > 1.2 * far["random"] and set(far) == {gait, "mine", "random"}, far
 
 
 def test_a_task_that_is_not_there_is_told(story):
-    story.types("seastar benchmark --tasks nowhere:SeastarAway-v0 --agents rest", ends=2)
+    story.types("seastar evaluate --task nowhere:SeastarAway-v0 --agents rest", ends=2)
     assert story.told.strip().endswith("No module named 'nowhere'.")

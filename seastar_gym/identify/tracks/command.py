@@ -1,12 +1,13 @@
 """Makes a trajectory that `seastar identify` reads from the file of a tracker.
 
 Formats are table, any CSV file, whose columns are named, deeplabcut (CSV or HDF5), sleap (analysis CSV or HDF5) and
-motive (CSV of OptiTrack); pose is a table of AprilTags with the columns time,x,y and theta.
+motive (CSV of OptiTrack).
 
-A table has a line for every picture. A point has the name of its column of x. Units are those in names, such as
-"x (mm)", unless options say so. Files of Kinovea, for example, take --x Hub/X Tip/X --y Hub/Y Tip/Y --time "Time (ms)",
-those of Vicon --skip 2 --headers 3 --rate 100 --x Star:Hub.X.mm --y Star:Hub.Y.mm, and those of rostopic
---time %time --time-unit ns --begin first, and as --theta the four columns of a quaternion.
+A table has a line for every picture, with the columns time,x,y and theta unless options name others. A point has the
+name of its column of x. Units are those in names, such as "x (mm)", unless options say so. Files of Kinovea, for
+example, take --x Hub/X Tip/X --y Hub/Y Tip/Y --time "Time (ms)", those of Vicon --skip 2 --headers 3 --rate 100
+--x Star:Hub.X.mm --y Star:Hub.Y.mm, and those of rostopic --time %time --time-unit ns --begin first, and as --theta the
+four columns of a quaternion.
 
 Pixels become metres by --metres-per-pixel, for a camera that looks straight down, or --homography, a CSV file with the
 pixel and the place u,v,x,y of four points or more.
@@ -48,7 +49,6 @@ TABLE = Format(read_table, (
 ))  # fmt: skip
 FORMATS = {
     "table": TABLE,
-    "pose": TABLE,
     "deeplabcut": Format(read_deeplabcut, (*OF_VIDEOS, *OF_TEXT)),
     "sleap": Format(read_sleap, (*OF_VIDEOS, *OF_TEXT)),
     "motive": Format(read_motive, ("up",)),

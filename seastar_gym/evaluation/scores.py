@@ -1,0 +1,96 @@
+"""Agents on registered tasks: a score for every seed, and a table of their means with intervals."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from seastar_gym.controllers.registry import load_agent
+from seastar_gym.evaluation.many import HELD_OUT_SEED
+from seastar_gym.evaluation.measures import measure_of
+from seastar_gym.evaluation.results import number, text_table, write_csv
+from seastar_gym.evaluation.statistics import Estimate, mean_with_interval
+from seastar_gym.evaluation.tasks import env_of, held_out, swim_episodes
+from seastar_gym.files import write_json
+from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.version import __version__
+
+
+class Scores(NamedTuple):
+    """What an agent reached in a task, in the order of the seeds.
+
+    measure, unit, better: What scores are, and whether "less" or "more" is better. fidelity: None means the task's own.
+    """
+
+    task: str
+    agent: str
+    fidelity: Fidelity | None
+    measure: str
+    unit: str
+    better: str
+    seeds: list[int]
+    scores: list[float]
+    success: list[bool]
+    returns: list[float]
+    decisions: list[int]
+
+    @property
+    def mean(self) -> Estimate:
+        """Mean score, failures among them, with its interval over seeds; no interval for one seed."""
+        mean = mean_with_interval(self.scores)
+        return mean if len(self.seeds) > 1 else Estimate(mean.mean, float("nan"), float("nan"))
+
+    def row(self) -> dict[str, Any]:
+        """Row of the table, by the names of the CSV."""
+        named = {name: getattr(self, name) for name in self._fields[:6]}
+        score = dict(zip(("score", "score_low", "score_high"), self.mean, strict=True))
+        return named | score | {
+            "success_rate": sum(self.success) / len(self.seeds), "seeds": len(self.seeds), "version": __version__
+        }  # fmt: skip
+
+
+def policies_of(agent: str) -> tuple[str, list[str]]:
+    """Label of an agent, and the names of its policies: LABEL=A,B,C are several, such as trainings, in one row."""
+    label, several, names = agent.partition("=")
+    short = Path(agent).stem if len(Path(agent).parts) > 1 else agent
+    return (label, names.split(",")) if several else (short, [agent])
+
+
+def measured(
+    task: str, agent: str, seeds: int = 10, *, fidelity: Fidelity | None = None, max_decisions: int | None = None,
+    threads: int | None = None,
+) -> Scores:  # fmt: skip
+    """Scores of an agent on held-out episodes of a task, which no training draws.
+
+    task: Id, or module:id. agent: Name, see `policies_of`; its policies take turns over the seeds. seeds: Number of
+    them. fidelity, max_decisions: None means the task's own. threads: Of the simulator; None means one per processor.
+    ValueError, with one sentence, where the agent does not fit the task.
+    """
+    label, names = policies_of(agent)
+    env = env_of(task, **held_out(task, fidelity))
+    measure, found = measure_of(env), dict[int, tuple[Any, ...]]()
+    for turn, name in enumerate(names[:seeds]):
+        own = list(range(HELD_OUT_SEED, HELD_OUT_SEED + seeds))[turn :: len(names)]
+        policy = load_agent(name, env, own[0])
+        swum = swim_episodes(task, policy, own, fidelity=fidelity, max_decisions=max_decisions, threads=threads)
+        rows = (column.tolist() for column in (measure.of(swum), swum.success, swum.returns, swum.decisions))
+        found |= zip(own, zip(*rows, strict=True), strict=True)
+    columns: Any = map(list, zip(*(found[seed] for seed in sorted(found)), strict=True))
+    return Scores(task, label, fidelity, measure.name, measure.unit, measure.better, sorted(found), *columns)
+
+
+def as_text(found: Sequence[Scores]) -> str:
+    """Table for a terminal, a line for every agent on every task."""
+    titles = "agent", "task", "measure", "better", "mean [95 %]", "success [%]", "seeds"
+    return text_table(titles, [
+        [one.agent, one.task, f"{one.measure} [{one.unit}]", one.better, str(one.mean),
+         number(100.0 * one.row()["success_rate"]), str(len(one.seeds))]
+        for one in found
+    ])  # fmt: skip
+
+
+def write(found: Iterable[Scores], file: Path) -> None:
+    """Write the table as CSV, or as JSON with the score, success, return and decisions of every seed."""
+    if file.suffix == ".json":
+        write_json(file, [one._asdict() | {"version": __version__} for one in found])
+    else:
+        write_csv([one.row() for one in found], file)

@@ -1,0 +1,251 @@
+"""Where the batches of a sweep are run: any executor of `concurrent.futures`, and those that the command makes.
+
+Results are the same bits on each. A worker that is lost costs the batch that it was at.
+"""
+
+import argparse
+import os
+import signal
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from multiprocessing import get_context, parent_process
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any, NamedTuple
+
+from seastar_gym.command import DEFAULT, refused_by_disk
+from seastar_gym.extras import require_extra
+from seastar_gym.files import within
+from seastar_gym.processors import processors
+from seastar_gym.scene.checks import require_count, shown
+from seastar_gym.sweep.batches import Batch
+
+Work = Callable[[Batch], bytes]
+"""What is done with a batch: a function that can be sent to another process, and that returns a file."""
+KNOWN_FAILURES = (ValueError, OSError, MemoryError, ArithmeticError)
+"""Failures of a batch that leave its worker sound."""
+PATIENCE = 10.0
+"""Time that the head of a cluster has to answer [s]."""
+
+
+class Outcome(NamedTuple):
+    """What came of a batch. part: Its results, None if there are none. problem: Why, in a sentence."""
+
+    task: Batch
+    part: bytes | None
+    problem: str = ""
+
+
+def outcomes(executor: Executor | None, work: Work, tasks: Iterator[Batch], at_once: int) -> Iterator[Outcome]:
+    """Outcomes of all batches, as they are done. The next batch is taken when there is room for it.
+
+    executor: None runs them here, one after the other. at_once: Batches under way at most.
+    """
+    if executor is None:
+        yield from (attempt(work, task) for task in tasks)
+        return
+    done, pending = SimpleQueue[Future[Outcome]](), dict[Future[Outcome], Batch]()
+
+    def next_done() -> Outcome:
+        future = done.get()
+        task, lost = pending.pop(future), future.exception()
+        return Outcome(task, None, f"Its worker was lost: {sentence_of(lost)}") if lost else future.result()
+
+    try:
+        for task in tasks:
+            future = executor.submit(attempt, work, task)
+            pending[future] = task
+            future.add_done_callback(done.put)
+            while len(pending) >= at_once or not done.empty():
+                yield next_done()
+        while pending:
+            yield next_done()
+    finally:
+        for future in pending:
+            future.cancel()
+
+
+def attempt(work: Work, task: Batch) -> Outcome:
+    """Outcome of a batch that is run now, where it is."""
+    try:
+        return Outcome(task, work(task))
+    except KNOWN_FAILURES as failure:
+        return Outcome(task, None, sentence_of(failure))
+
+
+def sentence_of(failure: BaseException) -> str:
+    """A failure on one line."""
+    if isinstance(failure, OSError):
+        return refused_by_disk(failure)
+    return " ".join(str(failure).split())[:200] or type(failure).__name__
+
+
+class Processes(ThreadPoolExecutor):
+    """Processes of this machine. One that dies costs what it was at alone, and another takes its place.
+
+    workers: How many; one per processor if None.
+    """
+
+    def __init__(self, workers: int | None = None):
+        if workers is not None:
+            require_count("workers", workers, 1, 4096)
+        super().__init__(workers or processors())
+        self._own, self._running = threading.local(), set[int]()
+
+    def submit(self, work: Any, /, *arguments: Any, **named: Any) -> Future[Any]:
+        """Run a function in one of the processes."""
+        return super().submit(self._in_process, work, *arguments, **named)
+
+    def _in_process(self, work: Any, *arguments: Any, **named: Any) -> Any:
+        """What a thread does: its process, a pool of one, works for it."""
+        own = self._own
+        try:
+            if not hasattr(own, "pool"):
+                own.pool = ProcessPoolExecutor(1, get_context("spawn"), end_with_parent)
+                own.process = own.pool.submit(os.getpid).result()
+                self._running.add(own.process)
+            return own.pool.submit(work, *arguments, **named).result()
+        except BrokenExecutor:
+            self._running.discard(vars(own).pop("process", 0))
+            del own.pool
+            raise
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes, and what they are at if futures are to be cancelled."""
+        super().shutdown(False, cancel_futures=cancel_futures)
+        for process in [*self._running] if cancel_futures else ():
+            with suppress(ProcessLookupError):
+                os.kill(process, signal.SIGTERM)
+        super().shutdown(wait)
+
+
+def end_with_parent() -> None:
+    """Have this process leave Ctrl-C to its parent, and end when that does, however it ends."""
+    parent = parent_process()
+
+    def follow() -> None:
+        assert parent is not None
+        parent.join()
+        os._exit(1)
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=follow, daemon=True).start()
+
+
+class RayTasks(Executor):
+    """Tasks of a Ray cluster, one processor each. Nodes need this package and its extras.
+
+    address: Of its head, "HOST:6379". None starts a cluster of this machine. workers: Its processors then.
+    """
+
+    def __init__(self, address: str | None = None, workers: int | None = None):
+        import ray
+
+        own: dict[str, Any] = {} if address else {"num_cpus": workers, "include_dashboard": False}
+        if address:
+            require_reachable(address)
+        try:
+            ray.init(address or "local", log_to_driver=False, logging_level="error", **own)
+        except (ConnectionError, RuntimeError) as refused:
+            raise ValueError(f"Ray does not start, or is not at {address}: {sentence_of(refused)}") from None
+        self._ray = ray
+        self._call = ray.remote(num_cpus=1, max_retries=0)(lambda work, *arguments: work(*arguments))
+
+    def submit(self, work: Any, /, *arguments: Any, **named: Any) -> Future[Any]:
+        """Run a function on the cluster. Ray does not repeat what is lost with its worker or node."""
+        future: Future[Any] = self._call.remote(work, *arguments, **named).future()
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Leave the cluster, which ends what is under way."""
+        self._ray.shutdown()
+
+
+class SlurmJobs(ThreadPoolExecutor):
+    """Jobs of SLURM, through submitit. Nodes and this process share the folder of their files.
+
+    jobs: At a time at most. cluster: "slurm", or "local" for processes of this machine, as submitit starts them.
+    parameters: Of submitit's executor, such as timeout_min and slurm_partition.
+    """
+
+    def __init__(self, folder: str | Path, jobs: int = 64, cluster: str = "slurm", **parameters: Any):
+        import submitit
+
+        try:
+            self._jobs = submitit.AutoExecutor(folder, cluster=cluster)
+        except RuntimeError as refused:
+            raise ValueError(f"There is no SLURM here: {sentence_of(refused)}") from None
+        self._jobs.update_parameters(**parameters)
+        super().__init__(jobs)
+
+    def submit(self, work: Any, /, *arguments: Any, **named: Any) -> Future[Any]:
+        """Run a function as a job, for which a thread waits."""
+        return super().submit(lambda: self._jobs.submit(work, *arguments, **named).result())
+
+
+def dask_client(address: str | None = None, workers: int | None = None) -> Any:
+    """Client of a Dask cluster, whose `get_executor()` is an executor; a context that closes it.
+
+    address: Of the scheduler, "HOST:8786". None starts a cluster of this machine, with so many workers.
+    """
+    from distributed import Client
+
+    if address:
+        require_reachable(address.removeprefix("tcp://"))
+    own: dict[str, Any] = {} if address else {"n_workers": workers or processors(), "threads_per_worker": 1}
+    return Client(address, **own)
+
+
+def require_reachable(address: str) -> None:
+    """ValueError unless something listens at "HOST:PORT": clusters themselves would try for minutes."""
+    host, _, port = address.rpartition(":")
+    if not host or not port.isdecimal():
+        raise ValueError(f"The address of a cluster is HOST:PORT, such as head:6379, not {shown(address)}.")
+    try:
+        socket.create_connection((host, int(port)), timeout=PATIENCE).close()
+    except (OSError, OverflowError) as refused:
+        raise ValueError(f"There is no cluster at {address}: {sentence_of(refused)}") from None
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add --executor, --workers, --address and --partition to a parser."""
+    parser.add_argument(
+        "--executor", choices=("processes", "here", "ray", "slurm", "dask"), default="processes",
+        help=f"where batches run: processes of this machine, this process, or a cluster {DEFAULT}",
+    )  # fmt: skip
+    parser.add_argument("--workers", type=int, help="batches at a time (default: one per processor; of SLURM, 64)")
+    parser.add_argument("--address", help="Ray, Dask: HOST:PORT of the head (default: a cluster of this machine)")
+    parser.add_argument("--partition", help="SLURM: partition")
+
+
+@contextmanager
+def executor_of(options: argparse.Namespace) -> Iterator[Executor | None]:
+    """Context with the executor that the options name. It says at once what is missing, and ends with the context."""
+    if options.workers is not None:
+        require_count("--workers", options.workers, 1, 1_000_000)
+    executor: Executor
+    match options.executor:
+        case "here":
+            yield None
+            return
+        case "dask":
+            require_extra("Runs on Dask", "dask", "distributed")
+            with dask_client(options.address, options.workers) as client:
+                yield client.get_executor()
+            return
+        case "ray":
+            require_extra("Runs on Ray", "ray", "ray")
+            executor = RayTasks(options.address, options.workers)
+        case "slurm":
+            require_extra("Runs on SLURM", "slurm", "submitit")
+            partition = {} if options.partition is None else {"slurm_partition": options.partition}
+            executor = SlurmJobs(within(options.out, "slurm"), options.workers or 64, cpus_per_task=1, **partition)
+        case _:
+            executor = Processes(options.workers)
+    try:
+        yield executor
+    finally:
+        executor.shutdown(cancel_futures=True)

@@ -1,0 +1,134 @@
+"""Agents are measured on registered tasks, and a table tells how sure their means are."""
+
+import csv
+import json
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from refusals import assert_refused
+from seastar_gym.cli.main import main
+from seastar_gym.controllers import GreedyPolicy, load_agent, scripted
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.tasks.station import Station
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.evaluation.measures import MEASURES, SECONDS, measure_of
+from seastar_gym.evaluation.scores import Scores
+from seastar_gym.evaluation.tasks import make_batch, require_seen, swim_episodes, task_ids
+
+SWIM, SHORT, OTHER = "SeastarSwim-v0", "SeastarShort-v0", "SeastarDrift-v0"
+
+
+class DriftEnv(SeastarSwimEnv):
+    """A task of another measure, with a split."""
+
+    challenge = Station()
+
+    def __init__(self, split="train", **arguments):
+        assert split == "test"
+        super().__init__(**arguments)
+
+
+@pytest.fixture
+def tasks():
+    """Two tasks that a user's package might register in this one's name: a short path, and one without a batch."""
+    entry = {"entry_point": "seastar_gym.envs.seastar_swim:SeastarSwimEnv"}
+    batch = {"vector_entry_point": "seastar_gym.envs.vector:SeastarSwimVectorEnv"}
+    short = {"path": [[0.03, 0.0]], "random_heading": True, "fidelity": "fast"}
+    gym.register(SHORT, **entry, **batch, max_episode_steps=30, kwargs=short)
+    gym.register(OTHER, DriftEnv, max_episode_steps=33, kwargs={"fidelity": "fast"})
+    yield
+    for task in (SHORT, OTHER):
+        del gym.registry[task]
+
+
+# Episodes
+
+
+def test_tasks_are_the_registered_ids_of_this_package(tasks):
+    assert {SWIM, "SeastarSwimTimed-v0", SHORT} <= set(task_ids())
+    assert not any(id.startswith("CartPole") for id in task_ids())
+    assert isinstance(make_batch(SHORT, 2), SeastarSwimVectorEnv)
+    assert isinstance(make_batch(OTHER, 2, split="test"), gym.vector.SyncVectorEnv)
+
+
+def test_returns_are_sums_of_rewards_and_who_does_not_arrive_has_the_time_limit(tasks):
+    swum = swim_episodes(SHORT, scripted("4+,1-"), [7])
+    env, total = gym.make(SHORT), 0.0
+    env.reset(seed=7)
+    for _ in range(swum.decisions[0]):
+        total += env.step(np.array([2, 0, 0, 1, 0]))[1]
+    assert swum.returns[0] == pytest.approx(total)
+    swum = swim_episodes(SHORT, scripted("rest"), [0, 1], max_decisions=4)
+    assert SECONDS.of(swum).tolist() == [4.0, 4.0] and not swum.success.any()
+
+
+def test_a_task_of_another_measure_without_a_batch_is_swum_on_its_held_out_split(tasks, monkeypatch):
+    monkeypatch.setattr("seastar_gym.evaluation.tasks.task_ids", lambda: [OTHER])
+    env = DriftEnv("test", fidelity="fast")
+    assert measure_of(env) is MEASURES[Station] and measure_of(SeastarSwimEnv()) is SECONDS
+    swum = swim_episodes(OTHER, scripted("rest"), [0, 1])
+    side = np.hypot(*env.reset(seed=0)[0][182:184]) * 100.0
+    np.testing.assert_allclose(MEASURES[Station].of(swum), side, rtol=1e-3)
+
+
+def test_agents_are_made_for_the_environment_they_swim_in_and_refused_where_they_cannot_see():
+    env = SeastarSwimEnv(decision_period=0.5, fidelity="fast")
+    assert load_agent("learned", env).decision_period == 0.5
+    assert load_agent("learned", SeastarSwimEnv()).decision_period == 1.0
+    assert load_agent("greedy", env).scene == env.scene
+    greedy = GreedyPolicy.__new__(GreedyPolicy)
+    greedy.actions, greedy.decision_period = "joint", 0.5
+    with assert_refused("It reads observations of 196 numbers, the task shows 186."):
+        require_seen(greedy, SeastarSwimEnv(decision_period=0.5, observe_actuators=False))
+
+
+# The table
+
+
+def of(*scores, seeds=4):
+    return Scores(SWIM, "a", None, "time", "s", "less", list(range(seeds)), list(scores), [True] * seeds, [], [])
+
+
+def test_a_failure_counts_in_the_mean_and_one_seed_has_no_interval():
+    """An interquartile mean would hide the quarter that does not arrive."""
+    mean = of(100.0, 100.0, 100.0, 300.0).mean
+    assert mean.mean == 150.0 and mean.low == 100.0 and mean.high > 150.0
+    assert np.isnan(of(100.0, seeds=1).mean.low)
+
+
+def test_the_command_writes_a_row_for_every_agent_and_the_episodes_of_policies_that_take_turns(tasks, tmp_path, capsys):
+    words = ["--task", SHORT, "--agents", "straight", "two=straight,rest", "--seeds", "4", "--decisions", "12"]
+    for file in ("table.csv", "table.json"):
+        assert main(["evaluate", *words, "--out", str(tmp_path / file)]) == 0
+    printed = capsys.readouterr().out
+    straight, two = json.loads((tmp_path / "table.json").read_text())
+    assert (straight["agent"], two["agent"]) == ("straight", "two") and straight["seeds"] == [1000, 1001, 1002, 1003]
+    assert two["returns"][::2] == straight["returns"][::2] and two["decisions"][1::2] == [12, 12]
+    assert two["scores"][1::2] == [12.0, 12.0]  # who rests has the time limit
+    rows = list(csv.DictReader((tmp_path / "table.csv").read_text().splitlines()))
+    assert [float(row["score"]) for row in rows] == [np.mean(one["scores"]) for one in (straight, two)]
+    assert all(row["task"] == SHORT and row["task"] in printed for row in rows)
+
+
+def test_an_agent_that_does_not_fit_costs_the_others_nothing(tasks, tmp_path, capsys):
+    file = tmp_path / "table.json"
+    words = ["--task", SHORT, "--agents", "lagged", "rest", "--seeds", "2", "--decisions", "2", "--out", str(file)]
+    assert main(["evaluate", *words]) == 2
+    assert "lagged does not swim SeastarShort-v0: A lagged gait needs two decisions" in capsys.readouterr().err
+    assert [one["agent"] for one in json.loads(file.read_text())] == ["rest"]
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["--task", "CartPole-v1"], "There is no task 'CartPole-v1': choose of SeastarSwim-v0, "),
+        (["--task", SWIM, "--agents", "rest", "rest"], "Two agents are called rest: name them with LABEL=AGENT."),
+        (["--task", SWIM, "--seeds", "0"], "--seeds must be"),
+        (["--task", SWIM, "--sets", "nominal"], "leave out --sets"),
+    ],
+)
+def test_what_cannot_be_measured_is_said_in_a_sentence(arguments, words, capsys):
+    assert main(["evaluate", *arguments]) == 2
+    assert words in capsys.readouterr().err
