@@ -20,8 +20,8 @@ from seastar_gym.controllers.planner import Planner, gait_planner
 from seastar_gym.controllers.scripted import GAITS, scripted
 from seastar_gym.envs.commands import unless_strokes
 from seastar_gym.envs.options import make_scene
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.tasks.envs import name_of
+from seastar_gym.envs.seastar_swim import OneRobotEnv, SeastarSwimEnv
+from seastar_gym.envs.tasks import name_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import (
     require_choice,
@@ -137,7 +137,7 @@ def _labels(names: Sequence[str]) -> dict[str, str]:
     return labels
 
 
-def load_agent(name: str, env: SeastarSwimEnv, seed: int = 0) -> Policy:
+def load_agent(name: str, env: OneRobotEnv, seed: int = 0) -> Policy:
     """Policy by a name as in `HELP`, for the robot and the decisions of an environment."""
     require_kind("name", name, str, "the name of an agent")
     require_seed(seed)
@@ -148,8 +148,8 @@ def load_agent(name: str, env: SeastarSwimEnv, seed: int = 0) -> Policy:
 
 
 def task_of(env: Any) -> str | None:
-    """Name of the challenge of an environment or a batch; None for waypoints, or where a challenge has no name."""
-    return name_of(getattr(env, "challenge", None))
+    """Name of the task of an environment or a batch; None for waypoints, or where a task has no name."""
+    return name_of(getattr(env, "task", None))
 
 
 def files_of(name: str, decision_period: float | None = None) -> list[Path]:
@@ -196,7 +196,7 @@ def _load_agent(
     scene: Scene,
     decision_period: float | None,
     task: str | None,
-    make_env: Callable[[], SeastarSwimEnv],
+    make_env: Callable[[], OneRobotEnv],
 ) -> Policy:
     if name in AGENTS:
         return AGENTS[name](scene, decision_period, task)

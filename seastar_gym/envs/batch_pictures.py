@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from seastar_gym.envs.camera import Camera
 from seastar_gym.envs.frame import Frame, frames_of
 from seastar_gym.envs.rendering import LARGEST, SMALLEST, Renderer
-from seastar_gym.envs.swimming import Swimming
+from seastar_gym.envs.robots import Robots
 
 Picture = NDArray[np.uint8]
 
@@ -26,51 +26,69 @@ def picture_size(n_pictures: int) -> tuple[int, int]:
 
 
 class BatchPictures:
-    """Trails and views of all robots of a task, drawn one after the other by one renderer when they are asked for."""
+    """Trails and views of all robots, drawn one after the other by one renderer when they are asked for."""
 
-    def __init__(self, task: Swimming):
-        self._task = task
-        self._trails: list[list[NDArray[np.float64]]] = [[] for _ in range(task.n_robots)]
+    def __init__(self, robots: Robots):
+        self._robots = robots
+        self._trails: list[list[NDArray[np.float64]]] = [[] for _ in range(robots.n_robots)]
         self._cameras: dict[int, Camera] = {}
         self._renderer: Renderer | None = None
+        self._shown: int | None = None
+        """Robot whose path and view the renderer has."""
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_renderer": None}
+        return {**self.__dict__, "_renderer": None, "_shown": None}
 
-    def begin(self, robots: NDArray[np.bool_]) -> None:
+    def begin(self, begun: NDArray[np.bool_]) -> None:
         """Forget the trails and views of the robots in a mask, shape (n_robots,): they begin an episode."""
-        hub = self._task.simulator.hub_position()
-        for robot in np.flatnonzero(robots).tolist():
+        hub = self._robots.simulator.hub_position()
+        for robot in np.flatnonzero(begun).tolist():
             self._trails[robot] = [hub[robot]]
             self._cameras.pop(robot, None)
+        self._shown = None
 
     def follow(self) -> None:
         """Extend all trails to the present positions of the hubs."""
-        for trail, hub in zip(self._trails, self._task.simulator.hub_position(), strict=True):
+        for trail, hub in zip(self._trails, self._robots.simulator.hub_position(), strict=True):
             trail.append(hub)
 
-    def draw(self, robots: Iterable[int], commands: NDArray[np.float64]) -> tuple[Picture, ...]:
-        """Pictures of the robots of these numbers, shape (height, width, 3) each.
-
-        commands: Commands of all robots in the last stroke, shape (n_robots, n_limbs).
-        """
-        wanted = list(robots)
+    def frames(self, wanted: Iterable[int]) -> list[Frame]:
+        """What pictures of the robots of these numbers show now."""
         trails = {robot: np.array(self._trails[robot]).reshape(-1, 2) for robot in wanted}
-        frames = dict(zip(trails, frames_of(self._task, commands, trails), strict=True))
-        return tuple(self._draw(robot, frames[robot]) for robot in wanted)
+        return list(frames_of(self._robots, trails))
+
+    def draw(self, wanted: Iterable[int]) -> tuple[Picture, ...]:
+        """Pictures of the robots of these numbers, shape (height, width, 3) each."""
+        numbers = list(wanted)
+        frames = dict(zip(dict.fromkeys(numbers), self.frames(numbers), strict=True))
+        return tuple(self._draw(robot, frames[robot]) for robot in numbers)
 
     def _draw(self, robot: int, frame: Frame) -> Picture:
-        renderer, body = self._get_renderer(), self._task.simulator.scene.of_robot(robot).robot
-        radius = self._task.radius_of(robot)
-        renderer.reset(self._task.waypoints_of(robot), body, self._task.headings_of(robot), radius)
-        renderer.camera = self._cameras.get(robot, renderer.camera)
-        picture = renderer.draw(frame)
-        self._cameras[robot] = renderer.camera
+        picture = self.renderer_of(robot).draw(frame)
+        self._cameras[robot] = self.renderer_of(robot).camera
         return picture
 
-    def _get_renderer(self) -> Renderer:
+    def show(self, fps: float) -> None:
+        """Show the picture of robot 0 in a window, no faster than `fps` pictures per second."""
+        self.renderer_of(0).show(self.frames([0])[0], fps=fps)
+        self._cameras[0] = self.renderer_of(0).camera
+
+    def renderer_of(self, robot: int) -> Renderer:
+        """The renderer, with the path and the view of a robot."""
+        if self._renderer is not None and self._shown == robot:
+            return self._renderer
+        robots, task = self._robots, self._robots.task
+        body, waypoints = robots.simulator.scene.of_robot(robot).robot, task.waypoints_of(robots, robot)
+        headings, radius = task.headings_of(robots, robot), task.radius_of(robots, robot)
         if self._renderer is None:
-            body = self._task.simulator.scene.of_robot(0).robot
-            size = picture_size(self._task.n_robots)
-            self._renderer = Renderer(body, self._task.waypoints_of(0), self._task.radius_of(0), size)
+            self._renderer = Renderer(body, waypoints, radius, picture_size(robots.n_robots))
+        self._renderer.reset(waypoints, body, headings, radius)
+        self._renderer.camera = self._cameras.get(robot, self._renderer.camera)
+        self._shown = robot
         return self._renderer
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = self._shown = None

@@ -15,9 +15,9 @@ from seastar_gym.controllers.learned import load
 from seastar_gym.controllers.registry import AGENTS, files_of, learned_file, load_agent
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.commands import checked_decision_period, decisions_in, unless_strokes
-from seastar_gym.envs.options import Path as SwimPath
 from seastar_gym.envs.paths import make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.waypoints import Path as SwimPath
 from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.scene import Scene

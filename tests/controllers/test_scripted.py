@@ -172,4 +172,4 @@ def test_a_robot_turns_to_the_side_that_is_asked_for_and_then_swims(asked):
     heated = done.limbs_heated > 0
     last = int(np.flatnonzero(heated)[-1])
     assert heated[:last].all() and 10 < last < 30 and not heated[last + 1 :].any()
-    assert env._task.facts()["heading"][0] == pytest.approx(asked, abs=headings.tolerance)
+    assert env._robots.facts()["heading"][0] == pytest.approx(asked, abs=headings.tolerance)

@@ -188,4 +188,4 @@ def test_a_second_has_ten_pictures_of_commands_and_warm_wires():
     for env in (warm, cold):
         env.reset(seed=0)
         env.step(7)
-    assert warm._frame().wire_state.max() == pytest.approx(5 / 9) and cold._frame().wire_state is None
+    assert warm.frame().wire_state.max() == pytest.approx(5 / 9) and cold.frame().wire_state is None
