@@ -19,7 +19,6 @@ from seastar_gym.controllers import checkpoint
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, Weights
 from seastar_gym.controllers.registry import task_of
-from seastar_gym.envs.commands import unless_strokes
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction, observed_mirror
 from seastar_gym.envs.waypoints import AlongPath
@@ -116,8 +115,7 @@ def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
     batch: Any = env.env.unwrapped
     memory = next((layer for layer in env.layers() if isinstance(layer, VectorFrameStack)), None)
     symmetry = memory is not None or env.env_is_wrapped(VectorSymmetryReduction)[0]
-    period = unless_strokes(batch.decision_period, batch.scene)
-    about = Description(batch.actions, symmetry, batch.scene, hidden, period)
+    about = Description(batch.actions, symmetry, batch.scene, hidden, batch.decision_period)
     past = 0 if memory is None else memory.frame_stack.past
     at = batch.layout
     about = about._replace(

@@ -23,7 +23,6 @@ from seastar_gym.controllers.scripted import scripted
 from seastar_gym.data.command import name_of, write_to
 from seastar_gym.data.dataset import summary, write
 from seastar_gym.data.recorder import Episode, Recorder
-from seastar_gym.envs.commands import unless_strokes
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.tasks.discs import rims
@@ -64,9 +63,8 @@ class OnRoute(Searcher):
 
     def __init__(self, inner: Any):
         self.scene, self.layout, self.task = inner.scene, inner.layout, inner.task
-        self.in_strokes = unless_strokes(inner.decision_period, inner.scene) is None
-        period = None if self.in_strokes else inner.decision_period
-        self.hub = displacement_map(inner.scene, inner.actions, period).hub[None]
+        self.in_strokes = inner.timed is None
+        self.hub = displacement_map(inner.scene, inner.actions, inner.timed).hub[None]
 
     def choose(self, observations: Floats32) -> NDArray[np.int64]:
         """Actions, shape (n,), for observations of shape (n, size)."""

@@ -34,8 +34,8 @@ class Description(NamedTuple):
     """Environment that a learned policy expects, and the shape of its network.
 
     actions: Action mode. symmetry: Whether the policy sees reduced observations, see `seastar_gym.envs.symmetry`.
-    scene: Scene of the training. hidden: Widths of the hidden layers. decision_period: Time between decisions [s].
-    None means strokes.
+    scene: Scene of the training. hidden: Widths of the hidden layers. decision_period: Time between decisions [s];
+    None means the period of the actuator, and is that in a policy.
     task: Name of the task that the policy was trained for, such as "miswired". None means waypoints.
     limb_mirror: What a mirror does to the numbers that are observed of every limb. None means those of the actuators.
     entries, shows_limbs, stations: Of the observations, see `Layout`. past: Number of past observations that the

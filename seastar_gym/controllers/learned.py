@@ -81,13 +81,14 @@ class LearnedPolicy:
             raise ValueError(f"Its weights have the shapes {shapes}, not {description.shapes()}.")
         if not all(array.dtype == np.float32 and np.isfinite(array).all() for array in weights.values()):
             raise ValueError("Its weights are not all finite numbers of single precision.")
-        self.description = description
+        stroke = float(description.scene.actuator.period)
+        self.decision_period = stroke if description.decision_period is None else description.decision_period
+        self.description = description._replace(decision_period=self.decision_period)
         self.weights = weights
         self.actions = description.actions
         self.scene = description.scene
         self.reduction, self.frame_stack = description.reduction, description.frame_stack
         self._n_seen, self._outputs = description.observation_size, description.distributions  # asked every decision
-        self.decision_period = description.decision_period or description.scene.actuator.period
         self.training = training or {}
         self.rng = np.random.default_rng(0) if rng is None else rng
 

@@ -18,7 +18,6 @@ from seastar_gym.controllers.contract import Policy, actions_of, require_fit
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.planner import Planner, gait_planner
 from seastar_gym.controllers.scripted import GAITS, scripted
-from seastar_gym.envs.commands import unless_strokes
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import OneRobotEnv, SeastarSwimEnv
 from seastar_gym.envs.tasks import name_of
@@ -141,10 +140,9 @@ def load_agent(name: str, env: OneRobotEnv, seed: int = 0) -> Policy:
     """Policy by a name as in `HELP`, for the robot and the decisions of an environment."""
     require_kind("name", name, str, "the name of an agent")
     require_seed(seed)
-    if not all(hasattr(env, known) for known in ("decision_period", "scene", "step")):
+    if not all(hasattr(env, known) for known in ("timed", "scene", "step")):
         raise ValueError(f"env must be an environment of this package, not {shown(env)}.")
-    period = unless_strokes(env.decision_period, env.scene)
-    return _load_agent(name, seed, env.scene, period, task_of(env), lambda: env)
+    return _load_agent(name, seed, env.scene, env.timed, task_of(env), lambda: env)
 
 
 def task_of(env: Any) -> str | None:

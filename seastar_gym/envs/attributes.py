@@ -99,6 +99,11 @@ class RobotsEnv:
         return self._robots.decision_period
 
     @property
+    def timed(self) -> float | None:
+        """Time between decisions [s], None where they are strokes of the actuator."""
+        return self._robots.timed
+
+    @property
     def observe_actuators(self) -> bool:
         """Whether observations have the memory of the actuators."""
         return self._robots.options.observe_actuators

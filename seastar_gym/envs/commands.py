@@ -141,11 +141,6 @@ def checked_decision_period(seconds: float | None, scene: Scene) -> float:
     return float(seconds)
 
 
-def unless_strokes(seconds: float | None, scene: Scene) -> float | None:
-    """Time between decisions [s], None where they are strokes of the scene's actuator."""
-    return None if seconds == scene.actuator.period else seconds
-
-
 def _can_begin_anew(actuator: ActuatorBase, seconds: float) -> bool:
     """Whether new commands that come after a time [s] find limbs at rest, or turn them on from where they are."""
     if not actuator.has_memory:

@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from seastar_gym.accuracy.certificate import Certificate
-from seastar_gym.envs.commands import Actions, unless_strokes
+from seastar_gym.envs.commands import Actions, checked_decision_period
 from seastar_gym.envs.randomization import ACTION_DELAY, DomainRandomization
 from seastar_gym.envs.sight import Drawn, Sight, require_action_delay
 from seastar_gym.scene import Scene, SmaWires
@@ -78,6 +78,11 @@ class SwimOptions:
         return make_scene(self.scene, self.fidelity, self.decision_period)
 
     @property
+    def period(self) -> float:
+        """Time between decisions [s]: that of the actuator if none is given. ValueError for one that it cannot take."""
+        return checked_decision_period(self.decision_period, self.modelled)
+
+    @property
     def fidelity_of_scene(self) -> Fidelity | None:
         """Fidelity that is asked for of a scene; None without a scene."""
         return None if self.scene is None else self.fidelity
@@ -92,7 +97,7 @@ def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None, decision_
     """
     if scene is None:
         chapters = Scene().at(fidelity)
-        in_strokes = unless_strokes(decision_period, chapters) is None
+        in_strokes = decision_period in (None, chapters.actuator.period)
         return chapters if in_strokes else replace(chapters, actuator=SmaWires())
     scene = read(scene, Scene)
     require_kind("scene", scene, Scene, "a Scene")

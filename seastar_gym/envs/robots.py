@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.accuracy.info import errors_in_info, read_certificate
-from seastar_gym.envs.commands import checked_decision_period, unless_strokes
 from seastar_gym.envs.lag import Lag, Piece
 from seastar_gym.envs.layout import N_STATIONS, Entry, Layout
 from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
@@ -63,8 +62,8 @@ class Score(NamedTuple):
 
     terms: dict[str, Floats]
     """Terms of the reward by their names in `info`."""
-    success: Flags | bool = False
-    over: Flags | bool = False
+    success: Flags | Literal[False] = False
+    over: Flags | Literal[False] = False
     """Whether the episode ends, by success or failure."""
 
 
@@ -205,7 +204,9 @@ class Robots:
         self.wiring: Floats | None = None
         """1 for limbs with wires as they should be, -1 for those whose wires are swapped, shape (n_robots, n_limbs)."""
         scene = options.modelled
-        self.decision_period = checked_decision_period(options.decision_period, scene)
+        self.decision_period = options.period
+        self.timed = None if self.decision_period == scene.actuator.period else self.decision_period
+        """Time between decisions [s], None where they are strokes of the actuator."""
         self._can_be_masked = can_be_masked(scene.actuator)
         self.scene, self._drawn_from = scene, task.simulated(scene)
         self._draws = draws
@@ -214,7 +215,7 @@ class Robots:
             drawn_scene(self._drawn_from, self.drawn), n_robots, threads, options.error_bars, effort, options.device
         )
         self._effort = effort
-        self.certificate = read_certificate(options.certificate, scene, unless_strokes(self.decision_period, scene))
+        self.certificate = read_certificate(options.certificate, scene, self.timed)
         self._names_of_errors = tuple(self._errors_of(self.simulator.scene))
         # Scene and strengths of limbs, and the errors of both.
         self._known: tuple[Scene | None, bytes, dict[str, Floats]] = None, b"", {}
@@ -527,8 +528,9 @@ class Robots:
         if self._tracker is not None:
             self._tracker.look(self.simulator.time)
         score = self.task.score(self, hub, pulses_of(report.heating_time, followed))
-        none = np.zeros(self.n_robots, bool)
-        score = Score(score.terms, none | score.success, none | score.over)
+        if score.success is False or score.over is False:
+            success, over = (np.zeros(self.n_robots, bool) if flags is False else flags for flags in score[1:])
+            score = Score(score.terms, success, over)
         info = self._info(hub, score, commands, followed, report)
         reward = functools.reduce(operator.add, score.terms.values())
         return Outcome(reward, score.over | (report.status != 0), info)
@@ -586,7 +588,7 @@ class Robots:
         return {**{name: values.copy() for name, values in self.drawn.items()}, **self._lateness.drawn}
 
     def _errors_of(self, scene: Scene) -> dict[str, float]:
-        return errors_in_info(scene, self.certificate, unless_strokes(self.decision_period, self.scene))
+        return errors_in_info(scene, self.certificate, self.timed)
 
     def _errors(self) -> dict[str, Floats]:
         """Measured errors and speed, shape (n_robots,) each, not copies; NaN for robots with weak limbs."""

@@ -16,7 +16,7 @@ from seastar_gym.accuracy.info import warn_uncertified
 from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
 from seastar_gym.envs.batch_pictures import BatchPictures, Picture
 from seastar_gym.envs.buffers import Buffers, require_buffers
-from seastar_gym.envs.commands import Actions, as_array, to_commands, unless_strokes
+from seastar_gym.envs.commands import Actions, as_array, to_commands
 from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.masks import sampling_mask
 from seastar_gym.envs.options import Plain, SwimOptions
@@ -233,10 +233,10 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
 
             outcome = completed(self._robots.step_in_parts(commands, parts), follow)
         self._elapsed += 1
-        terminated = outcome.terminated & ~begun
-        truncated = (self._elapsed >= self._limits) & ~begun
-        reward = np.where(begun, 0.0, outcome.reward)
+        reward, terminated, truncated = outcome.reward, outcome.terminated, self._elapsed >= self._limits
         if begun.any():
+            terminated, truncated = terminated & ~begun, truncated & ~begun
+            reward = np.where(begun, 0.0, reward)
             self._begin_episodes(begun)
         self.needs_reset, final = terminated | truncated, Info()
         observations = self._observe()
@@ -433,8 +433,7 @@ class SeastarSwimVectorEnv(ManyRobotsEnv):
 def warn_of_errors(robots: Robots) -> None:
     """Warn of scenes whose errors nobody has measured, if the task tells errors."""
     if robots.task.tells_errors:
-        timed = unless_strokes(robots.decision_period, robots.scene)
-        warn_uncertified(robots.scene, robots.options.fidelity_of_scene, robots.certificate, timed)
+        warn_uncertified(robots.scene, robots.options.fidelity_of_scene, robots.certificate, robots.timed)
 
 
 def frames_of_a_decision(robots: Robots, asked: int | None) -> int:

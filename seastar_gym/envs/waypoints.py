@@ -43,7 +43,7 @@ class Waypoints(Task):
     """Base of tasks along waypoints, each robot on a path of its own.
 
     Kept of an episode: waypoints [m], shape (n_robots, n, 2), their number, the way from each to the last [m], radius
-    [m], `RewardWeights` as numbers, the legs of the robots, and what is left to swim [m] and to turn [rad].
+    and aim [m], `RewardWeights` as numbers, the legs of the robots, and what is left to swim [m] and to turn [rad].
     """
 
     terms: tuple[str, ...] = ("reward_progress", "reward_waypoint", "reward_effort")
@@ -65,7 +65,7 @@ class Waypoints(Task):
         way_after = np.append(np.cumsum(legs[::-1])[::-1], 0.0)
         return {
             "waypoints": waypoints, "n_waypoints": len(waypoints), "way_after": way_after,
-            "radius": float(self.waypoint_radius), "weights": np.array(astuple(self.reward), np.float64),
+            "radius": float(self.waypoint_radius), "aim": float(self.reward.aim * self.waypoint_radius), "weights": np.array(astuple(self.reward), np.float64),
             "way_to_go": 0.0, "way_at_reset": 0.0, "turn_to_go": 0.0,
         }  # fmt: skip
 
@@ -100,8 +100,7 @@ class Waypoints(Task):
         A route through the centre of the current waypoint would pay for corners that need not be swum.
         """
         now = robots.episode
-        aim = Weights(*now.weights.T).aim * now.radius
-        return shortest_way(hub, now.legs.current, now.legs.following, aim) + now.legs.beyond
+        return shortest_way(hub, now.legs.current, now.legs.following, now.aim) + now.legs.beyond
 
     def targets(self, robots: Robots) -> Floats:
         """The current waypoint and the next."""

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from seastar_gym.envs.headings import wrapped
-from seastar_gym.envs.layout import VELOCITY_SCALE, Entry
+from seastar_gym.envs.layout import VELOCITY_SCALE
 from seastar_gym.envs.randomization import LIMB_STRENGTHS
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.robots import Flags, Floats, Robots, Score

@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.layout import Entry
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.robots import Floats, Robots, Score
 from seastar_gym.envs.scenery import Ring, Scenery

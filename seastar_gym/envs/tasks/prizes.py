@@ -8,7 +8,6 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.layout import Entry
 from seastar_gym.envs.robots import Flags, Floats, Robots, Score, Task
 from seastar_gym.envs.scenery import Ring, Scenery
 from seastar_gym.envs.tasks.rounds import best_round, distances, greedy_round
