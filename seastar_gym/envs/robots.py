@@ -18,17 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.accuracy.info import errors_in_info, read_certificate
-from seastar_gym.envs.lag import Lag, Piece
+from seastar_gym.envs.commands import action_masks, can_be_masked, masked_limbs
+from seastar_gym.envs.delays import Lag, Piece, Tracker
 from seastar_gym.envs.layout import N_STATIONS, Entry, Layout
-from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
-from seastar_gym.envs.observation import to_float32
+from seastar_gym.envs.observation import axes_of, lengths_of, observed_rows, rows_on_device, to_float32
 from seastar_gym.envs.options import SwimOptions
-from seastar_gym.envs.pictures import axes_of, lengths_of, observed_rows, rows_on_device
 from seastar_gym.envs.randomization import ACTION_DELAY, LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.sight import Lateness, Sees, Sight, bounds_of, entries_of, stations_seen
-from seastar_gym.envs.tracker import Tracker
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror, complete
 from seastar_gym.scene.checks import as_array, require_choice, shown
@@ -455,7 +453,7 @@ class Robots:
         return np.stack([c * x + s * y, c * y - s * x], axis=-1)
 
     def action_masks(self) -> Flags:
-        """Actions that wires can follow now, shape (n_robots, k), see masks.py."""
+        """Actions that wires can follow now, shape (n_robots, k), see commands.py."""
         return action_masks(self.options.actions, self._refractory_wires())
 
     def _refractory_wires(self) -> Flags:

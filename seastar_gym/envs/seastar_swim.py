@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.envs import IDS
 from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
-from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.commands import Actions, sampling_mask
 from seastar_gym.envs.frame import Frame
 from seastar_gym.envs.headings import HeadingTargets
-from seastar_gym.envs.masks import sampling_mask
 from seastar_gym.envs.options import Plain, SwimOptions
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.randomization import DomainRandomization
@@ -132,7 +131,7 @@ class OneRobotEnv(RobotsEnv, gym.Env[Observation, Any]):
         return self._robots.action_masks()[0]
 
     def sampling_mask(self) -> Any:
-        """`action_masks` in the form that `action_space.sample(mask=...)` takes, see `seastar_gym.envs.masks`."""
+        """`action_masks` in the form that `action_space.sample(mask=...)` takes, see `seastar_gym.envs.commands`."""
         return sampling_mask(self.action_space, self.action_masks())
 
     def close(self) -> None:

@@ -1,5 +1,7 @@
 """`SeastarSwim-v0` as a native batch: all robots in one simulator, with the bits of one environment each."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import getitem
 from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
@@ -14,24 +16,60 @@ from numpy.typing import NDArray
 from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.accuracy.info import warn_uncertified
 from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
-from seastar_gym.envs.batch_pictures import BatchPictures, Picture
-from seastar_gym.envs.buffers import Buffers, require_buffers
-from seastar_gym.envs.commands import Actions, as_array, to_commands
+from seastar_gym.envs.commands import Actions, as_array, sampling_mask, to_commands
 from seastar_gym.envs.headings import HeadingTargets
-from seastar_gym.envs.masks import sampling_mask
 from seastar_gym.envs.options import Plain, SwimOptions
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.randomization import DomainRandomization
+from seastar_gym.envs.rendering import BatchPictures, Picture
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.robots import Robots, Split, Task
 from seastar_gym.envs.sight import Drawn, Sight
 from seastar_gym.envs.tasks import chosen_task
 from seastar_gym.envs.waypoints import Path
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import is_whole_number, require_choice, require_count, require_flag, require_seed, shown
+from seastar_gym.scene.checks import (
+    is_whole_number,
+    require_choice,
+    require_count,
+    require_flag,
+    require_kind,
+    require_seed,
+    shown,
+)
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator.pauses import completed
 from seastar_gym.simulator.simulator import MAX_ROBOTS
+
+
+class Buffers(NamedTuple):
+    """Arrays of one step of a batch, such as rows of a learner's memory; none of them shares memory with another.
+
+    observations: Shape (num_envs, size). rewards, terminated, truncated: Shape (num_envs,), numbers and flags.
+    """
+
+    observations: NDArray[Any]
+    rewards: NDArray[Any]
+    terminated: NDArray[Any]
+    truncated: NDArray[Any]
+
+    def take(self, results: Buffers) -> None:
+        """Write the results of a step."""
+        for buffer, result in zip(self, results, strict=True):
+            buffer[...] = result
+
+
+def require_buffers(out: Buffers, n_robots: int, size: int) -> None:
+    """ValueError, with one sentence, for arrays that cannot take the results of so many robots."""
+    require_kind("out", out, Buffers, "Buffers")
+    shapes = {"observations": (n_robots, size)}
+    for name, buffer in out._asdict().items():
+        shape, kind = shapes.get(name, (n_robots,)), "f" if name in ("observations", "rewards") else "b"
+        fits = isinstance(buffer, np.ndarray) and buffer.shape == shape and buffer.dtype.kind == kind
+        if not fits or not buffer.flags.writeable:
+            what = "numbers" if kind == "f" else "flags"
+            raise ValueError(f"out.{name} must be a writeable array of {what} of shape {shape}.")
+
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -252,7 +290,7 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
         return self._robots.observe_on_device() if self.on_device else self._robots.observe()
 
     def action_masks(self) -> Flags:
-        """Actions that every robot's wires can follow now, shape (num_envs, k), see `seastar_gym.envs.masks`."""
+        """Actions that every robot's wires can follow now, shape (num_envs, k), see `seastar_gym.envs.commands`."""
         return self._robots.action_masks()
 
     def sampling_mask(self) -> tuple[Any, ...]:
@@ -366,11 +404,11 @@ class SeastarSwimVectorEnv(ManyRobotsEnv):
     ## Memory
     Arrays that a step returns are new, and the environment keeps no reference to them, so a learner may keep them as
     they are. With `step(actions, out=Buffers(...))` observations, rewards and flags are written into the given arrays,
-    such as rows of a learner's memory, see `seastar_gym.envs.buffers`.
+    such as rows of a learner's memory, see `Buffers`.
 
     Whatever Gymnasium's `SyncVectorEnv` of `SeastarSwimEnv` takes and gives, this batch takes and gives, but that
     `call("reset")` and `call("step")` are refused. `call` and `get_attr` give what each robot has of its own (see
-    `OF_EACH_ROBOT` in `batch_attributes`) robot by robot; everything else is common to all robots.
+    `OF_EACH_ROBOT`) robot by robot; everything else is common to all robots.
     """
 
     def __init__(

@@ -65,12 +65,13 @@ class Waypoints(Task):
         way_after = np.append(np.cumsum(legs[::-1])[::-1], 0.0)
         return {
             "waypoints": waypoints, "n_waypoints": len(waypoints), "way_after": way_after,
-            "radius": float(self.waypoint_radius), "aim": float(self.reward.aim * self.waypoint_radius), "weights": np.array(astuple(self.reward), np.float64),
+            "radius": float(self.waypoint_radius), "aim": float(self.reward.aim * self.waypoint_radius),
+            "weights": np.array(astuple(self.reward), np.float64),
             "way_to_go": 0.0, "way_at_reset": 0.0, "turn_to_go": 0.0,
         }  # fmt: skip
 
     def begin(self, robots: Robots, begun: Flags) -> None:
-        """AlongPath to the first waypoint."""
+        """Swim to the first waypoint."""
         now = robots.episode
         robots.waypoint_index[begun] = 0
         self.know_legs(robots)

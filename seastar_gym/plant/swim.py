@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.attributes import arguments_of
-from seastar_gym.envs.lag import Lag
+from seastar_gym.envs.delays import Lag, Pictures, Tracker
+from seastar_gym.envs.observation import lengths_of
 from seastar_gym.envs.options import SwimOptions
-from seastar_gym.envs.pictures import lengths_of
 from seastar_gym.envs.robots import Flags, Floats, Robots
 from seastar_gym.envs.seastar_swim import Observation, OneRobotEnv, RenderMode
 from seastar_gym.envs.sight import Sight, bounds_of
-from seastar_gym.envs.tracker import Pictures, Tracker
 from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.plant.guard import Guard, Limits
 from seastar_gym.plant.logs import Logs
@@ -130,7 +129,7 @@ class PlantRobot(Robots):
         return Pictures(self._row(seen)[None], np.array([seen.captured_at - self._begun]))
 
     def _row(self, seen: Sighting) -> Floats:
-        """Sighting as a picture, see tracker.py: relative to where the robot began."""
+        """Sighting as a picture, see delays.py: relative to where the robot began."""
         (x, y, heading), (x_0, y_0, _) = seen.pose, self._origin.pose
         c, s = math.cos(heading), math.sin(heading)
         n_places = len(self._known_pictures.columns)
@@ -295,7 +294,7 @@ class PlantSwim(OneRobotEnv):
         return self._driven.guard.plausibility.n_dropped
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """AlongPath for one decision; returns observation, reward, terminated, truncated and info."""
+        """Swim for one decision; returns observation, reward, terminated, truncated and info."""
         with self._driven.stopped_if_interrupted():
             observation, reward, terminated, _, info = super().step(action)
         truncated = bool(info["plant_message"])

@@ -17,8 +17,7 @@ from seastar_gym import (
     ThermalSma,
 )
 from seastar_gym.accuracy.info import IN_TIME
-from seastar_gym.envs.commands import to_commands
-from seastar_gym.envs.masks import action_masks
+from seastar_gym.envs.commands import action_masks, to_commands
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 

@@ -14,7 +14,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from seastar_gym.envs.attributes import RobotsEnv
-from seastar_gym.envs.masks import sampling_mask
+from seastar_gym.envs.commands import sampling_mask
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.symmetry.group import memory_mirror, symmetry_of
 from seastar_gym.envs.symmetry.symmetry import FrameStack, Symmetry
