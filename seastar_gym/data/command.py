@@ -20,7 +20,7 @@ from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.registry import HELP, load_agent
 from seastar_gym.controllers.scripted import RandomPolicy
 from seastar_gym.data.dataset import record, require_new, summary, write
-from seastar_gym.evaluation.tasks import env_of, parameters_of, require_seen, require_task
+from seastar_gym.evaluation.tasks import env_of, require_seen, require_task, spec_of
 from seastar_gym.extras import require_extra
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
@@ -72,7 +72,7 @@ def recorded(task: str, agent: str, options: argparse.Namespace, command: str) -
 
 def _random_paths(task: str) -> dict[str, Any]:
     """Arguments for random paths and headings."""
-    if "path" not in parameters_of(task):
+    if "task" in spec_of(task).kwargs:
         raise ValueError(f"{task} has no paths: leave --random-paths out.")
     return {"path": "random", "random_heading": True}
 

@@ -1,12 +1,11 @@
 """Registered environments of this package, by id, and episodes that an agent swims in them, one for each seed."""
 
 import importlib
-import inspect
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
-from gymnasium.envs.registration import EnvSpec, load_env_creator
+from gymnasium.envs.registration import EnvSpec
 
 from seastar_gym.controllers.contract import Policy, actions_in, require_fit
 from seastar_gym.controllers.greedy import Searcher
@@ -59,12 +58,6 @@ def make_task(task: str, **arguments: Any) -> gym.Env[Any, Any]:
     require_task(task)
     env: gym.Env[Any, Any] = gym.make(spec_of(task), disable_env_checker=True, **arguments)
     return env
-
-
-def parameters_of(task: str) -> set[str]:
-    """Names of the arguments of a task's environment."""
-    entry: Any = spec_of(task).entry_point
-    return set(inspect.signature(load_env_creator(entry) if isinstance(entry, str) else entry).parameters)
 
 
 def held_out(task: str, fidelity: Fidelity | None = None, split: Split = "test") -> dict[str, Any]:
