@@ -68,7 +68,11 @@ def measure(policy: LearnedPolicy, threads: int | None = None) -> dict[str, Swim
 def card(policy: LearnedPolicy, file: Path, sha256: str, swims: Mapping[str, Swims]) -> str:
     """The card, as Markdown. sha256: Of the weights, which tells what the card is about."""
     about, scene = policy.description, policy.scene
-    decides = "stroke by stroke, every 1 s" if about.decision_period is None else f"every {about.decision_period:g} s"
+    decides = (
+        "stroke by stroke, every 1 s"
+        if about.decision_period == about.scene.actuator.period
+        else f"every {about.decision_period:g} s"
+    )
     _, inputs = about.shapes()["0.weight"]
     layers = ", ".join(map(str, about.hidden))
     many, choices = about.distributions

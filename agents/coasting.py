@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.greedy import turned
-from seastar_gym.envs.commands import command_table, unless_strokes
+from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.reward import RewardWeights
@@ -81,8 +81,7 @@ def _ridge(x: Floats, y: Floats) -> Floats:
 def with_coasting(batch: gym.vector.VectorEnv[Any, Any, Any], weights: RewardWeights) -> "CoastingProgress":
     """A batch whose reward counts coasting, fitted to its scene and its time between decisions."""
     inner: Any = batch.unwrapped
-    period = unless_strokes(inner.decision_period, inner.scene)
-    return CoastingProgress(batch, fit_coasting(inner.scene, period, np.random.default_rng(0)), weights)
+    return CoastingProgress(batch, fit_coasting(inner.scene, inner.decision_period, np.random.default_rng(0)), weights)
 
 
 class CoastingProgress(gym.vector.VectorWrapper):

@@ -19,11 +19,10 @@ from seastar_gym.controllers import checkpoint
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, Weights
 from seastar_gym.controllers.registry import task_of
-from seastar_gym.envs.commands import unless_strokes
-from seastar_gym.envs.options import Path as SwimPath
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction, observed_mirror
-from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
+from seastar_gym.envs.waypoints import AlongPath
+from seastar_gym.envs.waypoints import Path as SwimPath
 from seastar_gym.scene.checks import require_count, require_kind, shown
 from seastar_gym.scene.numerics import Fidelity
 
@@ -116,15 +115,14 @@ def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
     batch: Any = env.env.unwrapped
     memory = next((layer for layer in env.layers() if isinstance(layer, VectorFrameStack)), None)
     symmetry = memory is not None or env.env_is_wrapped(VectorSymmetryReduction)[0]
-    period = unless_strokes(batch.decision_period, batch.scene)
-    about = Description(batch.actions, symmetry, batch.scene, hidden, period)
+    about = Description(batch.actions, symmetry, batch.scene, hidden, batch.decision_period)
     past = 0 if memory is None else memory.frame_stack.past
     at = batch.layout
     about = about._replace(
         past=past, entries=at.entries, shows_limbs=at.shows_limbs, stations=at.stations, sight=batch.sight,
         action_delay=batch.action_delay,
     )  # fmt: skip
-    if not isinstance(batch, SeastarTaskVectorEnv):
+    if isinstance(batch.task, AlongPath):
         return about._replace(path=batch.path if isinstance(batch.path, str) else None)
     return about._replace(task=task_of(batch), limb_mirror=observed_mirror(batch))
 

@@ -21,8 +21,8 @@ from torch.distributions import Categorical
 import seastar_gym  # noqa: F401, registers the environments
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, save
-from seastar_gym.envs.buffers import Buffers
 from seastar_gym.envs.symmetry import Symmetry
+from seastar_gym.envs.vector import Buffers
 
 
 @dataclass(frozen=True)

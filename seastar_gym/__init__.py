@@ -6,9 +6,8 @@ several times a second, and the tasks of `seastar_gym.envs.tasks`. Its names are
 
 from typing import TYPE_CHECKING
 
+from seastar_gym.envs import IDS as IDS
 from seastar_gym.envs import TASKS as TASKS
-from seastar_gym.envs import TIME_LIMIT as TIME_LIMIT
-from seastar_gym.envs import TIMED as TIMED
 from seastar_gym.lazy import lazily
 
 if TYPE_CHECKING:

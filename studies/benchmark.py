@@ -28,7 +28,7 @@ import gymnasium as gym
 import numpy as np
 
 from seastar_gym.der.stepping import stroke
-from seastar_gym.envs import observation, pictures
+from seastar_gym.envs import observation
 from seastar_gym.files import save_figure
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Numerics, Scene, Seastar
@@ -136,7 +136,7 @@ def step_of(env: Any, n: int) -> tuple[float, float]:
         return call
 
     advance, observe = timed(stroke.advance), timed(observation.observe)
-    with patch.object(batch, "advance", advance), patch.object(pictures, "observe", observe):
+    with patch.object(batch, "advance", advance), patch.object(observation, "observe", observe):
         start = time.thread_time()
         for action in actions:
             env.step(action)

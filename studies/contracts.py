@@ -9,6 +9,7 @@ from typing import Any
 
 import gymnasium as gym
 
+from seastar_gym import TASKS
 from studies.frame import DOCS, Study
 from studies.pages import markdown
 
@@ -18,8 +19,8 @@ def environments() -> str:
     head, rows = ["id", "contract", "actions", "numbers seen", "decision [s]", "limit [decisions]", "threshold"], []
     for spec in specs():
         env: Any = gym.make(spec.id, disable_env_checker=True).unwrapped
-        of = type(getattr(env, "challenge", env))
-        place = f"../{of.__module__.replace('.', '/')}.py" if hasattr(env, "challenge") else f"#{of.__name__.lower()}"
+        of = type(env.task if spec.id in TASKS else env)
+        place = f"../{of.__module__.replace('.', '/')}.py" if spec.id in TASKS else f"#{of.__name__.lower()}"
         numbers = env.observation_space.shape[0], env.decision_period, spec.max_episode_steps, spec.reward_threshold
         shown = ("-" if number is None else f"{number:g}" for number in numbers)
         rows.append([f"`{spec.id}`", f"[{of.__name__}]({place})", f"`{env.action_space}`", *shown])

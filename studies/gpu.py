@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym import DomainRandomization, HeadingTargets, Sight, Uniform
-from seastar_gym.envs.buffers import Buffers
+from seastar_gym.envs.vector import Buffers
 from seastar_gym.files import save_figure
 from seastar_gym.scene import (
     AlongLimb,

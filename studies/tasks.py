@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from seastar_gym import TASKS
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.greedy import Searcher, displacement_map, waypoints_of
-from seastar_gym.envs.commands import unless_strokes
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.tasks.discs import rims
@@ -18,7 +17,7 @@ from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.station import Station
-from seastar_gym.evaluation.measures import measure_of_challenge
+from seastar_gym.evaluation.measures import measure_of_task
 from seastar_gym.evaluation.rollout import Batch, rollout
 from seastar_gym.evaluation.tasks import RECORDED, make_batch
 from seastar_gym.scene.numerics import Fidelity
@@ -47,10 +46,9 @@ class OnRoute(Searcher):
     """Takes the action whose mean displacement leaves the shortest rewarded route."""
 
     def __init__(self, inner: Any):
-        self.scene, self.layout, self.challenge = inner.scene, inner.layout, inner.challenge
-        self.in_strokes = unless_strokes(inner.decision_period, inner.scene) is None
-        period = None if self.in_strokes else inner.decision_period
-        self.hub = displacement_map(inner.scene, inner.actions, period).hub[None]
+        self.scene, self.layout, self.task = inner.scene, inner.layout, inner.task
+        self.in_strokes = inner.timed is None
+        self.hub = displacement_map(inner.scene, inner.actions, inner.timed).hub[None]
 
     def choose(self, observations: Floats32) -> NDArray[np.int64]:
         """Actions, shape (n,), for observations of shape (n, size)."""
@@ -89,21 +87,21 @@ class MostPerMetre(OnRoute):
         own = self.own(observations)
         seen = own[:, :-1].reshape(len(own), -1, 3)
         places, worth = self.scene.robot.limb_length * seen[..., :2], seen[..., 2]
-        way = (SPEED_IN_STROKES if self.in_strokes else SPEED_IN_TIME) * self.challenge.seconds * own[:, -1:]
-        to = np.maximum(length(places) - self.challenge.radius, 1e-4)
+        way = (SPEED_IN_STROKES if self.in_strokes else SPEED_IN_TIME) * self.task.seconds * own[:, -1:]
+        to = np.maximum(length(places) - self.task.radius, 1e-4)
         value = np.where((worth > 0.0) & (to <= way), worth / to, worth * 1e-6 / to)
         chosen = places[np.arange(len(own)), np.argmax(value, axis=1)]
         return length(self.hub - chosen[:, None])
 
 
 RULES: dict[type, type[OnRoute]] = {Prey: Nearest, Station: Nearest, ObstTrap: Clear, Prizes: MostPerMetre}
-"""Rules of challenges, of others `OnRoute`."""
+"""Rules of tasks, of others `OnRoute`."""
 
 
 def greedy(batch: Batch) -> Policy:
     """Greedy rule of the task of a batch."""
     inner: Any = batch.unwrapped
-    return RULES.get(type(inner.challenge), OnRoute)(inner)
+    return RULES.get(type(inner.task), OnRoute)(inner)
 
 
 def held_out(id: str, n: int = HELD_OUT) -> float:
@@ -113,7 +111,7 @@ def held_out(id: str, n: int = HELD_OUT) -> float:
     batch.close()
     inner = batch.unwrapped
     limited = done._replace(limit=inner.max_episode_steps * inner.decision_period)
-    return float(measure_of_challenge(inner.challenge).of(limited).mean())
+    return float(measure_of_task(inner.task).of(limited).mean())
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ MOTIVE = (
 DEEPLABCUT = "scorer,s,s,s\nbodyparts,a,a,a\ncoords,x,y,likelihood\n0,1,2,1\n"
 MADE_BY_THE_PACKAGE = {
     "Setting", "Episodes", "Estimate", "Score", "Swim", "Progress",
-    "Actuator", "ActuatorBase", "Policy", "Challenge", "Numbered", "Swimming",
+    "Actuator", "ActuatorBase", "Policy", "Task", "Robots",
     "Plant", "PlantError", "Sighting", "Derivatives", "Motion", "Gradient", "Record",
     "Track",
 }  # fmt: skip

@@ -192,7 +192,7 @@ def test_a_package_index_shows_readme_with_absolute_links_once_there_is_an_addre
 def test_the_first_ten_lines_show_the_policy_that_arrives(monkeypatch):
     make, shown = gym.make, []
     monkeypatch.setattr(gym, "make", lambda id, **arguments: make(id, path=[[0.03, 0.0]], fidelity="fast", **arguments))
-    monkeypatch.setattr(SeastarSwimEnv, "_draw_frame", lambda env: shown.append(env.render_mode))
+    monkeypatch.setattr(SeastarSwimEnv, "draw_frame", lambda env: shown.append(env.render_mode))
     left = runpy.run_path(str(ROOT / "examples" / "ten_lines.py"))
     assert left["terminated"] and left["info"]["is_success"]
     assert set(shown) == {"human"} and len(shown) > 10

@@ -39,8 +39,8 @@ from seastar_gym.scene.numerics import Fidelity
 IMITATION = "imitation"
 """Learner that imitates the bundled policy of waypoints, which sees the true state, see `agents.distillation`."""
 OTHERS = {"obst-trap": "PPO, memory, told the way", "sim-to-real": IMITATION}
-"""Learners of challenges that a memory alone does not serve best."""
-RECIPES: dict[str, str] = {id: OTHERS.get(about[0], "PPO, memory") for id, about in TASKS.items()}
+"""Learners of tasks that a memory alone does not serve best."""
+RECIPES: dict[str, str] = {id: OTHERS.get(str(row.task), "PPO, memory") for id, row in TASKS.items()}
 """Learner of every task that has a bundled policy."""
 VALIDATION = 64
 """Episodes of the split "train" by which seeds are compared."""
@@ -77,8 +77,9 @@ class Options:
 
 def file_of(id: str, folder: Path = learned.TASKS) -> Path:
     """File of the policy of a task."""
-    task, _, period, *_ = TASKS[id]
-    return learned.of_task(task, None if period == SmaPulse().period else period, folder)
+    row = TASKS[id]
+    period = None if row.decision_period == SmaPulse().period else row.decision_period
+    return learned.of_task(str(row.task), period, folder)
 
 
 def trained(id: str, seed: int, options: Options) -> tuple[LearnedPolicy, dict[str, Any]]:
@@ -97,7 +98,7 @@ def trained(id: str, seed: int, options: Options) -> tuple[LearnedPolicy, dict[s
 
 def swims(policy: LearnedPolicy, id: str) -> LearnedPolicy:
     """The policy as one of a task, by whatever reward it was trained."""
-    return LearnedPolicy(policy.description._replace(task=TASKS[id][0]), policy.weights, policy.training)
+    return LearnedPolicy(policy.description._replace(task=TASKS[id].task), policy.weights, policy.training)
 
 
 def validated(id: str, policy: LearnedPolicy, options: Options) -> float:
@@ -160,7 +161,7 @@ def card(id: str, policy: LearnedPolicy, file: Path) -> str:
     return f"""# Model card: {file.stem}
 
 A policy of the chapter's robot for `{id}`. What it sees and is rewarded for stands in the docstring of
-`{type(env.challenge).__name__}`.{told}
+`{type(env.task).__name__}`.{told}
 It was trained in simulation, and no real robot has swum by it.
 
 | | |

@@ -33,7 +33,7 @@ OWN: dict[str, dict[str, Any]] = {
     "fast-prizes": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
     "sim-to-real": {"discount": 0.3, "gae_lambda": 0.95},
 }
-"""Hyperparameters that differ from the project's, by challenge: prey and prizes are met after many seconds."""
+"""Hyperparameters that differ from the project's, by task: prey and prizes are met after many seconds."""
 
 
 class Learner(NamedTuple):
@@ -52,7 +52,7 @@ class Learner(NamedTuple):
         """The batch as the learner sees it."""
         if self.coasting:
             inner: Any = batch.unwrapped
-            batch = with_coasting(batch, inner.challenge.reward)
+            batch = with_coasting(batch, inner.task.reward)
         if self.past:
             return VectorFrameStack(batch, self.past)
         return VectorSymmetryReduction(batch) if self.symmetric else batch
@@ -91,9 +91,8 @@ def _training_batch(id: str, fidelity: Fidelity, threads: int | None, **argument
 
 def new_model(id: str, env: BatchVecEnv, seed: int) -> PPO:
     """PPO that has learned nothing yet."""
-    task, *_ = TASKS[id]
     batch: Any = env.env.unwrapped
-    return make_model(env, hyperparameters(task, float(batch.decision_period)), seed)
+    return make_model(env, hyperparameters(str(TASKS[id].task), float(batch.decision_period)), seed)
 
 
 def train(id: str, learner: Learner, seed: int, decisions: int, fidelity: Fidelity, threads: int | None) -> PPO:

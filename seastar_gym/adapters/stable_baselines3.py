@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from seastar_gym.envs.batch_attributes import robot_by_robot
-from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.envs.vector import SeastarSwimVectorEnv, robot_by_robot
 
 Info = dict[str, Any]
 

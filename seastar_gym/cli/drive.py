@@ -25,7 +25,8 @@ from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.registry import HELP, learned_policy, load_agent
 from seastar_gym.envs.commands import decisions_in
-from seastar_gym.envs.options import SwimOptions, make_scene, scene_at
+from seastar_gym.envs.options import make_scene, scene_at
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.sight import FOR_CAMERA, Sight, told
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.pictures import draw_traces
@@ -44,8 +45,6 @@ from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator
 
 SIM, SERIAL = "sim", "serial:"
-RADIUS = SwimOptions().waypoint_radius
-"""Radius of waypoints [m]."""
 STOPPED = 1
 """Exit code of a drive that the guard has stopped."""
 
@@ -206,7 +205,7 @@ def drive(options: argparse.Namespace) -> int:
     picture = options.out / "plan.png"
     fluid = arguments["scene"].fluid
     current = None if fluid is None else fluid.current
-    draw_traces([planned], RADIUS, picture, current)
+    draw_traces([planned], WAYPOINT_RADIUS, picture, current)
     heat = planned.heating_time.sum()
     print(f"Plan: {planned.result}, {heat:.1f} s of heat in {planned.strokes} decisions, drawn in {picture}.")
     if options.dry or not (options.yes or agreed()):
@@ -218,7 +217,7 @@ def drive(options: argparse.Namespace) -> int:
             swum = _swim("driven", policy, env, options)
         finally:
             env.close()
-    draw_traces([planned, swum], RADIUS, options.out / "driven.png", current)
+    draw_traces([planned, swum], WAYPOINT_RADIUS, options.out / "driven.png", current)
     text = report(options, planned, swum, env)
     write_atomically(options.out / "report.md", text)
     guarded = env.stopped or "The guard had nothing to stop."

@@ -36,8 +36,9 @@ class PlayedEnv(SeastarSwimEnv):
         robot = self.scene.robot
         return limb_nodes(robot.n_limbs, robot.nodes_per_limb)
 
-    def _draw_frame(self) -> None:
-        super()._draw_frame()
+    def draw_frame(self) -> None:
+        """Draw a picture, and the help."""
+        super().draw_frame()
         self.last_picture = self._frames[-1] = self._annotated(self._frames[-1])
 
     def _annotated(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -59,10 +60,12 @@ class PlayedEnv(SeastarSwimEnv):
 
     def _numbers(self) -> list[tuple[int, NDArray[np.float64]]]:
         """Limbs that are not heated, whose names the picture lacks, and the places of their numbers [px]."""
-        positions, camera = self.simulator.positions[0], self._get_renderer().camera
+        positions, camera = self.simulator.positions[0], self._batch.pictures.renderer_of(0).camera
         tips, angles = camera.to_pixels(positions[self._limbs[:, -1]]), self.limb_directions()
         outward = 18.0 * np.stack([np.cos(angles), -np.sin(angles)], axis=1)
-        return [(limb, tips[limb] + outward[limb]) for limb in np.flatnonzero(self._command == 0.0).tolist()]
+        return [
+            (limb, tips[limb] + outward[limb]) for limb in np.flatnonzero(self._robots.last_commands[0] == 0.0).tolist()
+        ]
 
 
 def keys_help(n_limbs: int) -> list[tuple[str, str]]:

@@ -6,8 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from seastar_gym.envs.canvas import INK, WATER, Canvas, import_pygame
-from seastar_gym.envs.window import Window
+from seastar_gym.envs.canvas import INK, WATER, Canvas, Window, import_pygame
 from seastar_gym.evaluation.films import Picture, film, film_format
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_array, shown
 
 if TYPE_CHECKING:
-    from seastar_gym.envs.tasks.challenge import Challenge
+    from seastar_gym.envs.robots import Task
 
 
 LARGEST_SEEN = 1e30
@@ -71,18 +71,18 @@ def require_fit(
     actions: Actions,
     decision_period: float | None = None,
     n_seen: int | None = None,
-    challenge: "Challenge | None" = None,
+    task: "Task | None" = None,
     sight: Sight | None = None,
 ) -> None:
     """ValueError, with one sentence, where a policy cannot drive the robot of an environment, as far as it tells.
 
     decision_period: Time between decisions of the environment [s]. None means a stroke.
     n_seen: Length of the environment's observations. None means those of waypoints.
-    challenge: Of the environment. None means waypoints. sight: Through which the robot is seen, None for full sight.
+    task: Of the environment. None means waypoints. sight: Through which the robot is seen, None for full sight.
     """
     n_seen = Layout.of(scene).size if n_seen is None else n_seen
     if hasattr(policy, "require_fit"):
-        policy.require_fit(scene, actions, n_seen, challenge, sight)
+        policy.require_fit(scene, actions, n_seen, task, sight)
     limbs = getattr(policy, "n_limbs", None)
     if limbs is not None and limbs != scene.robot.n_limbs:
         raise ValueError(f"The policy is for a robot of {limbs} limbs, the environment's has {scene.robot.n_limbs}.")

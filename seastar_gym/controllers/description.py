@@ -34,9 +34,9 @@ class Description(NamedTuple):
     """Environment that a learned policy expects, and the shape of its network.
 
     actions: Action mode. symmetry: Whether the policy sees reduced observations, see `seastar_gym.envs.symmetry`.
-    scene: Scene of the training. hidden: Widths of the hidden layers. decision_period: Time between decisions [s].
-    None means strokes.
-    task: Name of the challenge that the policy was trained for, such as "miswired". None means waypoints.
+    scene: Scene of the training. hidden: Widths of the hidden layers. decision_period: Time between decisions [s];
+    None means the period of the actuator, and is that in a policy.
+    task: Name of the task that the policy was trained for, such as "miswired". None means waypoints.
     limb_mirror: What a mirror does to the numbers that are observed of every limb. None means those of the actuators.
     entries, shows_limbs, stations: Of the observations, see `Layout`. past: Number of past observations that the
     policy sees, see `FrameStack`.
@@ -108,8 +108,8 @@ class Description(NamedTuple):
             require_count("a width of its hidden layers", width, 1, WIDEST)
         if facts["decision_period"] is not None:
             checked_decision_period(facts["decision_period"], scene)
-        if task is not None and (not isinstance(task, str) or task not in CHALLENGES):
-            raise ValueError(f"Its task must be one of {', '.join(CHALLENGES)}, not {shown(task)}.")
+        if task is not None and (not isinstance(task, str) or task not in NAMES_OF_TASKS):
+            raise ValueError(f"Its task must be one of {', '.join(NAMES_OF_TASKS)}, not {shown(task)}.")
         require_count("its past", past, 0, MOST_PAST)
         if past and not symmetry:
             raise ValueError("A policy without symmetry has no past.")
@@ -179,8 +179,8 @@ class Description(NamedTuple):
         return shapes
 
 
-CHALLENGES = tuple(dict.fromkeys(about[0] for about in TASKS.values()))
-"""Names of challenges that policies are trained for."""
+NAMES_OF_TASKS = tuple(dict.fromkeys(str(row.task) for row in TASKS.values()))
+"""Names of tasks that policies are trained for."""
 
 
 def _rows(mirror: object) -> object:

@@ -35,7 +35,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number, require_file, require_flag, require_kind, require_period, shown
 
 if TYPE_CHECKING:
-    from seastar_gym.envs.tasks.challenge import Challenge
+    from seastar_gym.envs.robots import Task
 
 BUNDLED = Path(__file__).parent / "policies" / "strokes.safetensors"
 """File of the bundled policy that decides stroke by stroke; `python train.py --publish` replaces it."""
@@ -81,13 +81,14 @@ class LearnedPolicy:
             raise ValueError(f"Its weights have the shapes {shapes}, not {description.shapes()}.")
         if not all(array.dtype == np.float32 and np.isfinite(array).all() for array in weights.values()):
             raise ValueError("Its weights are not all finite numbers of single precision.")
-        self.description = description
+        stroke = float(description.scene.actuator.period)
+        self.decision_period = stroke if description.decision_period is None else description.decision_period
+        self.description = description._replace(decision_period=self.decision_period)
         self.weights = weights
         self.actions = description.actions
         self.scene = description.scene
         self.reduction, self.frame_stack = description.reduction, description.frame_stack
         self._n_seen, self._outputs = description.observation_size, description.distributions  # asked every decision
-        self.decision_period = description.decision_period or description.scene.actuator.period
         self.training = training or {}
         self.rng = np.random.default_rng(0) if rng is None else rng
 
@@ -168,12 +169,12 @@ class LearnedPolicy:
         scene: Scene,
         actions: Actions,
         n_seen: int,
-        challenge: Challenge | None = None,
+        task: Task | None = None,
         sight: Sight | None = None,
     ) -> None:
         """ValueError, with one sentence, where this policy cannot drive the robot of an environment.
 
-        n_seen: Length of the environment's observations. challenge: Of the environment, None for waypoints. A policy
+        n_seen: Length of the environment's observations. task: Of the environment, None for waypoints. A policy
         of a task fits that task with any numbers; one of waypoints fits wherever the observations are as long.
         sight: Through which the robot is seen, None for full sight; a policy fits any that sees the same.
         """
@@ -184,16 +185,15 @@ class LearnedPolicy:
             raise ValueError(
                 f'The policy answers with actions="{self.actions}", the environment takes actions="{actions}".'
             )
-        task = self.description.task
-        if task is not None:
-            require_task(task, challenge)
+        trained_for = self.description.task
+        if trained_for is not None:
+            require_task(trained_for, task)
         require_same_sight(self.description.sight, sight)
         ours = self.description.observation_size
         if ours != n_seen:
-            task = task or "waypoints"
             raise ValueError(
-                f"The policy sees {ours} numbers of {task}, the environment shows {n_seen}: another task, or actuators "
-                "that remember differently."
+                f"The policy sees {ours} numbers of {trained_for or 'waypoints'}, the environment shows {n_seen}: "
+                "another task, or actuators that remember differently."
             )
 
     def differences(self, scene: Scene) -> str:
@@ -210,19 +210,21 @@ class LearnedPolicy:
         return f"trained in another scene, with {', '.join(parts)}." if parts else ""
 
 
-def require_task(task: str, challenge: Challenge | None) -> None:
-    """ValueError unless a challenge is that of a task of this name, with any numbers.
+def require_task(name: str, task: Task | None) -> None:
+    """ValueError unless a task is that of a name, with any numbers. None means waypoints.
 
     A policy of `SimToReal` swims along waypoints, also those of a plant.
     """
-    from seastar_gym.envs.tasks.envs import CHALLENGES, name_of  # whoever has a challenge has imported them
+    from seastar_gym.envs.tasks import NAMED, name_of  # whoever has a task has imported them
     from seastar_gym.envs.tasks.sim_to_real import SimToReal
+    from seastar_gym.envs.waypoints import AlongPath
 
-    if challenge is None and isinstance(CHALLENGES[task], SimToReal):
+    is_swim = task is None or isinstance(task, AlongPath)
+    if is_swim and isinstance(NAMED[name], SimToReal):
         return
-    if not isinstance(challenge, type(CHALLENGES[task])):
-        other = "waypoints" if challenge is None else name_of(challenge) or type(challenge).__name__
-        raise ValueError(f"The policy was trained for the task {task}, the environment's is {other}.")
+    if not isinstance(task, type(NAMED[name])):
+        other = "waypoints" if is_swim else name_of(task) or type(task).__name__
+        raise ValueError(f"The policy was trained for the task {name}, the environment's is {other}.")
 
 
 def require_same_sight(ours: Sight | None, theirs: Sight | None) -> None:
@@ -300,7 +302,7 @@ def pretrained(name: str = BUNDLED.stem) -> LearnedPolicy:
 
 
 def of_task(task: str, decision_period: float | None, folder: Path = TASKS) -> Path:
-    """File of the policy of a task, by the name of its challenge, whether it is there or not."""
+    """File of the policy of a task, by its name, whether it is there or not."""
     period = "" if decision_period is None else f"-{decision_period:g}s"
     return folder / f"{task}{period}{BUNDLED.suffix}"
 

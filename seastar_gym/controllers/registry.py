@@ -18,10 +18,9 @@ from seastar_gym.controllers.contract import Policy, actions_of, require_fit
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.planner import Planner, gait_planner
 from seastar_gym.controllers.scripted import GAITS, scripted
-from seastar_gym.envs.commands import unless_strokes
 from seastar_gym.envs.options import make_scene
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.tasks.envs import name_of
+from seastar_gym.envs.seastar_swim import OneRobotEnv, SeastarSwimEnv
+from seastar_gym.envs.tasks import name_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import (
     require_choice,
@@ -137,19 +136,18 @@ def _labels(names: Sequence[str]) -> dict[str, str]:
     return labels
 
 
-def load_agent(name: str, env: SeastarSwimEnv, seed: int = 0) -> Policy:
+def load_agent(name: str, env: OneRobotEnv, seed: int = 0) -> Policy:
     """Policy by a name as in `HELP`, for the robot and the decisions of an environment."""
     require_kind("name", name, str, "the name of an agent")
     require_seed(seed)
-    if not all(hasattr(env, known) for known in ("decision_period", "scene", "step")):
+    if not all(hasattr(env, known) for known in ("timed", "scene", "step")):
         raise ValueError(f"env must be an environment of this package, not {shown(env)}.")
-    period = unless_strokes(env.decision_period, env.scene)
-    return _load_agent(name, seed, env.scene, period, task_of(env), lambda: env)
+    return _load_agent(name, seed, env.scene, env.timed, task_of(env), lambda: env)
 
 
 def task_of(env: Any) -> str | None:
-    """Name of the challenge of an environment or a batch; None for waypoints, or where a challenge has no name."""
-    return name_of(getattr(env, "challenge", None))
+    """Name of the task of an environment or a batch; None for waypoints, or where a task has no name."""
+    return name_of(getattr(env, "task", None))
 
 
 def files_of(name: str, decision_period: float | None = None) -> list[Path]:
@@ -196,7 +194,7 @@ def _load_agent(
     scene: Scene,
     decision_period: float | None,
     task: str | None,
-    make_env: Callable[[], SeastarSwimEnv],
+    make_env: Callable[[], OneRobotEnv],
 ) -> Policy:
     if name in AGENTS:
         return AGENTS[name](scene, decision_period, task)

@@ -24,7 +24,7 @@ import numpy as np
 
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import reason_of
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.seastar_swim import OneRobotEnv
 from seastar_gym.scene.scene_file import search
 
 _FUNCTION = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
@@ -48,7 +48,7 @@ def module_file(name: str) -> Path:
     return Path(spec.origin)
 
 
-def call_function(name: str, env: SeastarSwimEnv) -> Policy:
+def call_function(name: str, env: OneRobotEnv) -> Policy:
     """Policy that the function, or class, of this name returns for an environment.
 
     env: Environment that the function may inspect, simulate or learn in; the evaluation has another one.

@@ -1,10 +1,11 @@
 """Environments of robots that swim by decisions. Importing this package registers their ids, and nothing else.
 
 `SeastarSwim-v0`, the same with continuous commands, the timed environments that decide several times a second, one that
-asks for headings, and the tasks of `seastar_gym.envs.tasks`.
+asks for headings, and the tasks of `seastar_gym.envs.tasks`: every id is a row of `IDS`.
 """
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from gymnasium.envs.registration import EnvSpec, register, registry
 
@@ -12,62 +13,72 @@ if TYPE_CHECKING:
     from seastar_gym.envs.commands import Actions
 
 
-def _register(id: str, home: str = "seastar_gym.envs.vector", name: str = "SeastarSwim", **facts: Any) -> None:
-    """Register an id, unless it is, as when this module is loaded again.
+class Id(NamedTuple):
+    """What a registered environment is made of."""
 
-    Gymnasium's passive checker is left out: after a first reset that is refused or interrupted, it fails at every step.
-    """
-    single = home.replace("vector", "seastar_swim")
-    facts |= {
-        "entry_point": f"{single}:{name}Env", "vector_entry_point": f"{home}:{name}VectorEnv",
-        "disable_env_checker": True,
-    }  # fmt: skip
-    if registry.get(id) != EnvSpec(id=id, **facts):
-        register(id=id, **facts)
+    task: str | None
+    """Name of the task; None for waypoints."""
+    actions: "Actions"
+    decision_period: float
+    """Time between decisions [s]."""
+    seconds: float
+    """Time limit [s]."""
+    threshold: float | None = None
+    """Return that solves it."""
+    more: Mapping[str, Any] = {}
+    """Further arguments of the environment."""
+
+    @property
+    def decisions(self) -> int:
+        """Time limit [decisions]."""
+        return round(self.seconds / self.decision_period)
 
 
-_register("SeastarSwim-v0", max_episode_steps=400)
-_register("SeastarSwimContinuous-v0", max_episode_steps=400, kwargs={"actions": "continuous"})
+IDS: dict[str, Id] = {
+    "SeastarSwim-v0": Id(None, "limbs", 1.0, 400.0),
+    "SeastarSwimContinuous-v0": Id(None, "continuous", 1.0, 400.0),
+    "SeastarSwimTimed-v0": Id(None, "pairs", 0.5, 200.0),
+    "SeastarSwimTimedModerate-v0": Id(None, "pairs", 0.2, 200.0),
+    "SeastarSwimTimedHard-v0": Id(None, "pairs", 0.1, 200.0),
+    "SeastarSwimHeading-v0": Id(
+        None, "pairs", 0.5, 300.0, more={"headings": {"version": 1, "kind": "HeadingTargets"}}
+    ),
+    "SeastarMiswired-v0": Id("miswired", "joint", 1.0, 400.0, 150.0),
+    "SeastarMiswiredTimed-v0": Id("miswired", "joint", 0.5, 400.0, 145.0),
+    "SeastarPrey-v0": Id("prey", "pairs", 1.0, 200.0, 80.0),
+    "SeastarPreyTimed-v0": Id("fast-prey", "pairs", 0.5, 200.0, 130.0),
+    "SeastarStation-v0": Id("station", "joint", 1.0, 120.0, -20.0),
+    "SeastarFailBlind-v0": Id("fail-blind", "joint", 1.0, 500.0, 150.0),
+    "SeastarObstTrap-v0": Id("obst-trap", "pairs", 1.0, 300.0, 95.0),
+    "SeastarObstTrapTimed-v0": Id("obst-trap", "pairs", 0.5, 200.0, 94.0),
+    "SeastarPrizes-v0": Id("prizes", "pairs", 1.0, 201.0, 80.0),
+    "SeastarPrizesTimed-v0": Id("fast-prizes", "pairs", 0.5, 115.5, 76.0),
+    "SeastarSwimSimToReal-v0": Id("sim-to-real", "pairs", 0.2, 300.0, 145.0),
+}  # fmt: skip
+"""All environments of the package."""
+TASKS = {id: row for id, row in IDS.items() if row.task is not None}
+"""Those of tasks."""
 
-TIMED = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
-"""Times between decisions [s] of the timed environments, easy, moderate and hard, by id."""
-TIME_LIMIT = 200.0
-"""Time limit of the timed environments [s]."""
-
-for _id, _decision_period in TIMED.items():
-    _register(
-        _id,
-        max_episode_steps=round(TIME_LIMIT / _decision_period),
-        kwargs={"decision_period": _decision_period, "actions": "pairs"},
-    )
-
-_register(
-    "SeastarSwimHeading-v0",
-    max_episode_steps=600,
-    kwargs={"decision_period": 0.5, "actions": "pairs", "headings": {"version": 1, "kind": "HeadingTargets"}},
-)
-
-TASKS: dict[str, tuple[str, "Actions", float, float, float]] = {
-    "SeastarMiswired-v0": ("miswired", "joint", 1.0, 400.0, 150.0),
-    "SeastarMiswiredTimed-v0": ("miswired", "joint", 0.5, 400.0, 145.0),
-    "SeastarPrey-v0": ("prey", "pairs", 1.0, 200.0, 80.0),
-    "SeastarPreyTimed-v0": ("fast-prey", "pairs", 0.5, 200.0, 130.0),
-    "SeastarStation-v0": ("station", "joint", 1.0, 120.0, -20.0),
-    "SeastarFailBlind-v0": ("fail-blind", "joint", 1.0, 500.0, 150.0),
-    "SeastarObstTrap-v0": ("obst-trap", "pairs", 1.0, 300.0, 95.0),
-    "SeastarObstTrapTimed-v0": ("obst-trap", "pairs", 0.5, 200.0, 94.0),
-    "SeastarPrizes-v0": ("prizes", "pairs", 1.0, 201.0, 80.0),
-    "SeastarPrizesTimed-v0": ("fast-prizes", "pairs", 0.5, 115.5, 76.0),
-    "SeastarSwimSimToReal-v0": ("sim-to-real", "pairs", 0.2, 300.0, 145.0),
+ENVIRONMENTS: dict[str, Any] = {
+    "entry_point": "seastar_gym.envs.seastar_swim:SeastarSwimEnv",
+    "vector_entry_point": "seastar_gym.envs.vector:SeastarSwimVectorEnv",
+    "disable_env_checker": True,  # after a first reset that is refused or interrupted, it fails at every step
 }
-"""Name of the challenge, actions, time between decisions [s], time limit [s] and reward threshold of tasks, by id."""
+"""What makes the environments of every id."""
 
-for _id, (_task, _actions, _decision_period, _limit, _threshold) in TASKS.items():
-    _register(
-        _id,
-        "seastar_gym.envs.tasks.envs",
-        "SeastarTask",
-        max_episode_steps=round(_limit / _decision_period),
-        reward_threshold=_threshold,
-        kwargs={"task": _task, "actions": _actions, "decision_period": _decision_period},
-    )
+STROKE = 1.0
+"""Time between decisions [s] that the actuator chooses, unless another is asked for."""
+
+
+def _arguments(row: Id) -> dict[str, Any]:
+    """Arguments of an environment that are not its own ones."""
+    own = {"task": None, "actions": "limbs", "decision_period": STROKE}
+    return {name: getattr(row, name) for name in own if getattr(row, name) != own[name]} | dict(row.more)
+
+
+for _id, _row in IDS.items():
+    _facts = ENVIRONMENTS | {
+        "max_episode_steps": _row.decisions, "reward_threshold": _row.threshold, "kwargs": _arguments(_row),
+    }  # fmt: skip
+    if registry.get(_id) != EnvSpec(_id, **_facts):  # unless this module is loaded again
+        register(_id, **_facts)

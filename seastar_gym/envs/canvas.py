@@ -1,7 +1,7 @@
-"""Canvas: thick lines, discs and text on a picture, painted larger and smoothed down with pygame.
+"""What pictures are drawn on: the part of the plane that they show, the canvas, and the window.
 
-pygame is imported when a canvas is made, so that an environment that draws nothing does without it. Places and sizes
-are in pixels of the finished picture, counted from the upper left corner, y down.
+Lengths are in metres, y is up; pixels count from the upper left corner, y down. Without a display, windows are drawn
+off screen.
 """
 
 from __future__ import annotations
@@ -19,7 +19,51 @@ from seastar_gym.interrupts import held_back
 if TYPE_CHECKING:
     import pygame
 
+
+import warnings
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pygame
+
 FloatArray = NDArray[np.float64]
+
+
+class Camera:
+    """Map from metres to the pixels of a viewport, with one scale for x and y and the fitted box [m] in the middle."""
+
+    def __init__(self, corners: FloatArray, viewport: tuple[int, int, int, int]) -> None:
+        """corners: Points [m], shape (n, 2), whose bounding box is fitted; viewport: left, top, width, height [px]."""
+        self.corners = np.array([corners.min(axis=0), corners.max(axis=0)])
+        self.viewport = viewport
+        left, top, width, height = viewport
+        self.scale = float(np.min(np.array([width, height]) / np.ptp(self.corners, axis=0)))
+        self._centre = self.corners.mean(axis=0)
+        self._middle = np.array([left + width / 2, top + height / 2])
+
+    def to_pixels(self, points: ArrayLike) -> FloatArray:
+        """Pixels, shape (..., 2), of points [m], shape (..., 2)."""
+        pixels: FloatArray = self._middle + (np.asarray(points) - self._centre) * [self.scale, -self.scale]
+        return pixels
+
+    @property
+    def in_view(self) -> FloatArray:
+        """Lower left and upper right corner of what the viewport shows [m], shape (2, 2)."""
+        half = 0.5 * np.array(self.viewport[2:]) / self.scale
+        corners: FloatArray = np.array([self._centre - half, self._centre + half])
+        return corners
+
+    def sees(self, points: FloatArray) -> bool:
+        """Whether all points [m], shape (n, 2), lie in the viewport."""
+        left, top, width, height = self.viewport
+        pixels = self.to_pixels(points)
+        return bool(np.all(pixels >= [left, top]) and np.all(pixels <= [left + width, top + height]))
+
+    def widened(self, points: FloatArray, margin: float) -> Camera:
+        """A camera that sees what this one was fitted to and points [m], shape (n, 2), with a margin [m] around."""
+        return Camera(np.concatenate([self.corners, points - margin, points + margin]), self.viewport)
+
+
 Colour = tuple[int, int, int]
 
 WATER: Colour = (250, 252, 254)
@@ -175,3 +219,68 @@ def import_pygame() -> Any:
     except ImportError as missing:
         raise ImportError('Rendering needs pygame-ce: pip install "seastar-gym[render]".') from missing
     return pygame
+
+
+class Window:
+    """Window of pygame that opens with the first picture and stays closed once the user closed it.
+
+    Where there is no display, pictures go nowhere, and a warning says so.
+    """
+
+    def __init__(self) -> None:
+        self._pygame = import_pygame()
+        self._surface: pygame.Surface | None = None
+        self._clock = self._pygame.time.Clock()
+        self._closed_by_user = False
+        self.is_seen = True
+        """Whether there is a display. It is not known before the first picture."""
+
+    def is_wanted(self, size: tuple[int, int]) -> bool:
+        """Whether there is a window to show a picture of this width and height [px] in; opens it where needed."""
+        if self._closed_by_user:
+            return False
+        if not self.is_seen:
+            return True
+        if self._surface is None or self._surface is not self._pygame.display.get_surface():
+            self._surface = self._open(size)
+        if self.is_seen and any(event.type == self._pygame.QUIT for event in self._pygame.event.get()):
+            self.close()
+            self._closed_by_user = True
+        return not self._closed_by_user
+
+    def show(self, picture: pygame.Surface, fps: float | None) -> None:
+        """Show a picture, and wait until 1/fps seconds have passed since the one before, where fps is given."""
+        if self._surface is None:
+            return
+        self._surface.blit(picture, (0, 0))
+        self._pygame.display.flip()
+        if fps is not None:
+            self._clock.tick(fps)
+
+    def close(self) -> None:
+        """Close the window, if one is open; may be called again."""
+        if self._surface is not None:
+            self._surface = None
+            self._pygame.display.quit()
+
+    def _open(self, size: tuple[int, int]) -> pygame.Surface | None:
+        try:
+            self._pygame.display.init()
+            self._pygame.display.set_caption("SeastarSwim")
+            self._require_display()
+            surface: pygame.Surface = self._pygame.display.set_mode(size)
+        except self._pygame.error as no_display:
+            self.is_seen = False
+            warnings.warn(
+                f"No window can be opened here ({no_display}), so nobody sees the pictures: render with "
+                'render_mode="rgb_array" instead, or write a film, seastar swim --film swim.mp4.',
+                stacklevel=2,
+            )
+            return None
+        return surface
+
+    def _require_display(self) -> None:
+        """Without a display, SDL draws where nobody looks; a pygame.error says so, unless that was asked for."""
+        if self._pygame.display.get_driver() == "offscreen" and not os.environ.get("SDL_VIDEODRIVER"):
+            self._pygame.display.quit()
+            raise self._pygame.error("there is no display")

@@ -7,8 +7,8 @@ from operator import itemgetter
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.envs.robots import Robots
 from seastar_gym.envs.scenery import NOTHING, Scenery
-from seastar_gym.envs.swimming import Swimming
 from seastar_gym.scene.currents import AnyCurrent
 from seastar_gym.scene.per_robot import chosen
 from seastar_gym.simulator import Simulator
@@ -54,25 +54,21 @@ def body_of(simulator: Simulator) -> tuple[FloatArray | None, FloatArray | None]
     return simulator.root_positions(), simulator.hub_position()[:, None] + outline
 
 
-def frames_of(task: Swimming, commands: FloatArray, trails: Mapping[int, FloatArray]) -> Iterator[Frame]:
-    """Frames of robots at present.
-
-    commands: Commands of all robots in this decision, shape (n_robots, n_limbs).
-    trails: As in `Frame`, by the numbers of the robots that are shown.
-    """
-    simulator = task.simulator
-    positions, time, wire_state = simulator.positions, simulator.time, task.wire_state()
+def frames_of(robots: Robots, trails: Mapping[int, FloatArray]) -> Iterator[Frame]:
+    """Frames of robots at present. trails: As in `Frame`, by the numbers of the robots that are shown."""
+    simulator = robots.simulator
+    positions, time, wire_state = simulator.positions, simulator.time, robots.wire_state()
     roots, outlines = body_of(simulator)
     fluid = simulator.scene.fluid
     for robot, trail in trails.items():
         yield Frame(
             positions=positions[robot],
-            command=commands[robot],
+            command=robots.last_commands[robot],
             trail=trail,
-            waypoint_index=int(task.waypoint_index[robot]),
+            waypoint_index=int(robots.waypoint_index[robot]),
             time=float(time[robot]),
             wire_state=None if wire_state is None else wire_state[robot],
-            scenery=task.scenery(robot),
+            scenery=robots.task.scenery(robots, robot),
             roots=None if roots is None else roots[robot],
             outline=None if outlines is None else outlines[robot],
             current=None if fluid is None else chosen(fluid.current, itemgetter(robot)),

@@ -54,9 +54,9 @@ class GoalForm(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         swim = env.unwrapped
         if not isinstance(swim, SeastarSwimEnv):
             raise ValueError(f"GoalForm needs an environment of waypoints, not {swim}: one of {', '.join(SERVED)}.")
-        if not swim._task.goals_are_waypoints:
+        if not swim.task.goals_are_waypoints:
             raise ValueError(f"In {swim} waypoints are not all that counts: GoalForm serves {', '.join(SERVED)}.")
-        if swim._task.options.sight is not None:
+        if swim.sight is not None:
             raise ValueError("GoalForm tells where the hub is, which no camera knows: leave out sight.")
         for layer in _layers(env):
             if isinstance(layer, gym.ObservationWrapper | SymmetryReduction):
@@ -92,15 +92,20 @@ class GoalForm(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         if achieved.shape != desired.shape or achieved.shape[-1:] != shape:
             raise ValueError(f"Goals must have one shape (..., {shape[0]}), not {achieved.shape} and {desired.shape}.")
         away = achieved - desired
-        reached = np.hypot(away[..., 0], away[..., 1]) <= self._swim._task.radius_of(0) / self._length
+        reached = (
+            np.hypot(away[..., 0], away[..., 1]) <= self._swim.task.radius_of(self._swim._robots, 0) / self._length
+        )
         if self._swim.headings is not None:
             now, asked = (np.arctan2(goals[..., 3], goals[..., 2]) for goals in (achieved, desired))
             reached &= np.abs(wrapped(asked - now)) <= self._swim.headings.tolerance
         return np.where(reached, 0.0, -1.0)
 
     def _observed(self, seen: NDArray[np.float32], info: dict[str, Any]) -> GoalObservation:
-        task = self._swim._task
-        waypoints, headings, heading = self._swim.waypoints, task.headings_of(0), heading_of(self._swim.simulator)[0]
+        waypoints, headings, heading = (
+            self._swim.waypoints,
+            self._swim.task.headings_of(self._swim._robots, 0),
+            heading_of(self._swim.simulator)[0],
+        )
         k, direction = min(info["waypoint_index"], len(waypoints) - 1), _direction(heading)
         achieved, self._goal = info["hub_position"] / self._length, waypoints[k] / self._length
         if headings is not None:

@@ -2,87 +2,56 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path as FilePath
-from typing import Any, TypeVar
-
-import numpy as np
-from numpy.typing import ArrayLike
+from typing import Any
 
 from seastar_gym.accuracy.certificate import Certificate
-from seastar_gym.envs.commands import Actions, unless_strokes
-from seastar_gym.envs.headings import HeadingTargets
-from seastar_gym.envs.paths import FARTHEST, WAYPOINT_RADIUS, make_path
+from seastar_gym.envs.commands import Actions, checked_decision_period
 from seastar_gym.envs.randomization import ACTION_DELAY, DomainRandomization
-from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.sight import Drawn, Sight, require_action_delay
 from seastar_gym.scene import Scene, SmaWires
-from seastar_gym.scene.checks import as_float, require_flag, require_kind, require_number, shown
+from seastar_gym.scene.checks import as_float, require_flag, require_kind, shown
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene
 from seastar_gym.scene.serial import read
 
-Path = str | ArrayLike
-"""Path by its name, or waypoints [m], shape (n, 2)."""
 Plain = Mapping[str, Any]
 """Part of a scene, or of the task, as plain data, see `seastar_gym.scene.serial`."""
-
-Init = TypeVar("Init", bound=Callable[..., None])
 
 
 @dataclass(frozen=True)
 class SwimOptions:
-    """Arguments of the environments, but for pictures; `SeastarSwimEnv` documents them.
+    """Arguments of the environments, but for those of the task and of pictures; `SeastarSwimEnv` documents them.
 
-    `scene`, `reward`, `randomization`, `headings`, `sight` and a distribution as `action_delay` may be given as plain
-    data, and are parts then.
+    `scene`, `randomization`, `sight` and a distribution as `action_delay` may be given as plain data, and are parts
+    then.
     """
 
-    path: Path = "pentagon"
     actions: Actions = "limbs"
     fidelity: Fidelity | None = None
     scene: Scene | None = None
-    reward: RewardWeights = RewardWeights()
-    waypoint_radius: float = WAYPOINT_RADIUS
-    random_heading: bool = False
     randomization: DomainRandomization | None = None
     certificate: Certificate | str | PathLike[str] | None = None
     error_bars: bool = False
     decision_period: float | None = None
     observe_actuators: bool = True
-    headings: HeadingTargets | None = None
     device: str = "cpu"
     sight: Sight | None = None
     action_delay: Drawn = 0.0
 
     def __post_init__(self) -> None:
-        parts = {
-            "scene": Scene, "reward": RewardWeights, "randomization": DomainRandomization, "headings": HeadingTargets,
-            "sight": Sight, "action_delay": object,
-        }  # fmt: skip
-        for name, kind in parts.items():
+        kinds = {"scene": Scene, "randomization": DomainRandomization, "sight": Sight, "action_delay": object}
+        for name, kind in kinds.items():
             object.__setattr__(self, name, read(getattr(self, name), kind))
-        object.__setattr__(self, "waypoint_radius", as_float(self.waypoint_radius))
         require_kind("scene", self.scene, Scene | None, "a Scene")
-        require_kind("reward", self.reward, RewardWeights, "RewardWeights")
         require_kind("randomization", self.randomization, DomainRandomization | None, "a DomainRandomization or None")
-        require_kind("headings", self.headings, HeadingTargets | None, "HeadingTargets or None")
         require_kind("sight", self.sight, Sight | None, "a Sight or None")
         object.__setattr__(self, "action_delay", as_float(self.action_delay))
         self._check_late()
-        require_flag("random_heading", self.random_heading)
         require_flag("observe_actuators", self.observe_actuators)
-        require_number("waypoint_radius", self.waypoint_radius, "m")
-        if self.waypoint_radius > FARTHEST:
-            raise ValueError(f"waypoint_radius must be at most {FARTHEST:g} m, not {shown(self.waypoint_radius)}.")
-        waypoints = make_path(self.path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
-        if not isinstance(self.path, str):
-            object.__setattr__(self, "path", waypoints)
-        if self.headings is not None:
-            self.headings.of_path(waypoints, np.random.default_rng(0))  # likewise
 
     def _check_late(self) -> None:
         """Refuse distributions of what there is not, or beyond what it may be."""
@@ -109,19 +78,14 @@ class SwimOptions:
         return make_scene(self.scene, self.fidelity, self.decision_period)
 
     @property
+    def period(self) -> float:
+        """Time between decisions [s]: that of the actuator if none is given. ValueError for one that it cannot take."""
+        return checked_decision_period(self.decision_period, self.modelled)
+
+    @property
     def fidelity_of_scene(self) -> Fidelity | None:
         """Fidelity that is asked for of a scene; None without a scene."""
         return None if self.scene is None else self.fidelity
-
-
-def with_options(init: Init) -> Init:
-    """Decorator of an `__init__` with `*given` and `**options`, whose signature names all options in their place."""
-    shared = list(inspect.signature(SwimOptions).parameters.values())
-    own = [one for one in inspect.signature(init).parameters.values() if one.name != "options"]
-    at = next(k for k, one in enumerate(own) if one.kind is one.VAR_POSITIONAL)
-    later = [one.replace(kind=one.KEYWORD_ONLY) for one in own[at + 1 :]]
-    init.__signature__ = inspect.Signature([*own[:at], *shared, *later])  # type: ignore[attr-defined]
-    return init
 
 
 def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None, decision_period: float | None = None) -> Scene:
@@ -133,7 +97,7 @@ def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None, decision_
     """
     if scene is None:
         chapters = Scene().at(fidelity)
-        in_strokes = unless_strokes(decision_period, chapters) is None
+        in_strokes = decision_period in (None, chapters.actuator.period)
         return chapters if in_strokes else replace(chapters, actuator=SmaWires())
     scene = read(scene, Scene)
     require_kind("scene", scene, Scene, "a Scene")

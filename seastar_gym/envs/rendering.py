@@ -1,23 +1,64 @@
-"""Pictures of a swim: the robot on its path, as arrays or in a window.
+"""Pictures of swims: robots on their paths, as arrays or in a window.
 
 Lengths are in metres, y is up; pixels count from the upper left corner, y down.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.envs.camera import Camera
-from seastar_gym.envs.canvas import INK, WATER, Canvas, Colour, mixed
-from seastar_gym.envs.frame import Frame
+from seastar_gym.envs.canvas import INK, WATER, Camera, Canvas, Colour, Window, mixed
+from seastar_gym.envs.frame import Frame, frames_of
+from seastar_gym.envs.robots import Robots
 from seastar_gym.envs.scenery import NOTHING, Flow, Scenery, flow_of
-from seastar_gym.envs.waypoint_labels import waypoint_labels
-from seastar_gym.envs.window import Window
 from seastar_gym.scene import Seastar
 from seastar_gym.scene.currents import AnyCurrent
 
 FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Label:
+    """Label of a waypoint, or of several at one place, and where there is room to write it."""
+
+    indices: tuple[int, ...]
+    """Waypoints at this place, counted from 0."""
+    place: FloatArray
+    """Position [m], shape (2,)."""
+    direction: FloatArray
+    """Unit vector, y up, to the middle of the widest sector that is free of the path."""
+
+
+def waypoint_labels(path: FloatArray) -> list[Label]:
+    """Labels of the waypoints of a path [m], shape (n + 1, 2), that begins with its start."""
+    same_place = 1e-9 + 1e-6 * float(np.ptp(path, axis=0).max())
+    labels, labelled = [], set()
+    for waypoint in range(1, len(path)):
+        if waypoint in labelled:
+            continue
+        together = np.flatnonzero(np.hypot(*(path - path[waypoint]).T) <= same_place)
+        labelled.update(together.tolist())
+        neighbours = path[[n for node in together for n in (node - 1, node + 1) if 0 <= n < len(path)]]
+        direction = _widest_free_direction(neighbours - path[waypoint])
+        labels.append(Label(tuple(int(node) - 1 for node in together if node > 0), path[waypoint], direction))
+    return labels
+
+
+def _widest_free_direction(legs: FloatArray) -> FloatArray:
+    """Unit vector to the middle of the widest sector between legs, shape (n, 2)."""
+    angles = np.sort(np.arctan2(legs[:, 1], legs[:, 0]))
+    sectors = np.diff(np.append(angles, angles[0] + 2.0 * np.pi))
+    # Sectors that differ only by rounding count as equal.
+    widest = int(np.argmax(np.round(sectors, 6)))
+    middle = angles[widest] + 0.5 * sectors[widest]
+    return np.array([np.cos(middle), np.sin(middle)])
+
 
 FAINT_INK: Colour = (128, 136, 148)
 LIMB: Colour = (70, 77, 88)
@@ -391,3 +432,85 @@ def _warm_colour(wire_state: FloatArray) -> Colour:
 
 def _sign(command: float) -> str:
     return "+" if command > 0.0 else "\u2212"
+
+
+Picture = NDArray[np.uint8]
+
+SHEET_WIDTH = 1920
+"""Width [px] of a sheet of pictures side by side, as long as they are no smaller than SMALLEST."""
+
+
+def picture_size(n_pictures: int) -> tuple[int, int]:
+    """Width and height [px] of each of `n_pictures` pictures, for a sheet that can still be looked at."""
+    width = min(LARGEST[0], max(SMALLEST[0], SHEET_WIDTH // math.ceil(math.sqrt(n_pictures))))
+    width -= width % 4  # videos need even numbers
+    return width, width * 3 // 4
+
+
+class BatchPictures:
+    """Trails and views of all robots, drawn one after the other by one renderer when they are asked for."""
+
+    def __init__(self, robots: Robots):
+        self._robots = robots
+        self._trails: list[list[NDArray[np.float64]]] = [[] for _ in range(robots.n_robots)]
+        self._cameras: dict[int, Camera] = {}
+        self._renderer: Renderer | None = None
+        self._shown: int | None = None
+        """Robot whose path and view the renderer has."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_renderer": None, "_shown": None}
+
+    def begin(self, begun: NDArray[np.bool_]) -> None:
+        """Forget the trails and views of the robots in a mask, shape (n_robots,): they begin an episode."""
+        hub = self._robots.simulator.hub_position()
+        for robot in np.flatnonzero(begun).tolist():
+            self._trails[robot] = [hub[robot]]
+            self._cameras.pop(robot, None)
+        self._shown = None
+
+    def follow(self) -> None:
+        """Extend all trails to the present positions of the hubs."""
+        for trail, hub in zip(self._trails, self._robots.simulator.hub_position(), strict=True):
+            trail.append(hub)
+
+    def frames(self, wanted: Iterable[int]) -> list[Frame]:
+        """What pictures of the robots of these numbers show now."""
+        trails = {robot: np.array(self._trails[robot]).reshape(-1, 2) for robot in wanted}
+        return list(frames_of(self._robots, trails))
+
+    def draw(self, wanted: Iterable[int]) -> tuple[Picture, ...]:
+        """Pictures of the robots of these numbers, shape (height, width, 3) each."""
+        numbers = list(wanted)
+        frames = dict(zip(dict.fromkeys(numbers), self.frames(numbers), strict=True))
+        return tuple(self._draw(robot, frames[robot]) for robot in numbers)
+
+    def _draw(self, robot: int, frame: Frame) -> Picture:
+        picture = self.renderer_of(robot).draw(frame)
+        self._cameras[robot] = self.renderer_of(robot).camera
+        return picture
+
+    def show(self, fps: float) -> None:
+        """Show the picture of robot 0 in a window, no faster than `fps` pictures per second."""
+        self.renderer_of(0).show(self.frames([0])[0], fps=fps)
+        self._cameras[0] = self.renderer_of(0).camera
+
+    def renderer_of(self, robot: int) -> Renderer:
+        """The renderer, with the path and the view of a robot."""
+        if self._renderer is not None and self._shown == robot:
+            return self._renderer
+        robots, task = self._robots, self._robots.task
+        body, waypoints = robots.simulator.scene.of_robot(robot).robot, task.waypoints_of(robots, robot)
+        headings, radius = task.headings_of(robots, robot), task.radius_of(robots, robot)
+        if self._renderer is None:
+            self._renderer = Renderer(body, waypoints, radius, picture_size(robots.n_robots))
+        self._renderer.reset(waypoints, body, headings, radius)
+        self._renderer.camera = self._cameras.get(robot, self._renderer.camera)
+        self._shown = robot
+        return self._renderer
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = self._shown = None

@@ -1,4 +1,4 @@
-"""`SeastarSwim-v0`: the environment of one robot. Its docstring is the contract that users read."""
+"""`SeastarSwim-v0`: the environment of one robot, robot 0 of a batch of one. Its docstring is what users read."""
 
 from collections import deque
 from functools import cache
@@ -7,24 +7,28 @@ from weakref import WeakSet
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from seastar_gym.accuracy.info import warn_uncertified
-from seastar_gym.envs.commands import to_commands, unless_strokes
-from seastar_gym.envs.frame import Frame, frames_of
-from seastar_gym.envs.masks import sampling_mask
-from seastar_gym.envs.options import SwimOptions, with_options
-from seastar_gym.envs.rendering import Renderer
-from seastar_gym.envs.swimming import Outcome, Swimming
-from seastar_gym.envs.task import SwimTask
-from seastar_gym.envs.task_env import TaskEnv, arguments_of, checked_options
-from seastar_gym.scene.checks import require_choice, require_count, require_seed
-from seastar_gym.simulator.pauses import completed
+from seastar_gym.accuracy.certificate import Certificate
+from seastar_gym.envs import IDS
+from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
+from seastar_gym.envs.commands import Actions, sampling_mask
+from seastar_gym.envs.frame import Frame
+from seastar_gym.envs.headings import HeadingTargets
+from seastar_gym.envs.options import Plain, SwimOptions
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
+from seastar_gym.envs.randomization import DomainRandomization
+from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.robots import Robots, Split, Task
+from seastar_gym.envs.sight import Drawn, Sight
+from seastar_gym.envs.tasks import chosen_task
+from seastar_gym.envs.vector import FRAMES_PER_SECOND, ManyRobotsEnv, warn_of_errors
+from seastar_gym.envs.waypoints import Path
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_choice, require_seed
+from seastar_gym.scene.numerics import Fidelity
 
-FRAMES_PER_SECOND = 10
-"""Pictures per second of simulated time, unless another number is asked for."""
-MOST_ASKED_FRAMES = 1_000_000
-"""Largest number of pictures of a decision."""
 MOST_FRAMES = 100
 """Largest number of pictures that wait for `render`, or those of one decision if they are more; 2 MB each."""
 ROUNDING = 1e-9
@@ -36,7 +40,108 @@ Observation = NDArray[np.float32]
 RenderMode = Literal["human", "rgb_array", "rgb_array_list"]
 
 
-class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
+class OneRobotEnv(RobotsEnv, gym.Env[Observation, Any]):
+    """Environment of one robot that is there already; `SeastarSwimEnv` documents all of it."""
+
+    metadata = {"render_modes": ["human", "rgb_array", "rgb_array_list"], "render_fps": FRAMES_PER_SECOND}
+
+    def __init__(self, robots: Robots, render_mode: RenderMode | None = None, frames_per_stroke: int | None = None):
+        if render_mode is not None:
+            require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
+        self.render_mode = render_mode
+        self._batch = ManyRobotsEnv(robots, None, AutoresetMode.DISABLED, render_mode, frames_per_stroke)
+        self.action_space, self.observation_space = self._take(robots)
+        self.frames_per_stroke = self._batch.frames_per_stroke
+        self.metadata = {**self.metadata, "render_fps": self._batch.metadata["render_fps"]}
+        self._frames: deque[NDArray[np.uint8]] = deque(maxlen=max(MOST_FRAMES, self.frames_per_stroke + 1))
+        self._is_made = True
+        _open.add(self)
+        if len(_open) >= MANY:
+            _tell_of_batches()
+
+    @property
+    def waypoints(self) -> NDArray[np.float64]:
+        """Waypoints of the current episode [m], shape (n, 2)."""
+        return self._batch.waypoints[0]
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode; returns its first observation and info.
+
+        seed: Seed of paths, headings and drawn numbers. options: {"path": name or waypoints [m]} for this episode, or
+        for tasks {"instance": number of the episode}.
+        """
+        require_seed(seed)
+        super().reset(seed=None if seed is None else int(seed))
+        asked = checked_options(options, {self.task.option}).get(self.task.option)
+        self._batch.np_random = (self.np_random,)
+        self._batch.begin(np.ones(1, bool), asked)
+        self._frames.clear()
+        self._draw_now()
+        return self._robots.observe()[0], _of_one_robot(self._robots.first_info())
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Swim for one decision; returns observation, reward, terminated, truncated and info."""
+        if not self._batch.is_running or self._batch.needs_reset[0]:
+            raise gym.error.ResetNeeded(
+                "The episode has not begun, is over or was interrupted: call reset() before step()."
+            )
+        actions = action[None] if isinstance(action, np.ndarray) else [action]
+        look = None if self.render_mode in (None, "rgb_array") else self._look
+        (seen, reward, terminated, _), info, *_ = self._batch.advance(actions, look, self.frames_per_stroke)
+        self._draw_now()
+        return seen[0], reward.item(), terminated.item(), False, _of_one_robot(info)
+
+    def _look(self, time_in_decision: float) -> None:
+        if time_in_decision < self.decision_period * (1.0 - ROUNDING):
+            self._draw_now()  # the end is drawn once it is known whether a waypoint was reached
+
+    def _draw_now(self) -> None:
+        if self.render_mode in ("human", "rgb_array_list"):
+            self.draw_frame()
+
+    def frame(self) -> Frame:
+        """What a picture shows now."""
+        return self._batch.pictures.frames([0])[0]
+
+    def draw_frame(self) -> None:
+        """Draw a picture of now, into the window or for `render`: at a reset, and at the ends of parts of decisions."""
+        pictures = self._batch.pictures
+        if self.render_mode == "human":
+            pictures.show(self.metadata["render_fps"])
+            return
+        if len(self._frames) == self._frames.maxlen:
+            gym.logger.warn(f"Nobody calls render(): of its pictures, the last {len(self._frames)} are kept.")
+        self._frames.append(pictures.draw([0])[0])
+
+    def render(self) -> NDArray[np.uint8] | list[NDArray[np.uint8]] | None:  # type: ignore[override]
+        """Picture, shape (720, 960, 3); "rgb_array_list": the last MOST_FRAMES since the last call; "human": None."""
+        if self.render_mode is None:
+            gym.logger.warn('render() without a render_mode draws nothing: make the environment with "rgb_array".')
+            return None
+        if self.render_mode == "rgb_array":
+            return self._batch.pictures.draw([0])[0]
+        frames = list(self._frames)
+        self._frames.clear()
+        return frames if self.render_mode == "rgb_array_list" else None
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Actions that the wires can follow now, shape (k,), see the table of masks."""
+        return self._robots.action_masks()[0]
+
+    def sampling_mask(self) -> Any:
+        """`action_masks` in the form that `action_space.sample(mask=...)` takes, see `seastar_gym.envs.commands`."""
+        return sampling_mask(self.action_space, self.action_masks())
+
+    def close(self) -> None:
+        """Close the window, if there is one, and end the simulator's threads."""
+        _open.discard(self)
+        self.simulator.close()
+        self._batch.pictures.close()
+
+
+class SeastarSwimEnv(OneRobotEnv):
     """Environment of a five-limb soft robot that swims along waypoints, driven by shape memory alloy (SMA) actuators.
 
     The robot lies in a plane, and all its limbs meet in the hub. Limbs, nodes and angles are numbered and measured
@@ -63,18 +168,22 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
 
     ## Time between decisions
     `decision_period` is the time of a step. Decisions within a stroke need actuators that remember what is under way:
-    wires, one for each direction of every limb, that cool while others are heated. The registered settings are
+    wires, one for each direction of every limb, that cool while others are heated. The registered ids are
 
-    | id                            | decision period [s] | `actions`      | time limit [s] | decisions | actuator   |
-    |-------------------------------|---------------------|----------------|----------------|-----------|------------|
-    | `SeastarSwim-v0`              | 1.0                 | `"limbs"`      | 400            | 400       | `SmaPulse` |
-    | `SeastarSwimContinuous-v0`    | 1.0                 | `"continuous"` | 400            | 400       | `SmaPulse` |
-    | `SeastarSwimTimed-v0`         | 0.5                 | `"pairs"`      | 200            | 400       | `SmaWires` |
-    | `SeastarSwimTimedModerate-v0` | 0.2                 | `"pairs"`      | 200            | 1000      | `SmaWires` |
-    | `SeastarSwimTimedHard-v0`     | 0.1                 | `"pairs"`      | 200            | 2000      | `SmaWires` |
-    | `SeastarSwimHeading-v0`       | 0.5                 | `"pairs"`      | 300            | 600       | `SmaWires` |
+    <ids>
 
-    `SeastarSwimHeading-v0` asks for headings, along the legs of the path.
+    `SeastarSwimHeading-v0` asks for headings, along the legs of the path. The threshold is `reward_threshold` of the
+    spec: about the mean return of the best rule in docs/tasks.md that is not told what is hidden; for `Station`, a
+    little more. `Prizes` ends by itself a decision before its time limit.
+
+    ## Tasks
+    With a `task`, the robot swims for something else than the waypoints of a `path`. What a task asks for, observes and
+    rewards stands in its docstring: `Miswired`, `Prey`, `Station`, `FailBlind`, `ObstTrap`, `Prizes`, `SimToReal`.
+    Actions, masks and everything else are as described here, and pictures show what the robot is not told.
+
+    An episode of a task is a number, and what is drawn for it follows from its split and its number alone. A reset
+    draws the number, from two billion in the split "train", from a thousand in "test". `info["instance"]` tells it, and
+    `reset(options={"instance": number})` swims a certain one. The splits share no episode.
 
     ## Headings
     With `headings`, a waypoint is reached when the hub is within its radius and the robot's heading is within
@@ -251,6 +360,9 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     sight: Camera through which robots are seen, a `Sight`. None means that all nodes are seen, without delay.
     action_delay: Time from a decision to the heating [s], or a distribution of it, drawn at the start of every episode
         and rounded up to 0.01 s. Actuators other than wires need a multiple of the decision period.
+    task: Name of a task, or a task with numbers of your own, as an object or in plain form; `path`, `reward`,
+        `waypoint_radius`, `random_heading` and `headings` are then its own. None means waypoints.
+    split: Which episodes of a task are drawn: "train" or "test".
     render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
         `frames_per_stroke` pictures of every decision since the last call, the last 100 at most or those of one
         decision. "human": a window shows as many; without a display, a warning says so. `metadata["render_fps"]` is
@@ -265,148 +377,62 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     so `gym.make(EnvSpec.from_json(env.spec.to_json()))` is the same environment.
     """
 
-    metadata = {"render_modes": ["human", "rgb_array", "rgb_array_list"], "render_fps": FRAMES_PER_SECOND}
-
-    @with_options
     def __init__(
-        self, *given: Any, render_mode: RenderMode | None = None, frames_per_stroke: int | None = None, **options: Any
+        self,
+        path: Path = "pentagon",
+        actions: Actions = "limbs",
+        fidelity: Fidelity | None = None,
+        scene: Scene | Plain | None = None,
+        reward: RewardWeights | Plain = RewardWeights(),
+        waypoint_radius: float = WAYPOINT_RADIUS,
+        random_heading: bool = False,
+        randomization: DomainRandomization | Plain | None = None,
+        certificate: Certificate | str | None = None,
+        error_bars: bool = False,
+        decision_period: float | None = None,
+        observe_actuators: bool = True,
+        headings: HeadingTargets | Plain | None = None,
+        device: str = "cpu",
+        sight: Sight | Plain | None = None,
+        action_delay: Drawn | Plain = 0.0,
+        task: Task | Plain | str | None = None,
+        split: Split = "train",
+        *,
+        render_mode: RenderMode | None = None,
+        frames_per_stroke: int | None = None,
     ):
-        self._set_pictures(render_mode, frames_per_stroke)
-        task = SwimTask(SwimOptions(*given, **options), 1, 1)
-        timed = unless_strokes(task.options.decision_period, task.scene)
-        warn_uncertified(task.scene, task.options.fidelity_of_scene, task.certificate, timed)
-        self._begin_with(task, frames_per_stroke)
+        robots = Robots(
+            chosen_task(
+                task, path=path, reward=reward, waypoint_radius=waypoint_radius, random_heading=random_heading,
+                headings=headings,
+            ),
+            SwimOptions(
+                actions, fidelity, scene, randomization, certificate, error_bars, decision_period,  # type: ignore[arg-type]
+                observe_actuators, device, sight, action_delay,  # type: ignore[arg-type]  # plain data, too
+            ),
+            1, 1, split=split,
+        )  # fmt: skip
+        warn_of_errors(robots)
+        super().__init__(robots, render_mode, frames_per_stroke)
 
     _arguments = arguments_of(__init__)
 
-    def _set_pictures(self, render_mode: RenderMode | None, frames_per_stroke: int | None) -> None:
-        if render_mode is not None:
-            require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
-        if frames_per_stroke is not None:
-            require_count("frames_per_stroke", frames_per_stroke, 1, MOST_ASKED_FRAMES)
-        self.render_mode = render_mode
 
-    def _begin_with(self, task: Swimming, frames_per_stroke: int | None) -> None:
-        self.action_space, self.observation_space = self._set_task(task)
-        self.frames_per_stroke = frames_of_a_decision(task) if frames_per_stroke is None else frames_per_stroke
-        fps = render_fps(task, self.render_mode, self.frames_per_stroke)
-        self.metadata = {**self.metadata, "render_fps": fps}
-        self._command = np.zeros(self.scene.robot.n_limbs)
-        self._trail = np.zeros((0, 2))
-        self._frames: deque[NDArray[np.uint8]] = deque(maxlen=max(MOST_FRAMES, self.frames_per_stroke + 1))
-        self._renderer: Renderer | None = None
-        self._is_made = True
-        _open.add(self)
-        if len(_open) >= MANY:
-            _tell_of_batches()
+def table_of_ids() -> str:
+    """Table of the registered ids, see `seastar_gym.envs.IDS`."""
+    head = "id", "`task`", "decision period [s]", "`actions`", "time limit [s]", "decisions", "threshold"
+    rows = [
+        (f"`{id}`", f'`"{row.task}"`' if row.task else "-", f"{row.decision_period}", f'`"{row.actions}"`',
+         f"{row.seconds:g}", f"{row.decisions}", "-" if row.threshold is None else f"{row.threshold:g}")
+        for id, row in IDS.items()
+    ]  # fmt: skip
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    cells = [[cell.ljust(width) for cell, width in zip(row, widths, strict=True)] for row in (head, *rows)]
+    first, *others = [f"| {' | '.join(row)} |" for row in cells]
+    return "\n    ".join([first, f"|{'|'.join('-' * (width + 2) for width in widths)}|", *others])
 
-    @property
-    def waypoints(self) -> NDArray[np.float64]:
-        """Waypoints of the current episode [m], shape (n, 2)."""
-        return self._task.waypoints_of(0)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Begin an episode; returns its first observation and info.
-
-        seed: Seed of paths, headings and drawn numbers. options: {"path": name or waypoints [m]} for this episode.
-        """
-        require_seed(seed)
-        super().reset(seed=None if seed is None else int(seed))
-        asked = checked_options(options, {self._option}).get(self._option)
-        self._to_the_end(self._task.reset, np.ones(1, bool), [self.np_random], asked)
-        self._command = np.zeros_like(self._command)
-        self._trail = self.simulator.hub_position()
-        self._frames.clear()
-        if self._renderer is not None:
-            robot = self.simulator.scene.of_robot(0).robot
-            self._renderer.reset(self.waypoints, robot, self._task.headings_of(0), self._task.radius_of(0))
-        self._draw_frame()
-        return self._task.observe()[0], _of_one_robot(self._task.first_info())
-
-    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Swim for one decision; returns observation, reward, terminated, truncated and info."""
-        if not self._running:
-            raise gym.error.ResetNeeded(
-                "The episode has not begun, is over or was interrupted: call reset() before step()."
-            )
-        actions = action[None] if isinstance(action, np.ndarray) else [action]
-        command = to_commands(self.actions, self.scene.robot.n_limbs, actions, 1)
-        self._command = self._task.followed(command)[0]
-        outcome = self._to_the_end(self._swim, command)
-        terminated = outcome.terminated.item()
-        self._running = not terminated
-        return self._task.observe()[0], outcome.reward.item(), terminated, False, _of_one_robot(outcome.info)
-
-    def _swim(self, command: NDArray[np.float64]) -> Outcome:
-        if self.render_mode in (None, "rgb_array"):
-            outcome = self._task.step(command)
-            self._extend_trail()
-            return outcome
-        before_the_end = self.decision_period * (1.0 - ROUNDING)
-
-        def draw(time_in_decision: float) -> None:
-            self._extend_trail()
-            if time_in_decision < before_the_end:
-                self._draw_frame()
-
-        outcome = completed(self._task.step_in_parts(command, self.frames_per_stroke), draw)
-        self._draw_frame()  # now that it is known whether a waypoint was reached
-        return outcome
-
-    def _extend_trail(self) -> None:
-        if self.render_mode is not None:
-            self._trail = np.concatenate([self._trail, self.simulator.hub_position()])
-
-    def _frame(self) -> Frame:
-        (frame,) = frames_of(self._task, self._command[None], {0: self._trail})
-        return frame
-
-    def _draw_frame(self) -> None:
-        if self.render_mode == "human":
-            self._get_renderer().show(self._frame(), fps=self.metadata["render_fps"])
-        elif self.render_mode == "rgb_array_list":
-            if len(self._frames) == self._frames.maxlen:
-                gym.logger.warn(f"Nobody calls render(): of its pictures, the last {len(self._frames)} are kept.")
-            self._frames.append(self._get_renderer().draw(self._frame()))
-
-    def _get_renderer(self) -> Renderer:
-        if self._renderer is None:
-            robot = self.simulator.scene.of_robot(0).robot
-            radius, headings = self._task.radius_of(0), self._task.headings_of(0)
-            self._renderer = Renderer(robot, self.waypoints, radius, headings=headings)
-        return self._renderer
-
-    def render(self) -> NDArray[np.uint8] | list[NDArray[np.uint8]] | None:  # type: ignore[override]
-        """Picture, shape (720, 960, 3); "rgb_array_list": the last MOST_FRAMES since the last call; "human": None."""
-        if self.render_mode is None:
-            gym.logger.warn('render() without a render_mode draws nothing: make the environment with "rgb_array".')
-            return None
-        if self.render_mode == "rgb_array":
-            return self._get_renderer().draw(self._frame())
-        frames = list(self._frames)
-        self._frames.clear()
-        return frames if self.render_mode == "rgb_array_list" else None
-
-    def action_masks(self) -> NDArray[np.bool_]:
-        """Actions that the wires can follow now, shape (k,), see the table of masks."""
-        return self._task.action_masks()[0]
-
-    def sampling_mask(self) -> Any:
-        """`action_masks` in the form that `action_space.sample(mask=...)` takes, see `seastar_gym.envs.masks`."""
-        return sampling_mask(self.action_space, self.action_masks())
-
-    def close(self) -> None:
-        """Close the window, if there is one, and end the simulator's threads."""
-        _open.discard(self)
-        self.simulator.close()
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_renderer": None}
+SeastarSwimEnv.__doc__ = str(SeastarSwimEnv.__doc__).replace("<ids>", table_of_ids())
 
 
 @cache
@@ -417,17 +443,6 @@ def _tell_of_batches() -> None:
         'num_envs=128, vectorization_mode="vector_entry_point") steps 128 robots in one compiled call, which '
         "seastar_gym.adapters.stable_baselines3.BatchVecEnv hands to Stable-Baselines3."
     )
-
-
-def frames_of_a_decision(task: Swimming) -> int:
-    """Number of pictures of a decision, unless another one is asked for."""
-    return max(1, round(FRAMES_PER_SECOND * task.decision_period))
-
-
-def render_fps(task: Swimming, render_mode: str | None, frames_per_stroke: int) -> float:
-    """Pictures that `render` returns per second of simulated time: with "rgb_array" one for each decision."""
-    fps = float((1 if render_mode == "rgb_array" else frames_per_stroke) / task.decision_period)
-    return int(fps) if fps.is_integer() else fps
 
 
 def _of_one_robot(info: dict[str, NDArray[Any]]) -> dict[str, Any]:

@@ -1,7 +1,10 @@
 """`SeastarSwim-v0` as a native batch: all robots in one simulator, with the bits of one environment each."""
 
-from collections.abc import Iterable, Sequence
-from typing import Any, Literal
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import getitem
+from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -10,29 +13,372 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.accuracy.info import warn_uncertified
-from seastar_gym.envs.batch_attributes import BatchAttributes
-from seastar_gym.envs.batch_info import Info, of_some, with_masks
-from seastar_gym.envs.batch_pictures import BatchPictures, Picture
-from seastar_gym.envs.buffers import Buffers, require_buffers
-from seastar_gym.envs.commands import as_array, to_commands, unless_strokes
-from seastar_gym.envs.masks import sampling_mask
-from seastar_gym.envs.options import SwimOptions, with_options
-from seastar_gym.envs.seastar_swim import FRAMES_PER_SECOND, MOST_ASKED_FRAMES, frames_of_a_decision, render_fps
-from seastar_gym.envs.swimming import Swimming
-from seastar_gym.envs.task import SwimTask
-from seastar_gym.envs.task_env import arguments_of, checked_options
-from seastar_gym.scene.checks import is_whole_number, require_choice, require_count, require_flag, require_seed, shown
+from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
+from seastar_gym.envs.commands import Actions, as_array, sampling_mask, to_commands
+from seastar_gym.envs.headings import HeadingTargets
+from seastar_gym.envs.options import Plain, SwimOptions
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
+from seastar_gym.envs.randomization import DomainRandomization
+from seastar_gym.envs.rendering import BatchPictures, Picture
+from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.robots import Robots, Split, Task
+from seastar_gym.envs.sight import Drawn, Sight
+from seastar_gym.envs.tasks import chosen_task
+from seastar_gym.envs.waypoints import Path
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import (
+    is_whole_number,
+    require_choice,
+    require_count,
+    require_flag,
+    require_kind,
+    require_seed,
+    shown,
+)
+from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.simulator.pauses import completed
 from seastar_gym.simulator.simulator import MAX_ROBOTS
+
+
+class Buffers(NamedTuple):
+    """Arrays of one step of a batch, such as rows of a learner's memory; none of them shares memory with another.
+
+    observations: Shape (num_envs, size). rewards, terminated, truncated: Shape (num_envs,), numbers and flags.
+    """
+
+    observations: NDArray[Any]
+    rewards: NDArray[Any]
+    terminated: NDArray[Any]
+    truncated: NDArray[Any]
+
+    def take(self, results: Buffers) -> None:
+        """Write the results of a step."""
+        for buffer, result in zip(self, results, strict=True):
+            buffer[...] = result
+
+
+def require_buffers(out: Buffers, n_robots: int, size: int) -> None:
+    """ValueError, with one sentence, for arrays that cannot take the results of so many robots."""
+    require_kind("out", out, Buffers, "Buffers")
+    shapes = {"observations": (n_robots, size)}
+    for name, buffer in out._asdict().items():
+        shape, kind = shapes.get(name, (n_robots,)), "f" if name in ("observations", "rewards") else "b"
+        fits = isinstance(buffer, np.ndarray) and buffer.shape == shape and buffer.dtype.kind == kind
+        if not fits or not buffer.flags.writeable:
+            what = "numbers" if kind == "f" else "flags"
+            raise ValueError(f"out.{name} must be a writeable array of {what} of shape {shape}.")
+
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
+Info = dict[str, Any]
+_P = ParamSpec("_P")
+Result = TypeVar("Result")
 
 LONGEST = 2**63 - 1
 """Largest time limit, which is none [decisions]."""
+FRAMES_PER_SECOND = 10
+"""Pictures per second of simulated time, unless another number is asked for."""
+MOST_ASKED_FRAMES = 1_000_000
+"""Largest number of pictures of a decision."""
+OF_EACH_ROBOT: Mapping[str, Callable[[Any, int], Any]] = {
+    **dict.fromkeys(("action_masks", "np_random", "np_random_seed", "render", "sampling_mask", "waypoints"), getitem),
+    "privileged_observations": lambda rows, robot: rows[robot : robot + 1],
+    "scene": Scene.of_robot,
+}
+"""What a robot has of its own of these attributes, and results of methods, of a batch; all others are common."""
+NOT_OF_A_ROBOT = ("reset", "step")
+"""Methods that robots of one simulator cannot be called alone for."""
 
 
-class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, Any, Any]):
+class Step(NamedTuple):
+    """What a decision of a batch gives: results, info of all robots, and which have begun an episode meanwhile.
+
+    final: Last observations and infos of episodes that are over, if the next ones have begun.
+    """
+
+    results: Buffers
+    info: dict[str, NDArray[Any]]
+    begun: Flags
+    final: Info
+
+
+class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
+    """Environment of robots that are there already, side by side; `SeastarSwimVectorEnv` documents all of it."""
+
+    on_device = False
+    metadata = {
+        "render_modes": ["rgb_array"], "render_fps": FRAMES_PER_SECOND, "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }  # fmt: skip
+    is_running = False
+    """Whether episodes have begun and were not interrupted."""
+
+    def __init__(
+        self,
+        robots: Robots,
+        max_episode_steps: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
+        frames_per_stroke: int | None = None,
+        on_device: bool = False,
+    ):
+        n_robots = robots.n_robots
+        self._limit_episodes(max_episode_steps)
+        self.autoreset_mode = _checked_mode(autoreset_mode)
+        self.num_envs, self.render_mode, self.on_device = n_robots, render_mode, on_device
+        self.frames_per_stroke = frames_of_a_decision(robots, frames_per_stroke)
+        fps = render_fps(robots, render_mode, self.frames_per_stroke)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode, "render_fps": fps}
+        self.single_action_space, self.single_observation_space = self._take(robots)
+        self.action_space = batch_space(self.single_action_space, n_robots)
+        self.observation_space = batch_space(self.single_observation_space, n_robots)
+        self._generators, self._seeds = map(list, zip(*(seeding.np_random(None) for _ in range(n_robots)), strict=True))
+        self.pictures = BatchPictures(robots)
+        self._own_attributes: dict[str, tuple[Any, ...]] = {}
+        self._elapsed, self._limits = np.zeros(n_robots, np.int64), np.full(n_robots, LONGEST)
+        self.needs_reset = np.ones(n_robots, bool)
+        self._is_made = True
+
+    def _limit_episodes(self, decisions: int | None) -> None:
+        if is_whole_number(decisions) and decisions == -1:
+            decisions = None
+        if decisions is not None:
+            require_count("max_episode_steps", decisions, 1, LONGEST)
+        object.__setattr__(self, "max_episode_steps", decisions)
+
+    @property
+    def waypoints(self) -> tuple[NDArray[np.float64], ...]:
+        """Waypoints [m] of the present episode of every robot, shape (n, 2) each."""
+        return tuple(self.task.waypoints_of(self._robots, robot) for robot in range(self.num_envs))
+
+    @property  # type: ignore[override]
+    def np_random(self) -> tuple[np.random.Generator, ...]:
+        """Random generator of every robot, which draws its paths, headings and numbers."""
+        return tuple(self._generators)
+
+    @np_random.setter  # type: ignore[override]
+    def np_random(self, generators: Iterable[np.random.Generator]) -> None:
+        self._generators, self._seeds = list(generators), [-1] * self.num_envs
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """Seed of the random generator of every robot, -1 where the generator was given."""
+        return tuple(self._seeds)
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, Info]:
+        """Begin episodes; returns their first observations and infos.
+
+        seed: Seed of robot 0, followed by those of the others, or a list with a seed for every robot. options: "path"
+        (name or waypoints [m]), or for tasks "instance" (number of an episode, or one for each robot), and
+        "reset_mask" (whether each robot begins an episode, shape (num_envs,)).
+        """
+        chosen = checked_options(options, {self.task.option, "reset_mask"})
+        mask = self._checked_mask(chosen.get("reset_mask"))
+        seeds = checked_seeds(seed, self.num_envs)
+        for robot in np.flatnonzero(mask):
+            if seeds[robot] is not None:
+                self._generators[robot], self._seeds[robot] = seeding.np_random(seeds[robot])
+        self.begin(mask, chosen.get(self.task.option))
+        first = self._robots.first_info()
+        return self._observe(), with_masks({name: of_some(values, mask) for name, values in first.items()}, mask)
+
+    def _checked_mask(self, mask: Any) -> Flags:
+        if mask is None:
+            return np.ones(self.num_envs, bool)
+        mask = as_array(mask)
+        if mask.dtype != bool or mask.shape != (self.num_envs,) or not mask.any():
+            raise ValueError(f"reset_mask must be boolean of shape ({self.num_envs},) with at least one True.")
+        if not self.is_running and not mask.all():
+            raise gym.error.ResetNeeded("The first reset must be of all robots: call reset() without a reset_mask.")
+        return mask
+
+    def begin(self, mask: Flags, asked: Any = None) -> None:
+        """Begin episodes of the robots in a mask, with their own generators. asked: What a reset asks for."""
+        self._to_the_end(self._begin_episodes, mask, asked)
+
+    def _begin_episodes(self, mask: Flags, asked: Any = None) -> None:
+        self._robots.reset(mask, self._generators, asked)
+        self._elapsed[mask], self._limits[mask] = 0, self.max_episode_steps or LONGEST
+        self.needs_reset[mask] = False
+        if self.render_mode is not None:
+            self.pictures.begin(mask)
+
+    def _to_the_end(self, change: Callable[_P, Result], *args: _P.args, **kwargs: _P.kwargs) -> Result:
+        """What a step or reset returns: after an interruption, robots and task disagree, and only a reset helps."""
+        was_running, self.is_running = self.is_running, False
+        try:
+            result = change(*args, **kwargs)
+        except ValueError:  # refused before anything changed
+            self.is_running = was_running
+            raise
+        self.is_running = True
+        return result
+
+    def step(
+        self, actions: Any, out: Buffers | None = None
+    ) -> tuple[Observations, NDArray[np.float64], Flags, Flags, Info]:
+        """Swim for one decision with every robot; returns observations, rewards, terminated, truncated and info.
+
+        out: Arrays that the results are written into, and that are returned then; by default fresh ones.
+        """
+        if out is not None and self.on_device:
+            raise ValueError("out takes observations of the processor: make the batch without on_device, or copy them.")
+        if out is not None:
+            require_buffers(out, self.num_envs, self.layout.size)
+        if not self.is_running:
+            raise gym.error.ResetNeeded("The episodes have not begun or were interrupted: call reset() before step().")
+        if self.autoreset_mode is AutoresetMode.DISABLED and self.needs_reset.any():
+            raise gym.error.ResetNeeded(
+                'Some episodes are over: call reset(options={"reset_mask": ...}) before step().'
+            )
+        results, values, begun, final = self.advance(actions)
+        info = with_masks(values, np.ones_like(begun)) | final
+        if begun.any():
+            for name, first in self._robots.first_info().items():
+                info[name][begun] = first[begun]
+        if out is None:
+            return *results, info
+        out.take(results)
+        return *out, info
+
+    def advance(self, actions: Any, look: Callable[[float], None] | None = None, parts: int = 1) -> Step:
+        """Swim for one decision, if need be in `parts` parts.
+
+        look: Called with the time since the decision [s] after every part, when pictures are asked for.
+        """
+        begun = self.needs_reset.copy()  # NEXT_STEP: these begin anew instead of swimming
+        commands = to_commands(self.actions, self.simulator.scene.robot.n_limbs, actions, self.num_envs)
+        commands[begun] = 0.0
+        self.closed = False
+        return self._to_the_end(self._advance, commands, begun, look, parts)
+
+    def _advance(
+        self, commands: NDArray[np.float64], begun: Flags, look: Callable[[float], None] | None, parts: int
+    ) -> Step:
+        if look is None:
+            outcome = self._robots.step(commands)
+            if self.render_mode is not None:
+                self.pictures.follow()
+        else:
+
+            def follow(time: float) -> None:
+                self.pictures.follow()
+                look(time)
+
+            outcome = completed(self._robots.step_in_parts(commands, parts), follow)
+        self._elapsed += 1
+        reward, terminated, truncated = outcome.reward, outcome.terminated, self._elapsed >= self._limits
+        if begun.any():
+            terminated, truncated = terminated & ~begun, truncated & ~begun
+            reward = np.where(begun, 0.0, reward)
+            self._begin_episodes(begun)
+        self.needs_reset, final = terminated | truncated, Info()
+        observations = self._observe()
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self.needs_reset.any():
+            begun = self.needs_reset.copy()
+            final = _final(observations, outcome.info, begun)
+            self._begin_episodes(begun)
+            observations = self._observe()
+        return Step(Buffers(observations, reward, terminated, truncated), outcome.info, begun, final)
+
+    def _observe(self) -> Observations:
+        """Observations: numpy's, or the device's if they are asked for."""
+        return self._robots.observe_on_device() if self.on_device else self._robots.observe()
+
+    def action_masks(self) -> Flags:
+        """Actions that every robot's wires can follow now, shape (num_envs, k), see `seastar_gym.envs.commands`."""
+        return self._robots.action_masks()
+
+    def sampling_mask(self) -> tuple[Any, ...]:
+        """`action_masks` in the form that `single_action_space.sample(mask=...)` takes, for every robot."""
+        return tuple(sampling_mask(self.single_action_space, mask) for mask in self.action_masks())
+
+    def close_extras(self, **ignored: Any) -> None:
+        """End the simulator's threads; a step after that starts them again.
+
+        ignored: Arguments of other batches, such as `terminate` and `timeout`: the threads are at rest.
+        """
+        self.simulator.close()
+
+    def render(self) -> tuple[Picture, ...] | None:
+        """Picture of every robot, shape (height, width, 3) each; None without a render_mode."""
+        return self.render_robots(range(self.num_envs))
+
+    def render_robots(self, robots: Iterable[int]) -> tuple[Picture, ...] | None:
+        """Pictures of the robots of these numbers, shape (height, width, 3) each; None without a render_mode."""
+        if self.render_mode is None:
+            gym.logger.warn('render() without a render_mode draws nothing: make the batch with "rgb_array".')
+            return None
+        if not self.is_running:
+            raise gym.error.ResetNeeded(
+                "The episodes have not begun or were interrupted: call reset() before render()."
+            )
+        return self.pictures.draw(robots)
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Attribute, or result of a method, of every robot."""
+        if name in NOT_OF_A_ROBOT:
+            raise ValueError(f"The robots share one simulator: use {name}() of the batch, not call({name!r}).")
+        if name == "get_wrapper_attr":
+            return self.call(*args)
+        if name in self._own_attributes:
+            values = self._own_attributes[name]
+            return tuple(value(*args, **kwargs) if callable(value) else value for value in values)
+        if name in self._robots.per_episode:
+            return tuple(self._argument(name, robot) for robot in range(self.num_envs))
+        if name in ("action_space", "observation_space"):
+            name = f"single_{name}"
+        value = getattr(self, name)
+        return robot_by_robot(name, value(*args, **kwargs) if callable(value) else value, self.num_envs)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Attribute of every robot."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute to a list or tuple with a value for every robot, or to one value for all.
+
+        Robots may differ in new attributes, in `np_random`, and in the arguments that hold from their next episodes on:
+        `path`, `random_heading`, `reward` and `waypoint_radius`. Another attribute that the batch has already is common
+        to all robots, and takes one value only; other arguments of the constructor are refused.
+        """
+        values = tuple(values) if isinstance(values, list | tuple) else (values,) * self.num_envs
+        if len(values) != self.num_envs:
+            raise ValueError(f"{name} must be one value or {self.num_envs} of them, not {len(values)}.")
+        if name == "np_random":
+            setattr(self, name, values)
+        elif name in self._robots.per_episode:
+            self._ask(name, values)
+        elif not hasattr(self, name):
+            self._own_attributes[name] = values
+        elif all(value is values[0] or np.all(value == values[0]) for value in values):
+            setattr(self, name, values[0])
+        else:
+            raise ValueError(f"The robots share one batch, so {name} must be the same for all of them.")
+
+    def has_wrapper_attr(self, name: str) -> bool:
+        """Whether robots have an attribute, as Gymnasium's environments tell."""
+        return name in self._own_attributes or hasattr(self, name)
+
+    def set_wrapper_attr(self, name: str, value: Any, *, force: bool = True) -> bool:
+        """Set an attribute of all robots; returns whether it is set. force: Also where there is none of the name."""
+        is_set = force or self.has_wrapper_attr(name)
+        if is_set:
+            self.set_attr(name, (value,) * self.num_envs)
+        return is_set
+
+    def _ask(self, name: str, values: Sequence[Any]) -> None:
+        if name == "max_episode_steps":
+            self._limit_episodes(values[0])
+        else:
+            super()._ask(name, values)
+
+
+class SeastarSwimVectorEnv(ManyRobotsEnv):
     """Environment of `num_envs` robots side by side; `SeastarSwimEnv` documents spaces, rewards, info and arguments.
 
     Robot i has the seed `seed + i` and is bit-identical to a `SeastarSwimEnv` with that seed and the same actions.
@@ -58,54 +404,43 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
     ## Memory
     Arrays that a step returns are new, and the environment keeps no reference to them, so a learner may keep them as
     they are. With `step(actions, out=Buffers(...))` observations, rewards and flags are written into the given arrays,
-    such as rows of a learner's memory, see `seastar_gym.envs.buffers`.
+    such as rows of a learner's memory, see `Buffers`.
 
     Whatever Gymnasium's `SyncVectorEnv` of `SeastarSwimEnv` takes and gives, this batch takes and gives, but that
     `call("reset")` and `call("step")` are refused. `call` and `get_attr` give what each robot has of its own (see
-    `OF_EACH_ROBOT` in `batch_attributes`) robot by robot; everything else is common to all robots.
+    `OF_EACH_ROBOT`) robot by robot; everything else is common to all robots.
     """
 
-    on_device = False
-    metadata = {
-        "render_modes": ["rgb_array"], "render_fps": FRAMES_PER_SECOND, "autoreset_mode": AutoresetMode.NEXT_STEP,
-    }  # fmt: skip
-
-    @with_options
     def __init__(
         self,
         num_envs: int = 1,
         max_episode_steps: int | None = None,
-        *given: Any,
+        path: Path = "pentagon",
+        actions: Actions = "limbs",
+        fidelity: Fidelity | None = None,
+        scene: Scene | Plain | None = None,
+        reward: RewardWeights | Plain = RewardWeights(),
+        waypoint_radius: float = WAYPOINT_RADIUS,
+        random_heading: bool = False,
+        randomization: DomainRandomization | Plain | None = None,
+        certificate: Certificate | str | None = None,
+        error_bars: bool = False,
+        decision_period: float | None = None,
+        observe_actuators: bool = True,
+        headings: HeadingTargets | Plain | None = None,
+        device: str = "cpu",
+        sight: Sight | Plain | None = None,
+        action_delay: Drawn | Plain = 0.0,
+        task: Task | Plain | str | None = None,
+        split: Split = "train",
+        *,
         render_mode: Literal["rgb_array"] | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
         on_device: bool = False,
         frames_per_stroke: int | None = None,
         disable_env_checker: bool | None = None,
-        **options: Any,
     ):
-        self._set_batch(
-            num_envs, max_episode_steps, render_mode, autoreset_mode, threads, frames_per_stroke, disable_env_checker
-        )
-        require_flag("on_device", on_device)
-        self.on_device = bool(on_device)
-        task = SwimTask(SwimOptions(*given, **options), num_envs, threads)
-        timed = unless_strokes(task.options.decision_period, task.scene)
-        warn_uncertified(task.scene, task.options.fidelity_of_scene, task.certificate, timed)
-        self._begin_with(task)
-
-    _arguments = arguments_of(__init__)
-
-    def _set_batch(
-        self,
-        num_envs: int,
-        max_episode_steps: int | None,
-        render_mode: Literal["rgb_array"] | None,
-        autoreset_mode: AutoresetMode | str,
-        threads: int | None = None,
-        frames_per_stroke: int | None = None,
-        disable_env_checker: bool | None = None,
-    ) -> None:
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
                 f'The batch draws with render_mode="rgb_array" only, not {shown(render_mode)}: '
@@ -114,197 +449,72 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         require_count("num_envs", num_envs, 1, MAX_ROBOTS)
         if disable_env_checker is not None:
             require_flag("disable_env_checker", disable_env_checker)
-        if frames_per_stroke is not None:
-            require_count("frames_per_stroke", frames_per_stroke, 1, MOST_ASKED_FRAMES)
-        self.num_envs, self.threads = num_envs, threads
-        self.frames_per_stroke, self.disable_env_checker = frames_per_stroke, disable_env_checker
-        self._limit_episodes(max_episode_steps)
-        self.autoreset_mode = _checked_mode(autoreset_mode)
-        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
-        self.render_mode = render_mode
+        require_flag("on_device", on_device)
+        self.threads, self.disable_env_checker = threads, disable_env_checker
+        robots = Robots(
+            chosen_task(
+                task, path=path, reward=reward, waypoint_radius=waypoint_radius, random_heading=random_heading,
+                headings=headings,
+            ),
+            SwimOptions(
+                actions, fidelity, scene, randomization, certificate, error_bars, decision_period,  # type: ignore[arg-type]
+                observe_actuators, device, sight, action_delay,  # type: ignore[arg-type]  # plain data, too
+            ),
+            num_envs, threads, split=split,
+        )  # fmt: skip
+        warn_of_errors(robots)
+        super().__init__(robots, max_episode_steps, autoreset_mode, render_mode, frames_per_stroke, bool(on_device))
 
-    def _limit_episodes(self, decisions: int | None) -> None:
-        if is_whole_number(decisions) and decisions == -1:
-            decisions = None
-        if decisions is not None:
-            require_count("max_episode_steps", decisions, 1, LONGEST)
-        object.__setattr__(self, "max_episode_steps", decisions)
+    _arguments = arguments_of(__init__)
 
-    def _begin_with(self, task: Swimming) -> None:
-        num_envs = self.num_envs
-        if self.frames_per_stroke is None:
-            self.frames_per_stroke = frames_of_a_decision(task)
-        fps = render_fps(task, self.render_mode, self.frames_per_stroke)
-        self.metadata = {**self.metadata, "render_fps": fps}
-        self.single_action_space, self.single_observation_space = self._set_task(task)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._generators, self._seeds = map(list, zip(*(seeding.np_random(None) for _ in range(num_envs)), strict=True))
-        self._commands = np.zeros((num_envs, task.scene.robot.n_limbs))
-        self._pictures = BatchPictures(self._task)
-        self._own_attributes: dict[str, tuple[Any, ...]] = {}
-        self._elapsed, self._limits = np.zeros(num_envs, np.int64), np.full(num_envs, LONGEST)
-        self._needs_reset = np.ones(num_envs, bool)
-        self._is_made = True
 
-    @property
-    def waypoints(self) -> tuple[NDArray[np.float64], ...]:
-        """Waypoints [m] of the present episode of every robot, shape (n, 2) each."""
-        return tuple(map(self._task.waypoints_of, range(self.num_envs)))
+def warn_of_errors(robots: Robots) -> None:
+    """Warn of scenes whose errors nobody has measured, if the task tells errors."""
+    if robots.task.tells_errors:
+        warn_uncertified(robots.scene, robots.options.fidelity_of_scene, robots.certificate, robots.timed)
 
-    @property  # type: ignore[override]
-    def np_random(self) -> tuple[np.random.Generator, ...]:
-        """Random generator of every robot, which draws its paths, headings and numbers."""
-        return tuple(self._generators)
 
-    @np_random.setter  # type: ignore[override]
-    def np_random(self, generators: Iterable[np.random.Generator]) -> None:
-        self._generators, self._seeds = list(generators), [-1] * self.num_envs
+def frames_of_a_decision(robots: Robots, asked: int | None) -> int:
+    """Number of pictures of a decision. asked: None means ten per second of simulated time, and one at least."""
+    if asked is None:
+        return max(1, round(FRAMES_PER_SECOND * robots.decision_period))
+    require_count("frames_per_stroke", asked, 1, MOST_ASKED_FRAMES)
+    return asked
 
-    @property
-    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
-        """Seed of the random generator of every robot, -1 where the generator was given."""
-        return tuple(self._seeds)
 
-    def reset(
-        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observations, Info]:
-        """Begin episodes; returns their first observations and infos.
+def render_fps(robots: Robots, render_mode: str | None, frames_per_stroke: int) -> float:
+    """Pictures that `render` returns per second of simulated time: with "rgb_array" one for each decision."""
+    fps = float((1 if render_mode == "rgb_array" else frames_per_stroke) / robots.decision_period)
+    return int(fps) if fps.is_integer() else fps
 
-        seed: Seed of robot 0, followed by those of the others, or a list with a seed for every robot. options: "path"
-        (name or waypoints [m]) and "reset_mask" (whether each robot begins an episode, shape (num_envs,)).
-        """
-        chosen = checked_options(options, {self._option, "reset_mask"})
-        mask = self._checked_mask(chosen.get("reset_mask"))
-        seeds = checked_seeds(seed, self.num_envs)
-        for robot in np.flatnonzero(mask):
-            if seeds[robot] is not None:
-                self._generators[robot], self._seeds[robot] = seeding.np_random(seeds[robot])
-        self._to_the_end(self._begin_episodes, mask, chosen.get(self._option))
-        first = self._task.first_info()
-        return self._observe(), with_masks({name: of_some(values, mask) for name, values in first.items()}, mask)
 
-    def _checked_mask(self, mask: Any) -> Flags:
-        if mask is None:
-            return np.ones(self.num_envs, bool)
-        mask = as_array(mask)
-        if mask.dtype != bool or mask.shape != (self.num_envs,) or not mask.any():
-            raise ValueError(f"reset_mask must be boolean of shape ({self.num_envs},) with at least one True.")
-        if not self._running and not mask.all():
-            raise gym.error.ResetNeeded("The first reset must be of all robots: call reset() without a reset_mask.")
-        return mask
+def robot_by_robot(name: str, value: Any, n_robots: int) -> tuple[Any, ...]:
+    """What every robot has of an attribute of a batch, or of a method's result."""
+    own = OF_EACH_ROBOT.get(name)
+    return (
+        (value,) * n_robots if own is None or value is None else tuple(own(value, robot) for robot in range(n_robots))
+    )
 
-    def _begin_episodes(self, mask: Flags, asked: Any = None) -> None:
-        self._task.reset(mask, self._generators, asked)
-        self._elapsed[mask], self._limits[mask] = 0, self.max_episode_steps or LONGEST
-        self._needs_reset[mask] = False
-        self._commands[mask] = 0.0
-        if self.render_mode is not None:
-            self._pictures.begin(mask)
 
-    def step(
-        self, actions: Any, out: Buffers | None = None
-    ) -> tuple[Observations, NDArray[np.float64], Flags, Flags, Info]:
-        """Swim for one decision with every robot; returns observations, rewards, terminated, truncated and info.
+def of_some(values: NDArray[Any], mask: Flags) -> NDArray[Any]:
+    """Values of the robots in a mask, shape (n_robots,); zero or None, as in Gymnasium, for the others."""
+    values = values.copy()
+    values[~mask] = None if values.dtype == object else 0
+    return values
 
-        out: Arrays that the results are written into, and that are returned then; by default fresh ones.
-        """
-        if out is not None and self.on_device:
-            raise ValueError("out takes observations of the processor: make the batch without on_device, or copy them.")
-        if out is not None:
-            require_buffers(out, self.num_envs, self._task.layout.size)
-        if not self._running:
-            raise gym.error.ResetNeeded("The episodes have not begun or were interrupted: call reset() before step().")
-        if self.autoreset_mode is AutoresetMode.DISABLED and self._needs_reset.any():
-            raise gym.error.ResetNeeded(
-                'Some episodes are over: call reset(options={"reset_mask": ...}) before step().'
-            )
-        resting = self._needs_reset.copy()  # NEXT_STEP: these begin anew instead of swimming
-        commands = to_commands(self.actions, self.simulator.scene.robot.n_limbs, actions, self.num_envs)
-        commands[resting] = 0.0
-        self.closed = False
-        results, info = self._to_the_end(self._step, commands, resting)
-        if out is None:
-            return *results, info
-        out.take(results)
-        return *out, info
 
-    def _step(self, commands: NDArray[np.float64], resting: Flags) -> tuple[Buffers, Info]:
-        outcome = self._task.step(commands)
-        self._commands = outcome.commands
-        if self.render_mode is not None:
-            self._pictures.follow()
-        self._elapsed += 1
-        terminated = outcome.terminated & ~resting
-        truncated = (self._elapsed >= self._limits) & ~resting
-        reward = np.where(resting, 0.0, outcome.reward)
-        if resting.any():
-            self._begin_episodes(resting)
-        self._needs_reset = terminated | truncated
-        observations, info = self._observe(), self._info(outcome.info, resting)
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._needs_reset.any():
-            observations, info = self._begin_next_episodes(observations, outcome.info)
-        return Buffers(observations, reward, terminated, truncated), info
+def with_masks(values: dict[str, NDArray[Any]], mask: Flags) -> Info:
+    """Info of a batch in Gymnasium's form: a copy of every array, and a mask of the robots for which it is valid."""
+    return {name: array.copy() for name, array in values.items()} | {f"_{name}": mask.copy() for name in values}
 
-    def _observe(self) -> Observations:
-        """Observations: numpy's, or the device's if they are asked for."""
-        return self._task.observe_on_device() if self.on_device else self._task.observe()
 
-    def action_masks(self) -> Flags:
-        """Actions that every robot's wires can follow now, shape (num_envs, k), see `seastar_gym.envs.masks`."""
-        return self._task.action_masks()
-
-    def sampling_mask(self) -> tuple[Any, ...]:
-        """`action_masks` in the form that `single_action_space.sample(mask=...)` takes, for every robot."""
-        return tuple(sampling_mask(self.single_action_space, mask) for mask in self.action_masks())
-
-    def close_extras(self, **ignored: Any) -> None:
-        """End the simulator's threads; a step after that starts them again.
-
-        ignored: Arguments of other batches, such as `terminate` and `timeout`: the threads are at rest.
-        """
-        self.simulator.close()
-
-    def render(self) -> tuple[Picture, ...] | None:
-        """Picture of every robot, shape (height, width, 3) each; None without a render_mode."""
-        return self.render_robots(range(self.num_envs))
-
-    def render_robots(self, robots: Iterable[int]) -> tuple[Picture, ...] | None:
-        """Pictures of the robots of these numbers, shape (height, width, 3) each; None without a render_mode."""
-        if self.render_mode is None:
-            gym.logger.warn('render() without a render_mode draws nothing: make the batch with "rgb_array".')
-            return None
-        if not self._running:
-            raise gym.error.ResetNeeded(
-                "The episodes have not begun or were interrupted: call reset() before render()."
-            )
-        return self._pictures.draw(robots, self._commands)
-
-    def _begin_next_episodes(
-        self, observations: Observations, strokes: dict[str, NDArray[Any]]
-    ) -> tuple[Observations, Info]:
-        """Begin the next episodes in mode SAME_STEP; info keeps the last observations and infos of the old ones."""
-        over = self._needs_reset.copy()
-        final_obs = np.full(self.num_envs, None, dtype=object)
-        for robot in np.flatnonzero(over):
-            final_obs[robot] = observations[robot]
-        final_info = with_masks({name: of_some(values, over) for name, values in strokes.items()}, over)
-        self._begin_episodes(over)
-        return self._observe(), {
-            **self._info(strokes, over),
-            "final_obs": final_obs,
-            "_final_obs": over,
-            "final_info": final_info,
-            "_final_info": over,
-        }
-
-    def _info(self, strokes: dict[str, NDArray[Any]], begun: Flags) -> Info:
-        """Info of the decision, and of the reset for robots in the mask of those that have `begun` an episode."""
-        info = with_masks(strokes, np.ones_like(begun))
-        if begun.any():
-            for name, values in self._task.first_info().items():
-                info[name][begun] = values[begun]
-        return info
+def _final(observations: Observations, info: dict[str, NDArray[Any]], over: Flags) -> Info:
+    """Entries of info in mode SAME_STEP: last observations and infos of the robots in a mask."""
+    last = np.full(len(over), None, dtype=object)
+    for robot in np.flatnonzero(over):
+        last[robot] = observations[robot]
+    last_info = with_masks({name: of_some(values, over) for name, values in info.items()}, over)
+    return {"final_obs": last, "_final_obs": over, "final_info": last_info, "_final_info": over}
 
 
 def checked_seeds(seed: object, n_robots: int) -> list[int | None]:

@@ -13,7 +13,7 @@ from seastar_gym.controllers.learned import LearnedPolicy, camera_of
 from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.seastar_swim import OneRobotEnv, SeastarSwimEnv
 from seastar_gym.evaluation.films import film
 from seastar_gym.evaluation.pictures import FPS, FRAMES_PER_STROKE, draw_traces
 from seastar_gym.evaluation.playback import Playback, RecordingEnv
@@ -124,7 +124,7 @@ def _swim_once(
     env = RecordingEnv(film=video is not None, frames_per_stroke=FRAMES_PER_STROKE, **environment)
     with film(video, FPS) if video is not None else nullcontext(lambda picture: None) as add:
 
-        def watch(env: SeastarSwimEnv) -> None:
+        def watch(env: OneRobotEnv) -> None:
             for picture in env.render() or ():
                 add(picture)
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.greedy import turned
 from seastar_gym.envs.layout import VELOCITY_SCALE
 from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.robots import Flags, Outcome, Robots
 from seastar_gym.envs.stations import heading_of
-from seastar_gym.envs.swimming import Flags, Outcome
-from seastar_gym.envs.task import SwimTask
+from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.per_robot import column
 
@@ -56,21 +56,24 @@ DISTURBANCES = {
 }
 
 
-class DisturbedTask(SwimTask):
-    """Task whose robots are disturbed; positions are those in the world, where the waypoints stand still.
+class DisturbedRobots(Robots):
+    """Robots that are disturbed; positions are those in the world, where the waypoints stand still.
 
-    rng: Draws noise and lost strokes. options, n_robots, threads: See `SwimTask`.
+    rng: Draws noise and lost strokes. task, options, n_robots, threads: See `Robots`.
     """
+
+    task: AlongPath
 
     def __init__(
         self,
         disturbance: Disturbance,
         rng: np.random.Generator,
+        task: AlongPath,
         options: SwimOptions,
         n_robots: int,
         threads: int | None,
     ):
-        super().__init__(options, n_robots, threads)
+        super().__init__(task, options, n_robots, threads)
         self.disturbance, self._rng = disturbance, rng
         robots, n_limbs = np.arange(self.n_robots), self.scene.robot.n_limbs
         angles = 2.0 * np.pi / CURRENT_DIRECTIONS * robots
@@ -113,7 +116,7 @@ class DisturbedTask(SwimTask):
         """
         lost = self._rng.random(len(commands)) < self.disturbance.lost
         drift = self._current * self.decision_period
-        self.move_waypoints(-drift)
+        self.task.move_waypoints(self, -drift)
         self._carried += drift
         outcome = super().step(np.where(lost[:, None], 0.0, commands))
         return outcome._replace(terminated=outcome.info["is_success"])

@@ -6,12 +6,14 @@ import numpy as np
 
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit, require_policy
 from seastar_gym.envs.commands import decisions_in
-from seastar_gym.envs.options import Path as SwimPath
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.sight import Drawn, Sight
-from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
-from seastar_gym.evaluation.rollout import MOST_DECISIONS, TaskBatch, rollout
+from seastar_gym.envs.vector import ManyRobotsEnv
+from seastar_gym.envs.waypoints import AlongPath
+from seastar_gym.envs.waypoints import Path as SwimPath
+from seastar_gym.evaluation.disturbances import Disturbance, DisturbedRobots
+from seastar_gym.evaluation.rollout import MOST_DECISIONS, rollout
 from seastar_gym.evaluation.swim import RECORDED, TIME_LIMIT, Swim, swims_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_kind
@@ -54,13 +56,13 @@ def swim_many(
     require_count("seed", seed, 0, LARGEST_SEED)
     actions = actions_of(policy, scene.robot.n_limbs)
     with_heading = isinstance(path, str) and path == "random"
+    task = AlongPath(path, waypoint_radius=waypoint_radius, random_heading=with_heading)
     options = SwimOptions(
-        path, actions, scene=scene, waypoint_radius=waypoint_radius, random_heading=with_heading,
-        decision_period=decision_period, sight=sight, action_delay=action_delay,
+        actions, scene=scene, decision_period=decision_period, sight=sight, action_delay=action_delay
     )  # fmt: skip
-    task = DisturbedTask(disturbance, np.random.default_rng([seed, n_swims]), options, n_swims, threads)
-    require_fit(policy, scene, actions, decision_period, task.layout.size, sight=sight)
-    batch, limit = TaskBatch(task), max_strokes or decisions_in(TIME_LIMIT, decision_period, scene)
+    robots = DisturbedRobots(disturbance, np.random.default_rng([seed, n_swims]), task, options, n_swims, threads)
+    require_fit(policy, scene, actions, decision_period, robots.layout.size, sight=sight)
+    batch, limit = ManyRobotsEnv(robots), max_strokes or decisions_in(TIME_LIMIT, decision_period, scene)
     batch.np_random = tuple(np.random.default_rng([seed, swim]) for swim in range(n_swims))
     swims = swims_of(agent, rollout(batch, policy, until=limit, record=RECORDED))
     batch.close()

@@ -5,7 +5,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from seastar_gym.envs.tasks.challenge import Challenge
+from seastar_gym.envs.robots import Task
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.station import Station
@@ -56,14 +56,14 @@ MEASURES: dict[type[Any], Measure] = {
     Station: Measure("mean distance", "mm", "less", mean_distance),
     Prizes: Measure("worth of prizes", "1", "more", prizes),
 }
-"""Measures of challenges that are not done at some time; those of one's own join them."""
+"""Measures of tasks that are not done at some time; those of one's own join them."""
 
 
 def measure_of(env: Any) -> Measure:
     """Measure of the task of an environment."""
-    return measure_of_challenge(getattr(env, "challenge", None))
+    return measure_of_task(getattr(env, "task", None))
 
 
-def measure_of_challenge(challenge: Challenge | None) -> Measure:
-    """Measure of a challenge; None for waypoints."""
-    return MEASURES.get(type(challenge), SECONDS)
+def measure_of_task(task: Task | None) -> Measure:
+    """Measure of a task; None for waypoints."""
+    return MEASURES.get(type(task), SECONDS)

@@ -56,10 +56,11 @@ class RecordingEnv(SeastarSwimEnv):
         self._recorded = []
         return super().reset(**arguments)
 
-    def _draw_frame(self) -> None:
-        self._recorded.append(self._frame())
+    def draw_frame(self) -> None:
+        """Keep what a picture would show, and draw it if this is a film."""
+        self._recorded.append(self.frame())
         if self._film:
-            super()._draw_frame()
+            super().draw_frame()
 
     def playback(self, agent: str) -> Playback:
         """Playback of the frames since the last reset."""

@@ -18,8 +18,6 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import Policy, require_policy
-from seastar_gym.envs.swimming import Swimming
-from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.checks import require_callable, require_count, require_kind, require_texts
 
 Floats = NDArray[np.float64]
@@ -123,11 +121,3 @@ def require_next_step(who: str, batch: Any) -> None:
     mode = batch.metadata.get("autoreset_mode")
     if mode is not AutoresetMode.NEXT_STEP:
         raise ValueError(f"{who} needs autoreset_mode=AutoresetMode.NEXT_STEP, not {mode}.")
-
-
-class TaskBatch(SeastarSwimVectorEnv):
-    """Batch of a task that is there already, such as a disturbed one."""
-
-    def __init__(self, task: Swimming):
-        self._set_batch(task.n_robots, None, None, AutoresetMode.NEXT_STEP)
-        self._begin_with(task)

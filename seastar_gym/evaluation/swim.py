@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import Policy, require_fit, require_policy
 from seastar_gym.envs.paths import cross_track_error, path_length
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.seastar_swim import OneRobotEnv
 from seastar_gym.evaluation.rollout import MOST_DECISIONS, Episodes, Info, rollout
 from seastar_gym.scene.checks import require_callable, require_count, require_kind
 from seastar_gym.simulator import SolverStatus
@@ -126,12 +126,12 @@ class Swim:
 def swim(
     agent: str,
     policy: Policy,
-    env: SeastarSwimEnv,
+    env: OneRobotEnv,
     *,
     max_strokes: int,
     seed: int | None = None,
     reset_options: dict[str, Any] | None = None,
-    watch: Callable[[SeastarSwimEnv], None] | None = None,
+    watch: Callable[[OneRobotEnv], None] | None = None,
 ) -> Swim:
     """One episode, with deterministic actions, to the last waypoint or for `max_strokes` strokes.
 
@@ -140,13 +140,13 @@ def swim(
     """
     require_kind("agent", agent, str, "a text")
     require_policy(policy)
-    require_kind("env", env, SeastarSwimEnv, "an environment of waypoints, without wrappers: gym.make(...).unwrapped")
+    require_kind("env", env, OneRobotEnv, "an environment of waypoints, without wrappers: gym.make(...).unwrapped")
     require_count("max_strokes", max_strokes, 1, MOST_DECISIONS)
     if watch is not None:
         require_callable("watch", watch)
     assert env.observation_space.shape is not None
-    n_seen, challenge = env.observation_space.shape[0], getattr(env, "challenge", None)
-    require_fit(policy, env.scene, env.actions, env.decision_period, n_seen, challenge, env.sight)
+    n_seen, task = env.observation_space.shape[0], getattr(env, "task", None)
+    require_fit(policy, env.scene, env.actions, env.decision_period, n_seen, task, env.sight)
 
     def look(info: Info) -> None:
         if watch is not None:

@@ -1,19 +1,18 @@
 """Registered environments of this package, by id, and episodes that an agent swims in them, one for each seed."""
 
 import importlib
-import inspect
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
-from gymnasium.envs.registration import EnvSpec, load_env_creator
+from gymnasium.envs.registration import EnvSpec
 
 from seastar_gym.controllers.contract import Policy, actions_in, require_fit
 from seastar_gym.controllers.greedy import Searcher
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.layout import Layout
+from seastar_gym.envs.robots import Split
 from seastar_gym.envs.sight import told
-from seastar_gym.envs.tasks.numbered import Split
 from seastar_gym.evaluation.measures import measure_of
 from seastar_gym.evaluation.rollout import Batch, Episodes, rollout
 from seastar_gym.scene.numerics import Fidelity
@@ -61,16 +60,10 @@ def make_task(task: str, **arguments: Any) -> gym.Env[Any, Any]:
     return env
 
 
-def parameters_of(task: str) -> set[str]:
-    """Names of the arguments of a task's environment."""
-    entry: Any = spec_of(task).entry_point
-    return set(inspect.signature(load_env_creator(entry) if isinstance(entry, str) else entry).parameters)
-
-
 def held_out(task: str, fidelity: Fidelity | None = None, split: Split = "test") -> dict[str, Any]:
     """Arguments that keep a task to the episodes of a split, where it has splits; by default those that no training
     draws. fidelity: None means the task's own."""
-    return ({"split": split} if "split" in parameters_of(task) else {}) | (
+    return ({"split": split} if "task" in spec_of(task).kwargs else {}) | (
         {} if fidelity is None else {"fidelity": fidelity}
     )
 
@@ -95,8 +88,7 @@ def require_seen(policy: Policy, env: Any) -> Actions:
         shown_by = "" if env.sight is None else f", by {told(env.sight)}"
         raise ValueError(f"It reads observations of {n_known} numbers, the task shows {n_seen}{shown_by}.")
     actions = actions_in(policy, env.actions, env.scene.robot.n_limbs)
-    challenge = getattr(env, "challenge", None)
-    require_fit(policy, env.scene, actions, env.decision_period, n_seen, challenge, env.sight)
+    require_fit(policy, env.scene, actions, env.decision_period, n_seen, getattr(env, "task", None), env.sight)
     return actions
 
 

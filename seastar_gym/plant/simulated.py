@@ -7,8 +7,8 @@ from dataclasses import asdict, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.envs.delays import POSE, Tracker
 from seastar_gym.envs.sight import Lateness, Sight
-from seastar_gym.envs.tracker import POSE, Tracker
 from seastar_gym.plant.plant import Sighting
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.heating import WirePair

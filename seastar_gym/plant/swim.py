@@ -12,15 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.lag import Lag
+from seastar_gym.envs.attributes import arguments_of
+from seastar_gym.envs.delays import Lag, Pictures, Tracker
+from seastar_gym.envs.observation import lengths_of
 from seastar_gym.envs.options import SwimOptions
-from seastar_gym.envs.pictures import lengths_of
-from seastar_gym.envs.seastar_swim import Observation, RenderMode, SeastarSwimEnv
+from seastar_gym.envs.robots import Flags, Floats, Robots
+from seastar_gym.envs.seastar_swim import Observation, OneRobotEnv, RenderMode
 from seastar_gym.envs.sight import Sight, bounds_of
-from seastar_gym.envs.swimming import Flags, Floats
-from seastar_gym.envs.task import SwimTask
-from seastar_gym.envs.task_env import arguments_of
-from seastar_gym.envs.tracker import Pictures, Tracker
+from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.plant.guard import Guard, Limits
 from seastar_gym.plant.logs import Logs
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
@@ -41,21 +40,20 @@ def limits_for(limits: Limits, sight: Sight) -> Limits:
     return replace(limits, blur=max(limits.blur, blur), turn_blur=max(limits.turn_blur, turn_blur))
 
 
-class PlantTask(SwimTask):
-    """Task of a robot in a tank. Its simulator swims along, and is put where the robot was seen after every decision.
+class PlantRobot(Robots):
+    """Robot in a tank. Its simulator swims along, and is put where the robot was seen after every decision.
 
     plant: What is driven. limits: Of its guard. logs: Folder of logs; None: none.
     """
 
-    per_episode = ("path", "reward", "waypoint_radius")
-
-    def __init__(self, plant: Plant, limits: Limits, options: SwimOptions, logs: Path | None):
+    def __init__(self, plant: Plant, limits: Limits, task: AlongPath, options: SwimOptions, logs: Path | None):
         sight = Sight() if options.sight is None else options.sight
         if sight.sees == "nodes":
             raise ValueError('A tracker sees no nodes: use Sight(sees="pose"), or markers.')
-        if options.action_delay != 0.0 or options.randomization is not None or options.random_heading:
+        if options.action_delay != 0.0 or options.randomization is not None or task.random_heading:
             raise ValueError("A plant is late and at random by itself: leave action_delay, randomization and headings.")
-        SwimTask.__init__(self, replace(options, sight=Sight(sees=sight.sees)), 1, 1)
+        super().__init__(task, replace(options, sight=Sight(sees=sight.sees)), 1, 1)
+        self.per_episode = ("path", "reward", "waypoint_radius")
         self.pulse = getattr(self.scene.actuator, "heating_time", math.nan)
         if not self.pulse <= limits.longest_pulse:
             raise ValueError(
@@ -93,7 +91,7 @@ class PlantTask(SwimTask):
         self._begun = self.guard.now()
         self._note(seen)
         self._known_pictures.restart(self._picture(seen))
-        self._begin(robots)
+        self.task.begin(self, robots)
 
     def _watched(self, seen: Sighting) -> Sighting:
         """The last sighting of a robot that was seen so, after a while in which it rests and is logged, if it is."""
@@ -131,7 +129,7 @@ class PlantTask(SwimTask):
         return Pictures(self._row(seen)[None], np.array([seen.captured_at - self._begun]))
 
     def _row(self, seen: Sighting) -> Floats:
-        """Sighting as a picture, see tracker.py: relative to where the robot began."""
+        """Sighting as a picture, see delays.py: relative to where the robot began."""
         (x, y, heading), (x_0, y_0, _) = seen.pose, self._origin.pose
         c, s = math.cos(heading), math.sin(heading)
         n_places = len(self._known_pictures.columns)
@@ -238,7 +236,7 @@ class PlantTask(SwimTask):
         return {**super().facts(hub), "late": late, "dropped_pictures": dropped, "plant_message": message}
 
 
-class PlantSwim(SeastarSwimEnv):
+class PlantSwim(OneRobotEnv):
     """Environment of a robot in a tank, for policies that were trained with the same `sight`.
 
     Actions, observations, rewards and `info` are those of `SeastarSwimEnv` with that `sight`; the origin is where the
@@ -266,7 +264,6 @@ class PlantSwim(SeastarSwimEnv):
         frames_per_stroke: int | None = None,
         **options: Any,
     ):
-        self._set_pictures(render_mode, frames_per_stroke)
         if not hasattr(plant, "sight"):
             raise ValueError(f"plant must be a Plant, not {shown(plant)}.")
         limits = Limits() if limits is None else limits
@@ -275,38 +272,39 @@ class PlantSwim(SeastarSwimEnv):
             require_file("logs", logs)
         folder = None if logs is None else Path(logs)
         self.plant, self.limits, self.logs = plant, limits, logs
-        self._plant_task = PlantTask(plant, limits, SwimOptions(**options), folder)
-        self._begin_with(self._plant_task, frames_per_stroke)
+        own = {name: options.pop(name) for name in arguments_of(AlongPath.__init__) & {*options}}
+        self._driven = PlantRobot(plant, limits, AlongPath(**own), SwimOptions(**options), folder)
+        super().__init__(self._driven, render_mode, frames_per_stroke)
 
-    _arguments = arguments_of(__init__) | arguments_of(SwimOptions.__init__)
+    _arguments = arguments_of(__init__) | arguments_of(AlongPath.__init__) | arguments_of(SwimOptions.__init__)
 
     @property
     def stopped(self) -> str:
         """Why the guard stopped the plant, in a sentence; empty if it did not."""
-        return self._plant_task.stopped
+        return self._driven.stopped
 
     @property
     def latest(self) -> float:
         """How late the latest decision of the episode was, but for the first [s]."""
-        return self._plant_task.latest
+        return self._driven.latest
 
     @property
     def dropped_pictures(self) -> int:
         """Number of pictures of the episode that were dropped, because no robot can be there."""
-        return self._plant_task.guard.plausibility.n_dropped
+        return self._driven.guard.plausibility.n_dropped
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Swim for one decision; returns observation, reward, terminated, truncated and info."""
-        with self._plant_task.stopped_if_interrupted():
+        with self._driven.stopped_if_interrupted():
             observation, reward, terminated, _, info = super().step(action)
         truncated = bool(info["plant_message"])
-        self._running = self._running and not truncated
+        self._batch.needs_reset[:] |= truncated
         return observation, reward, terminated, truncated, info
 
     def close(self) -> None:
         """Stop the plant, and close its logs and the window."""
         try:
-            self._plant_task.guard.plant.stop()
+            self._driven.guard.plant.stop()
         finally:
-            self._plant_task.close_logs()
+            self._driven.close_logs()
             super().close()

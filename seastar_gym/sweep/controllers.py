@@ -14,10 +14,10 @@ from seastar_gym.controllers.contract import Policy, require_fit
 from seastar_gym.controllers.learned import load
 from seastar_gym.controllers.registry import AGENTS, files_of, learned_file, load_agent
 from seastar_gym.controllers.scripted import scripted
-from seastar_gym.envs.commands import checked_decision_period, decisions_in, unless_strokes
-from seastar_gym.envs.options import Path as SwimPath
+from seastar_gym.envs.commands import checked_decision_period, decisions_in
 from seastar_gym.envs.paths import make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.waypoints import Path as SwimPath
 from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.scene import Scene
@@ -76,7 +76,7 @@ def controller_of(name: Any, route: Route, scene: Scene) -> Controller:
     if not isinstance(name, str):
         raise ValueError(f"A controller is the name of an agent, such as learned, not {shown(name)}.")
     seconds = checked_decision_period(route.decision_period, scene)
-    period = unless_strokes(seconds, scene)
+    period = None if seconds == scene.actuator.period else seconds
     files, file = files_of(name, period), learned_file(name, period)
     if file is not None:
         policy = load(file)

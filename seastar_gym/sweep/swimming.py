@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.contract import actions_of, require_fit
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
-from seastar_gym.envs.task import SwimTask
-from seastar_gym.evaluation.rollout import TaskBatch, rollout
+from seastar_gym.envs.robots import Robots
+from seastar_gym.envs.vector import ManyRobotsEnv
+from seastar_gym.envs.waypoints import AlongPath
+from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.scene import Scene
 from seastar_gym.scene.per_robot import with_numbers
 from seastar_gym.simulator import Simulator
@@ -133,15 +135,12 @@ def steer(scene: Scene, frame: Scene, controller: Controller, n_robots: int, dev
     n_limbs, policy, waypoints = scene.robot.n_limbs, controller.policy(frame), np.array(controller.waypoints)
     actions = actions_of(policy, n_limbs)
     require_fit(policy, scene, actions, controller.decision_period)
-    options = SwimOptions(
-        waypoints, actions, scene=scene, waypoint_radius=WAYPOINT_RADIUS, decision_period=controller.decision_period,
-        device=device,
-    )  # fmt: skip
-    task = SwimTask(options, n_robots, 1, effort=True)
+    options = SwimOptions(actions, scene=scene, decision_period=controller.decision_period, device=device)
+    robots = Robots(AlongPath(waypoints, waypoint_radius=WAYPOINT_RADIUS), options, n_robots, 1, effort=True)
     headings: list[Floats] = []
     swum = rollout(
-        TaskBatch(task), policy, seeds=0, until=controller.decisions, record=OF_EPISODES,
-        on_step=lambda info: headings.append(task.heading()),
+        ManyRobotsEnv(robots), policy, seeds=0, until=controller.decisions, record=OF_EPISODES,
+        on_step=lambda info: headings.append(robots.heading()),
     )  # fmt: skip
     begin, end = headings[0], np.array(headings)[swum.decisions, np.arange(n_robots)]
     reached, time = swum.last("waypoint_index"), swum.last("time")

@@ -18,8 +18,8 @@ from seastar_gym import Body, Certificate, Contact, Numerics, Scene, Seastar, Sm
 from seastar_gym.accuracy import command, commands, measure, timed_certificate
 from seastar_gym.accuracy.certificate import _digest
 from seastar_gym.accuracy.setting import resolved
+from seastar_gym.envs.attributes import RobotsEnv
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.scene_file import load_scene
 
@@ -253,7 +253,7 @@ def test_the_environment_tells_the_errors_of_a_certified_scene(certificate, file
     envs = gym.make_vec("SeastarSwim-v0", 3, vectorization_mode="vector_entry_point",
                         scene=certificate.at(setting), certificate=certificate)  # fmt: skip
     assert (envs.reset(seed=0)[1]["path_error"] == info["path_error"]).all()
-    assert isinstance(env.unwrapped, PlainSpec)
+    assert isinstance(env.unwrapped, RobotsEnv)
     assert json.loads(env.spec.to_json())["kwargs"]["certificate"] == str(file)
 
 

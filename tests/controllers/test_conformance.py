@@ -19,7 +19,7 @@ from seastar_gym.controllers.planner import Budget, Planner, gait_planner
 from seastar_gym.controllers.registry import load_agents
 from seastar_gym.controllers.scripted import GAITS, RandomPolicy, scripted
 from seastar_gym.envs.commands import action_space, to_commands
-from seastar_gym.envs.tasks.envs import CHALLENGES
+from seastar_gym.envs.tasks import NAMED
 from seastar_gym.evaluation.many import swim_many
 
 stable_baselines3 = Later("stable_baselines3")
@@ -172,7 +172,7 @@ def test_a_bundled_policy_fits_its_robot_and_mode_alone(name, file):
     policy = load(file)
     about = policy.description
     own = about.scene, about.actions, about.decision_period, about.observation_size
-    task = about.task and CHALLENGES[about.task]
+    task = about.task and NAMED[about.task]
     require_fit(policy, *own, task, about.sight)
     for change, words in (
         ((replace(about.scene, robot=Seastar(n_limbs=4)), *own[1:]), "robot of 5 limbs, the environment's has 4."),

@@ -324,13 +324,13 @@ def test_c_sees_what_the_environment_shows(name, tmp_path):
     """From positions and velocities, to float32's rounding; from a short history, to the error of differences."""
     policy, layout = policy_of(name), policy_of(name).description.layout
     env = environment(name, policy, 4)
-    task = env.unwrapped._task
-    compiled = Compiled(policy, tmp_path, task.scene.robot.nodes_per_limb)
+    inner = env.unwrapped
+    compiled = Compiled(policy, tmp_path, inner.scene.robot.nodes_per_limb)
     env.reset(seed=3)
     env.action_space.seed(0)
     for _ in range(3):
         observations = env.step(env.action_space.sample())[0]
-    simulator, targets = task.simulator, task._targets()
+    simulator, targets = inner.simulator, inner.task.targets(inner._robots)
     x, v = simulator.positions, simulator.velocities
     for robot, expected in enumerate(observations):
         limbs = expected[layout.actuators].astype(float) if layout.of_limb else None
@@ -347,14 +347,15 @@ def test_c_sees_what_the_environment_shows(name, tmp_path):
 @needs_compiler
 def test_a_policy_that_does_not_see_its_limbs_needs_a_pose_alone(tmp_path):
     policy, env = policy_of("fail-blind"), environment("fail-blind", policy_of("fail-blind"), 4)
-    task, layout = env.unwrapped._task, policy.description.layout
+    inner, layout = env.unwrapped, policy.description.layout
     compiled = Compiled(policy, tmp_path)
     env.reset(seed=3)
     env.action_space.seed(0)
     for _ in range(3):
         observations = env.step(env.action_space.sample())[0]
+    simulator, targets = inner.simulator, inner.task.targets(inner._robots)
     for hub, theta, target, expected in zip(
-        task.simulator.hub_position(), heading_of(task.simulator), task._targets(), observations, strict=True
+        simulator.hub_position(), heading_of(simulator), targets, observations, strict=True
     ):
         limbs, further = expected[layout.actuators].astype(float), expected[layout.further].astype(float)
         found = compiled.observe_pose(np.array([*hub, theta]), limbs, further, np.ascontiguousarray(target))
@@ -375,7 +376,7 @@ def test_a_robot_swims_by_c_from_what_a_camera_sees(tmp_path):
         by_python += 1
         assert not truncated
     simulator, (robot,) = Simulator(scene), compiled.robots(1)
-    reached, strokes, radius = 0, 0, env.unwrapped._task.waypoint_radius
+    reached, strokes, radius = 0, 0, env.unwrapped.waypoint_radius
     pictures = [simulator.positions[0]] * 3
     while reached < 2 and strokes < 2 * by_python:
         targets = waypoints[[reached, 1]]

@@ -161,13 +161,14 @@ def test_a_goal_pays_where_the_waypoint_counts_is_nowhere_else_in_the_observatio
     goals, achieved, rewards, infos = [], [], [], []
     for beside in (0.05, 0.0, 0.05, 0.0):
         for turned in (3.0, 0.0):
-            task, k = env.unwrapped._task, int(env.unwrapped._task.waypoint_index[0])
-            asked = task.headings_of(0)
+            robots = env.unwrapped._robots
+            k, asked = int(robots.waypoint_index[0]), robots.task.headings_of(robots, 0)
             put(env, env.unwrapped.waypoints[k] + [beside, 0.0], turned + (0.0 if asked is None else asked[k]))
             twin = copy.deepcopy(env)
-            twin.unwrapped._task.move_waypoints(np.array([[0.3, 0.1]]))
+            theirs = twin.unwrapped._robots
+            theirs.task.move_waypoints(theirs, np.array([[0.3, 0.1]]))
             if asked is not None:
-                twin.unwrapped._task._asked._asked[0] += 1.0
+                theirs.episode.asked[0] += 1.0
             goals.append(observed["desired_goal"])
             observed, reward, *_, info = env.step(rest)
             elsewhere = twin.step(rest)[0]

@@ -37,11 +37,12 @@ from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
 from seastar_gym.envs.options import scene_at
 from seastar_gym.envs.paths import PATHS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv, name_of
+from seastar_gym.envs.tasks import name_of
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.envs.waypoints import AlongPath
 
 TYPES = {"float": float, "int": int, "bool": bool, "str": str}
-CHALLENGED = (Miswired, Prey, Station, FailBlind, ObstTrap, Prizes, SimToReal)
+OF_TASKS = (Miswired, Prey, Station, FailBlind, ObstTrap, Prizes, SimToReal)
 TASK_IDS = tuple(seastar_gym.TASKS)
 
 
@@ -57,12 +58,6 @@ def table(title: str, kind: type = SeastarSwimEnv) -> list[dict[str, str]]:
     rows = [line.strip("|").split("|") for line in itertools.takewhile(lambda line: line.startswith("|"), lines)]
     head, _, *rows = [[cell.strip().strip("`") for cell in row] for row in rows]
     return [dict(zip(head, row, strict=True)) for row in rows]
-
-
-def row_of(id: str, kind: type) -> list[str]:
-    """Cells of the row of an id, behind it."""
-    cells = re.search(rf"\| `{id}` +\|(.*)\|$", kind.__doc__, re.MULTILINE)[1].split("|")
-    return [cell.strip().strip("`") for cell in cells]
 
 
 def arguments(kind: type) -> list[str]:
@@ -118,23 +113,23 @@ def test_the_reward_and_info_are_those_of_the_tables():
                 assert type(info[name]) is TYPES[kind], name
 
 
-@pytest.mark.parametrize("one, batch", [(SeastarSwimEnv, SeastarSwimVectorEnv), (SeastarTaskEnv, SeastarTaskVectorEnv)])
-def test_the_arguments_are_those_of_the_constructors(one, batch):
+def test_the_arguments_are_those_of_the_constructors():
+    one, batch = SeastarSwimEnv, SeastarSwimVectorEnv
     assert arguments(one) == list(inspect.signature(one).parameters)
     assert {*arguments(one), *arguments(batch)} == set(inspect.signature(batch).parameters)
-    assert one is SeastarTaskEnv or all(f'"{name}"' in section("Arguments") for name in PATHS)
+    assert all(f'"{name}"' in section("Arguments") for name in PATHS)
 
 
-OF_WAYPOINTS = "SeastarSwim-v0", "SeastarSwimContinuous-v0", "SeastarSwimHeading-v0", *seastar_gym.TIMED
-
-
-@pytest.mark.parametrize("id", OF_WAYPOINTS)
+@pytest.mark.parametrize("id", seastar_gym.IDS)
 def test_ids_are_those_of_the_table(id):
-    period, actions, limit, decisions, actuator = row_of(id, SeastarSwimEnv)
-    env, inner = gym.make(id), gym.make(id).unwrapped
+    cells = re.search(rf"\| `{id}` +\|(.*)\|$", SeastarSwimEnv.__doc__, re.MULTILINE)[1].split("|")
+    task, period, actions, limit, decisions, threshold = [cell.strip(" `") for cell in cells]
+    env, inner = gym.make(id, fidelity="fast"), gym.make(id, fidelity="fast").unwrapped
     assert inner.decision_period == float(period) and f'"{inner.actions}"' == actions
     assert env.spec.max_episode_steps == int(decisions) == round(float(limit) / float(period))
-    assert type(inner.scene.actuator).__name__ == actuator
+    assert env.spec.reward_threshold == (None if threshold == "-" else float(threshold))
+    assert task == f'"{name_of(inner.task)}"' if id in TASK_IDS else task == "-" and isinstance(inner.task, AlongPath)
+    assert type(inner.scene.actuator) is (SmaPulse if float(period) == 1.0 else SmaWires)
     assert gym.make_vec(id, 2).decision_period == float(period)
     env.reset(seed=0)
     assert env.step(env.action_space.sample())[4]["time"] == float(period)
@@ -143,21 +138,14 @@ def test_ids_are_those_of_the_table(id):
 # Tasks
 
 
-@pytest.mark.parametrize("id", TASK_IDS)
-def test_a_task_has_the_numbers_of_the_table(id):
-    task, period, actions, limit, threshold = row_of(id, SeastarTaskEnv)
-    env = gym.make(id, fidelity="fast")
-    inner = env.unwrapped
-    assert name_of(None) is name_of(Prey(wanted=9)) is None and name_of(inner.challenge) == task.strip('"')
-    assert CHALLENGES[task.strip('"')] == inner.challenge and f'"{inner.actions}"' == actions
-    assert inner.decision_period == float(period) and env.spec.reward_threshold == float(threshold)
-    assert env.spec.max_episode_steps == round(float(limit) / float(period))
+def test_names_are_those_of_tasks_with_their_numbers():
+    assert name_of(None) is name_of(Prey(wanted=9)) is None and name_of(Prey()) == "prey"
 
 
 @pytest.mark.parametrize("id", TASK_IDS)
 def test_info_of_a_task_is_that_of_the_docstrings(id):
     env = gym.make(id, fidelity="fast")
-    kind, found = type(env.unwrapped.challenge), env.reset(seed=0)[1]
+    kind, found = type(env.unwrapped.task), env.reset(seed=0)[1]
     own = {row["name"]: row["type"] for row in table("Info", kind)}
     common = {row["name"] for row in table("Info")} - {
         "error_estimate",
@@ -180,10 +168,10 @@ def test_info_of_a_task_is_that_of_the_docstrings(id):
         assert type_.startswith({np.ndarray: "array", int: "int", float: "float"}[type(found[name])]), name
 
 
-@pytest.mark.parametrize("kind", CHALLENGED)
-def test_arguments_and_rewards_of_a_challenge_are_those_of_the_docstring(kind):
+@pytest.mark.parametrize("kind", OF_TASKS)
+def test_arguments_and_rewards_of_a_task_are_those_of_the_docstring(kind):
     assert arguments(kind) == list(inspect.signature(kind).parameters)
-    env = SeastarTaskEnv(task=kind(), fidelity="fast")
+    env = SeastarSwimEnv(actions="pairs", task=kind(), fidelity="fast")
     named = {row["term"] for row in table("Reward", kind) if row["term"]}
     assert named == {name for name in env.reset(seed=0)[1] if name.startswith("reward_")}
 
@@ -193,11 +181,11 @@ def places_of(at):
     return at.stations_and_hub, at.actuators, at.further, at.waypoints
 
 
-@pytest.mark.parametrize("kind", [kind for kind in CHALLENGED if kind not in (Prey, SimToReal)])
+@pytest.mark.parametrize("kind", [kind for kind in OF_TASKS if kind not in (Prey, SimToReal)])
 @pytest.mark.parametrize("column, period", [(0, 1.0), (1, 0.5)])
 def test_the_observation_of_a_task_is_that_of_the_table(kind, column, period):
-    env = SeastarTaskEnv(task=kind(), fidelity="fast", decision_period=period)
-    task = env._task
+    env = SeastarSwimEnv(actions="pairs", task=kind(), fidelity="fast", decision_period=period)
+    task = env.task
     sees_wires = period < 1.0 and env.observe_actuators
     at = Layout(5, task.observes_commands + 2 * sees_wires, task.entries, task.shows_limbs)
     cells = [[*row.values()] for row in table("Observation", kind)]

@@ -26,12 +26,12 @@ from seastar_gym import (
     SymmetryReduction,
     Uniform,
 )
+from seastar_gym.envs.attributes import checked_options
 from seastar_gym.envs.commands import action_space, choices, command_table, to_commands
 from seastar_gym.envs.frame import Frame
 from seastar_gym.envs.goal import GoalForm
 from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.layout import Layout
-from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.paths import FARTHEST, PATHS, make_path, register_path
 from seastar_gym.envs.randomization import LogUniform, Normal
 from seastar_gym.envs.rendering import Renderer
@@ -45,11 +45,10 @@ from seastar_gym.envs.symmetry import (
     memory_mirror,
     symmetry_of,
 )
-from seastar_gym.envs.task_env import checked_options
 from seastar_gym.envs.tasks.course import Pursuit, draw_course
-from seastar_gym.envs.tasks.envs import SeastarTaskEnv, SeastarTaskVectorEnv
 from seastar_gym.envs.tasks.obst_trap import ObstTrap, draw_discs
 from seastar_gym.envs.vector import SeastarSwimVectorEnv, checked_seeds
+from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.scene.numerics import MAX_STEPS, SHORTEST
 from seastar_gym.scene.serial import to_dict
 from symmetries import symmetry_for
@@ -92,9 +91,9 @@ def swimmers(**options):
     return SeastarSwimVectorEnv(2, fidelity="fast", threads=1, **options)
 
 
-def drawing(name, low, high):
+def drawing(name, low, high, **options):
     """Environment that draws a number for every episode."""
-    return SeastarSwimEnv(randomization=DomainRandomization({name: Uniform(low, high)}))
+    return SeastarSwimEnv(**options, randomization=DomainRandomization({name: Uniform(low, high)}))
 
 
 REFUSED = {
@@ -159,7 +158,7 @@ REFUSED = {
     "unknown options": (lambda: checked_options({"way": 1}, {"path"}), "Unknown reset option(s)"),
     "seeds that are too few": (lambda: swimmers().reset(seed=[1]), "seed must be one number or 2 of them, not 1"),
     "a seed below zero": (lambda: checked_seeds([1, -1], 2), "seed"),
-    "a radius beyond": (lambda: SwimOptions(waypoint_radius=2e6), "waypoint_radius must be at most 1e+06 m"),
+    "a radius beyond": (lambda: AlongPath(waypoint_radius=2e6), "waypoint_radius must be at most 1e+06 m"),
     "a table of limbs": (lambda: command_table("limbs", 5), "not a table of commands: use LIMB_COMMANDS"),
     "too many limbs": (lambda: command_table("joint", 9), "would have 3^9 = 19,683 actions for 9 limbs"),
     "an action for nine limbs": (lambda: SeastarSwimEnv(scene=NINE, actions="joint"), "19,683 actions"),
@@ -213,12 +212,15 @@ REFUSED = {
     "no mode of a batch": (lambda: SeastarSwimVectorEnv(2, autoreset_mode="sometimes"), "autoreset_mode must be one"),
     "no mode of pictures": (lambda: SeastarSwimEnv(render_mode="ansi"), "render_mode"),
     "no pictures": (lambda: SeastarSwimEnv(frames_per_stroke=0), "frames_per_stroke must be a whole number"),
-    "no mode of a task": (lambda: SeastarTaskEnv(render_mode="film"), "render_mode"),
+    "no mode of a task": (lambda: SeastarSwimEnv(task="prey", render_mode="film"), "render_mode"),
     "films of tasks": (lambda: gym.make_vec("SeastarPrey-v0", render_mode="film"), "The batch draws"),
-    "no task": (lambda: SeastarTaskEnv(task="swim"), "one of 'miswired', 'prey', 'fast-prey', 'station'"),
-    "a task of 3": (lambda: SeastarTaskVectorEnv(task=3), "task must be a challenge"),
-    "a task in plain": (lambda: SeastarTaskEnv(task={"kind": "Prey"}), "a dict with a version"),
-    "no split": (lambda: SeastarTaskVectorEnv(split="validation"), "split must be one of 'train', 'test'"),
+    "no task": (lambda: SeastarSwimEnv(task="swim"), "one of 'miswired', 'prey', 'fast-prey', 'station'"),
+    "a task of 3": (lambda: SeastarSwimVectorEnv(task=3), "task must be a task such as"),
+    "a task in plain": (lambda: SeastarSwimEnv(task={"kind": "Prey"}), "a dict with a version"),
+    "a path of a task": (lambda: SeastarSwimEnv([[0.1, 0.0]], task="prey"), "path belongs to swims along a path"),
+    "a split of paths": (lambda: SeastarSwimEnv(split="test"), "split is for tasks"),
+    "two draws": (lambda: drawing("fluid.drag_coefficient", 0.5, 1.0, task="fail-blind"), "leave out randomization"),
+    "no split": (lambda: SeastarSwimVectorEnv(task="prey", split="validation"), "split must be one of 'train', 'test'"),
     "pictures too small": (lambda: drawn_by(size=(100, 100)), "at least 320 x 240 pixels, not 100 x 100"),
     "a robot beside numbers": (lambda: drawn_by(positions=np.full((46, 2), np.nan)), "of shape (46, 2)"),
     "a node that is missing": (lambda: drawn_by(positions=np.zeros((45, 2))), "must be finite and of shape (46, 2)"),
@@ -244,7 +246,7 @@ def test_what_is_just_allowed_is_taken():
     near = [[0.1 - 1e-9, 0.0], [0.1 + 1e-9, 0.0]]  # the radius of waypoints in limb lengths
     assert goals(near, np.zeros((2, 2))).tolist() == [0.0, -1.0]
     assert make_path([[FARTHEST, -FARTHEST]], np.random.default_rng(0)).tolist() == [[1e6, -1e6]]
-    assert SwimOptions(waypoint_radius=FARTHEST).waypoint_radius == 1e6
+    assert AlongPath(waypoint_radius=FARTHEST).waypoint_radius == 1e6
     assert command_table("joint", 8).shape == (6561, 8) and command_table("pairs", 1).tolist() == [[0.0]]
     assert to_commands("continuous", 2, [[1.0, -1.0]], 1).tolist() == [[1.0, -1.0]]
     assert to_commands("pairs", 5, [20, 0], 2)[:, 4].tolist() == [1.0, 0.0]
@@ -320,7 +322,7 @@ def resets():
         yield batch, {"reset_mask": wrong}, "reset_mask"
     for env in (SeastarSwimEnv(**asked), SeastarSwimVectorEnv(**asked)):
         yield env, {"path": "pentagon"}, "3 angles", "5 waypoint"
-    task = SeastarTaskEnv(task="prey", fidelity="fast", split="test")
+    task = SeastarSwimEnv(actions="pairs", task="prey", fidelity="fast", split="test")
     for number in (-1, 1000, 1.0, True, [1, 2, 3], "one"):
         yield task, {"instance": number}, "instance must be a whole number from 0 to 999"
     yield task, {"path": "line"}, "Unknown reset option"
@@ -346,7 +348,7 @@ for id in [id for id in gym.registry if id.startswith("Seastar")]:
     for make in (gym.make, gym.make_vec):
         env, other = (make(id, fidelity="fast") for _ in range(2))
         for refused in ({"seed": -1}, {"seed": "1"}, {"options": {"no": 1}}, {"options": [1]},
-                        {"options": {env.unwrapped._option: [[np.nan, 0.0]]}}):
+                        {"options": {env.unwrapped.task.option: [[np.nan, 0.0]]}}):
             try:
                 env.reset(**refused)
             except ValueError as sentence:

@@ -105,11 +105,12 @@ def test_a_reached_waypoint_leaves_the_turns_after_it():
 def test_headings_are_along_the_legs_or_drawn():
     env = SeastarSwimEnv(CORNERS, fidelity="fast", headings=HeadingTargets())
     env.reset(seed=0)
-    np.testing.assert_allclose(env._task.headings_of(0), [0.0, np.pi / 2, -0.75 * np.pi])
+    np.testing.assert_allclose(env.task.headings_of(env._robots, 0), [0.0, np.pi / 2, -0.75 * np.pi])
     env = SeastarSwimEnv(CORNERS, fidelity="fast", headings=HeadingTargets("random"))
-    drawn = [env.reset(seed=seed) and env._task.headings_of(0) for seed in (5, None, 5)]
+    drawn = [env.reset(seed=seed) and env.task.headings_of(env._robots, 0) for seed in (5, None, 5)]
     np.testing.assert_array_equal(drawn[0], drawn[2])
-    assert len(np.unique([*drawn[0], *drawn[1]])) == 6 and SeastarSwimEnv()._task.headings_of(0) is None
+    plain = SeastarSwimEnv()
+    assert len(np.unique([*drawn[0], *drawn[1]])) == 6 and plain.task.headings_of(plain._robots, 0) is None
 
 
 @pytest.mark.parametrize("angle, turn", [(0, 0), (np.pi, -np.pi), (1.5 * np.pi, -np.pi / 2), (-7.0, 2 * np.pi - 7.0)])
@@ -143,7 +144,7 @@ def test_pictures_show_the_asked_heading_and_limb_1():
         env = SeastarSwimEnv([[0.3, 0.0]], fidelity="fast", render_mode="rgb_array", headings=headings)
         env.reset(seed=0)
         pictures.append(env.render())
-        camera = env._get_renderer().camera
+        camera = env._batch.pictures.renderer_of(0).camera
     places = [camera.to_pixels(place) for place in ([0.3, 0.025], [0.3, -0.025], [0.1, 0.0])]
     orange = [[is_orange(picture[int(y), int(x)]) for x, y in places] for picture in pictures]
     assert orange == [[True, False, True], [False, True, True], [False, False, False]]

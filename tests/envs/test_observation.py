@@ -25,7 +25,7 @@ from seastar_gym.envs.observation import observe
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import at_stations, heading_of, stations_of
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
-from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import to_rows
 
@@ -288,7 +288,7 @@ def test_delays_and_noise_are_drawn_for_every_episode():
 
 
 def batch(task, n=6, **arguments):
-    return SeastarTaskVectorEnv(n, 400, task, fidelity="fast", threads=1, **arguments)
+    return SeastarSwimVectorEnv(n, 400, task=task, fidelity="fast", threads=1, **{"actions": "pairs"} | arguments)
 
 
 @pytest.mark.parametrize(

@@ -22,12 +22,13 @@ from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.randomization import drawn_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import limb_order, symmetry_in, transform_commands
+from seastar_gym.envs.tasks import NAMED
 from seastar_gym.envs.tasks.course import CHASE, Courses, Pursuit, draw_course
 from seastar_gym.envs.tasks.discs import rims, ways
-from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv
 from seastar_gym.envs.tasks.obst_trap import FIRST, LAST, draw_discs, draw_horseshoe, draw_kind
 from seastar_gym.envs.tasks.prizes import draw_prizes
 from seastar_gym.envs.tasks.rounds import best_round, distances, greedy_round
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.currents import UniformCurrent
 
 IDS = tuple(seastar_gym.TASKS)
@@ -59,7 +60,7 @@ def test_an_episode_follows_from_its_split_and_its_number(id):
     chosen = env.reset(seed=5, options={"instance": info["instance"]})[1]
     assert all(np.array_equal(chosen[name], info[name]) for name in info)
     other = made(id, split="train").reset(options={"instance": info["instance"]})[1]
-    hidden = HIDDEN[seastar_gym.TASKS[id][0]]
+    hidden = HIDDEN[seastar_gym.TASKS[id].task]
     drawn = ["distance", *(name for name in hidden if name not in ("wiring", "limb_strengths"))]
     assert all(not np.array_equal(other[name], info[name]) for name in drawn)
 
@@ -78,27 +79,27 @@ def test_a_batch_draws_numbers_from_all_of_the_split_and_takes_one_or_one_for_ea
     assert info["instance"].tolist() == [*range(8)] and not np.array_equal(each[0], each[1])
 
 
-@pytest.mark.parametrize("id", [id for id in IDS if HIDDEN[seastar_gym.TASKS[id][0]]])
+@pytest.mark.parametrize("id", [id for id in IDS if HIDDEN[seastar_gym.TASKS[id].task]])
 def test_what_is_hidden_is_not_observed(id):
     """Two robots that differ in what is hidden, and in nothing else, begin with the same observation."""
-    env, (name, *_) = made(id), HIDDEN[seastar_gym.TASKS[id][0]]
+    env, (name, *_) = made(id), HIDDEN[seastar_gym.TASKS[id].task]
     observation, _ = env.reset(seed=0)
-    task = env.unwrapped._task
+    robots = env.unwrapped._robots
+    now, simulator = robots.episode, robots.simulator
     if name == "wiring":
-        task.wiring *= -1.0
+        now.wiring *= -1.0
     elif name == "course":
-        place, velocity = task.prey()
-        mirrored = _course_that_turns_the_other_way(task.courses[0], place[0], velocity[0])
-        task.courses[0] = mirrored
+        place, velocity = robots.task.prey(robots)
+        now.course[0] = _course_that_turns_the_other_way(now.course[0], place[0], velocity[0])
     elif name == "limb_strengths":
-        task.simulator.set_limb_strengths(1.0 - task.simulator.limb_strengths)
+        simulator.set_limb_strengths(1.0 - simulator.limb_strengths)
     elif name == "discs":
-        far = np.argsort(np.hypot(*task.discs[0, :, :2].T) - task.discs[0, :, 2])[6:]
-        task.discs[0, far, 0] += 0.2
+        far = np.argsort(np.hypot(*now.discs[0, :, :2].T) - now.discs[0, :, 2])[6:]
+        now.discs[0, far, 0] += 0.2
     else:
-        task.drawn[name] = task.drawn[name] * 1.1 + 0.001
-        task.simulator.set_scene(drawn_scene(task.simulator.scene, task.drawn))
-    np.testing.assert_allclose(task.observe()[0], observation, atol=1e-6)
+        robots.drawn[name] = robots.drawn[name] * 1.1 + 0.001
+        simulator.set_scene(drawn_scene(simulator.scene, robots.drawn))
+    np.testing.assert_allclose(robots.observe()[0], observation, atol=1e-6)
 
 
 def _course_that_turns_the_other_way(course, place, velocity):
@@ -115,7 +116,7 @@ def test_pictures_tell_in_words_what_is_hidden(golden):
     for id in IDS:
         env = made(id).unwrapped
         env.reset(options={"instance": 1})
-        scenery = env._task.scenery(0)
+        scenery = env.task.scenery(env._robots, 0)
         lines.append(f"{id}: {scenery.progress}; {scenery.note}; {[ring.label for ring in scenery.rings]}")
     golden("words.txt", "\n".join(lines))
 
@@ -125,11 +126,11 @@ def test_pictures_tell_in_words_what_is_hidden(golden):
 
 @pytest.mark.parametrize("period", [1.0, 0.5])
 def test_a_miswired_limb_does_the_opposite_and_tells_of_wires_by_the_names_of_commands(period):
-    env = SeastarTaskEnv(task="miswired", fidelity="fast", actions="continuous", decision_period=period)
+    env = SeastarSwimEnv(task="miswired", fidelity="fast", actions="continuous", decision_period=period)
     env.reset(options={"instance": 4})
-    wiring, plain = env._task.wiring[0].copy(), copy.deepcopy(env)
+    wiring, plain = env._robots.episode.wiring[0].copy(), copy.deepcopy(env)
     assert set(wiring) == {-1.0, 1.0}
-    plain._task.wiring[:] = 1.0
+    plain._robots.episode.wiring[:] = 1.0
     wires = slice(182, 192) if period < 1.0 else slice(182, 182)
     for command in np.array([[1, -1, 0, 0.5, 0], [-1, 0, 1, 0, 1], [0, 0, 0, 0, 0]], np.float32):
         ours, *_, info = env.step(command)
@@ -146,7 +147,7 @@ def test_a_miswired_limb_does_the_opposite_and_tells_of_wires_by_the_names_of_co
 
 def test_wires_are_swapped_and_limbs_are_dead_as_often_as_asked():
     def drawn(n, task, name):
-        return SeastarTaskVectorEnv(n, task=task, fidelity="fast").reset(seed=0)[1][name]
+        return SeastarSwimVectorEnv(n, actions="pairs", task=task, fidelity="fast").reset(seed=0)[1][name]
 
     assert abs((drawn(400, Miswired(0.2), "wiring") < 0.0).mean() - 0.2) < 0.04
     assert (drawn(9, Miswired(0.0), "wiring") == 1.0).all()
@@ -159,7 +160,7 @@ def test_wires_are_swapped_and_limbs_are_dead_as_often_as_asked():
 
 
 def test_a_resting_robot_is_carried_by_the_current():
-    env = SeastarTaskEnv(task="station", fidelity="fast", actions="joint")
+    env = SeastarSwimEnv(task="station", fidelity="fast", actions="joint")
     _, first = env.reset(seed=1)
     flow = np.array([first["fluid.current.u_x"], first["fluid.current.u_y"]])
     assert 0.001 <= np.hypot(*flow) <= 0.0025
@@ -173,19 +174,19 @@ def test_a_resting_robot_is_carried_by_the_current():
 
 
 def test_a_station_is_near_and_no_waypoint_rewards_count_its_distance_and_its_current_is_seen_in_pictures_alone():
-    env = SeastarTaskEnv(task=Station(distance=(0.01, 0.03)), fidelity="fast", actions="joint")
+    env = SeastarSwimEnv(task=Station(distance=(0.01, 0.03)), fidelity="fast", actions="joint")
     _, before = env.reset(seed=2)
     assert 0.01 <= before["distance"] <= 0.03 and env.waypoints.shape == (0, 2) and env.scene.fluid.current is None
-    assert env._frame().current == UniformCurrent(before["fluid.current.u_x"], before["fluid.current.u_y"])
+    assert env.frame().current == UniformCurrent(before["fluid.current.u_x"], before["fluid.current.u_y"])
     *_, info = env.step(17)
     assert info["distance"] == pytest.approx(np.hypot(*(info["hub_position"] - info["station"])), abs=1e-15)
     assert info["reward_progress"] == pytest.approx(200.0 * (before["distance"] - info["distance"]))
     assert info["reward_distance"] == pytest.approx(-100.0 * min(info["distance"], 0.02))
     assert info["is_success"] == (info["distance"] <= 0.002)
-    env = SeastarTaskEnv(task=Station(current=(0.0, 0.0)), fidelity="fast")
+    env = SeastarSwimEnv(actions="pairs", task=Station(current=(0.0, 0.0)), fidelity="fast")
     env.reset(seed=0)
     for away, counted in ((0.015, 0.015), (0.02, 0.02), (0.021, 0.02), (0.5, 0.02)):  # and no farther than 20 mm
-        env._task.station[0] = env._task.simulator.hub_position()[0] + [away, 0.0]
+        env._robots.episode.station[0] = env._robots.simulator.hub_position()[0] + [away, 0.0]
         assert env.step(0)[4]["reward_distance"] == pytest.approx(-100.0 * counted, rel=1e-3)
 
 
@@ -227,25 +228,25 @@ def test_every_prey_that_is_drawn_can_be_met_and_most_only_ahead_of_it():
 
 
 def test_a_prey_within_reach_is_caught_and_the_next_one_begins_around_the_robot():
-    env = SeastarTaskEnv(task=Prey(wanted=2), fidelity="fast")
+    env = SeastarSwimEnv(actions="pairs", task=Prey(wanted=2), fidelity="fast")
     env.reset(seed=0)
-    task, hub = env._task, env.simulator.hub_position()[0]
+    now, hub = env._robots.episode, env.simulator.hub_position()[0]
     for catches in (1, 2):
-        task.courses[0] = [*hub, task.simulator.time[0], 1e-3, 0.0, 0.0, 0.0, 0.1]
+        now.course[0] = [*hub, env.simulator.time[0], 1e-3, 0.0, 0.0, 0.0, 0.1]
         _, _, over, _, info = env.step(0)
         assert info["catches"] == catches and info["reward_catch"] == 10.0 and not over
         assert info["is_success"] == (catches == 2)
-        np.testing.assert_array_equal(info["course"][:2], task._drawn_courses[0, catches, :2] + info["hub_position"])
+        np.testing.assert_array_equal(info["course"][:2], now.drawn[0, catches, :2] + info["hub_position"])
         assert info["course"][2] == info["time"] and info["distance"] >= 0.08
     *_, info = env.step(0)
     assert info["catches"] == 2 and info["reward_catch"] == 0.0
 
 
 def test_progress_counts_against_the_prey_that_was_hunted_and_the_second_target_tells_its_velocity():
-    env = SeastarTaskEnv(task="prey", fidelity="fast")
+    env = SeastarSwimEnv(actions="pairs", task="prey", fidelity="fast")
     observation, before = env.reset(seed=0)
     ahead = 0.1 * (observation[-2:] - observation[-4:-2]) / 10.0
-    assert np.hypot(*ahead) == pytest.approx(np.hypot(*env._task.prey()[1][0]), rel=1e-5)
+    assert np.hypot(*ahead) == pytest.approx(np.hypot(*env.task.prey(env._robots)[1][0]), rel=1e-5)
     *_, info = env.step(6)
     assert info["reward_progress"] == pytest.approx(50.0 * (before["distance"] - info["distance"]))
 
@@ -255,7 +256,7 @@ def test_progress_counts_against_the_prey_that_was_hunted_and_the_second_target_
 
 @pytest.mark.parametrize("period", [1.0, 0.5])
 def test_dead_limbs_do_nothing_and_nothing_is_seen_but_the_way(period):
-    env = SeastarTaskEnv(task="fail-blind", fidelity="fast", actions="continuous", decision_period=period)
+    env = SeastarSwimEnv(task="fail-blind", fidelity="fast", actions="continuous", decision_period=period)
     _, first = env.reset(options={"instance": 4})
     strengths, live = first["limb_strengths"], copy.deepcopy(env)
     assert sorted(strengths) == [0.0, 0.0, 1.0, 1.0, 1.0]
@@ -269,16 +270,16 @@ def test_dead_limbs_do_nothing_and_nothing_is_seen_but_the_way(period):
 
 @pytest.mark.parametrize("period", [1.0, 0.5])
 def test_odometry_is_the_way_in_the_frame_in_which_the_decision_began(period):
-    env = SeastarTaskEnv(task="fail-blind", fidelity="fast", actions="joint", decision_period=period)
+    env = SeastarSwimEnv(task="fail-blind", fidelity="fast", actions="joint", decision_period=period)
     seen, info = env.reset(seed=0)
     assert not seen[-7:-4].any()
     for action in (5, 100, 200, 77):
-        heading, before = env._task.heading()[0], info["hub_position"]
+        heading, before = env._robots.heading()[0], info["hub_position"]
         seen, *_, info = env.step(action)
         x, y = (info["hub_position"] - before) / (0.025 * period)
         c, s = np.cos(heading), np.sin(heading)
         np.testing.assert_allclose(seen[-7:-5], [c * x + s * y, c * y - s * x], atol=1e-6)
-        assert seen[-5] == pytest.approx(env._task.heading()[0] - heading, abs=1e-6)
+        assert seen[-5] == pytest.approx(env._robots.heading()[0] - heading, abs=1e-6)
     assert np.abs(seen[-7:-4]).max() > 0.01
 
 
@@ -340,11 +341,11 @@ def test_ways_on_the_grid_are_as_long_as_ways_are():
 
 
 def test_the_six_nearest_discs_are_seen_in_the_body_frame():
-    env = SeastarTaskEnv(task="obst-trap", fidelity="fast")
+    env = SeastarSwimEnv(actions="pairs", task="obst-trap", fidelity="fast")
     seen, info = env.reset(options={"instance": 2})
     for action in (3, 8, 14):
         discs = seen[-22:-4].reshape(6, 3).astype(np.float64) * 0.1
-        heading = env._task.heading()[0]
+        heading = env._robots.heading()[0]
         c, s = np.cos(heading), np.sin(heading)
         world = discs[:, :2] @ [[c, s], [-s, c]] + info["hub_position"]
         far = np.hypot(*(info["discs"][:, :2] - info["hub_position"]).T) - info["discs"][:, 2]
@@ -356,13 +357,14 @@ def test_the_six_nearest_discs_are_seen_in_the_body_frame():
 
 @pytest.mark.parametrize("at_goal, in_disc", [(True, False), (True, True), (False, True)])
 def test_who_reaches_the_goal_ends_with_success_and_who_touches_a_disc_without(at_goal, in_disc):
-    env = SeastarTaskEnv(task="obst-trap", fidelity="fast")
+    env = SeastarSwimEnv(actions="pairs", task="obst-trap", fidelity="fast")
     _, info = env.reset(seed=0)
     assert not info["is_success"]
     if at_goal:
-        env._task._set_path(0, info["hub_position"][None] + [[0.005, 0.0]])
+        env._robots.episode.waypoints[0, 0] = info["hub_position"] + [0.005, 0.0]
+        env.task.know_legs(env._robots)
     if in_disc:
-        env._task.discs[0, 0] = [*info["hub_position"], 0.05]
+        env._robots.episode.discs[0, 0] = [*info["hub_position"], 0.05]
     _, reward, over, _, info = env.step(0)
     assert over and info["is_success"] != in_disc and info["reward_touch"] == (-20.0 if in_disc else 0.0)
     assert in_disc == (info["clearance"] < 0.0) and info["reward_waypoint"] == at_goal
@@ -371,7 +373,8 @@ def test_who_reaches_the_goal_ends_with_success_and_who_touches_a_disc_without(a
 
 def test_the_geodesic_potential_counts_the_way_around():
     straight, around = (
-        SeastarTaskEnv(task=ObstTrap(potential=potential), fidelity="fast") for potential in ("straight", "geodesic")
+        SeastarSwimEnv(actions="pairs", task=ObstTrap(potential=potential), fidelity="fast")
+        for potential in ("straight", "geodesic")
     )
     (first, info), (its_first, _) = (env.reset(options={"instance": 5}) for env in (straight, around))
     np.testing.assert_array_equal(first, its_first)
@@ -423,34 +426,34 @@ def test_greed_takes_worth_per_metre_while_there_is_way_and_costs_in_every_draw(
 
 
 def test_a_prize_within_reach_is_taken_once_and_in_time():
-    env = SeastarTaskEnv(task=Prizes(seconds=2.5), fidelity="fast")
+    env = SeastarSwimEnv(actions="pairs", task=Prizes(seconds=2.5), fidelity="fast")
     _, info = env.reset(seed=0)
     worth = info["prizes"][:, 2].copy()
-    env._task.prizes[0, 3, :2] = info["hub_position"]
+    env._robots.episode.prizes[0, 3, :2] = info["hub_position"]
     seen, _, over, _, info = env.step(0)
     assert info["taken"] == worth[3] and info["reward_prize"] == 5.0 * worth[3] and not over
-    assert len(env._task.scenery(0).rings) == len(worth) - 1
+    assert len(env.task.scenery(env._robots, 0).rings) == len(worth) - 1
     assert info["prizes"][3, 2] == 0.0 and not seen[-8:-5].any()  # the last of the prizes that are seen is none
     assert seen[-5] == pytest.approx(1.0 - 1.0 / 2.5)
     assert env.step(0)[4]["reward_prize"] == 0.0
-    env._task.prizes[0, 5, :2] = info["hub_position"]
+    env._robots.episode.prizes[0, 5, :2] = info["hub_position"]
     *_, info = env.step(0)
     assert info["time"] == 3.0 and info["taken"] == worth[3]  # too late
     _, info = env.reset(seed=0)
-    env._task.prizes[0, :, :2] = info["hub_position"]
+    env._robots.episode.prizes[0, :, :2] = info["hub_position"]
     seen, _, over, _, info = env.step(0)
     assert over and info["is_success"] and info["distance"] == 0.0 and not seen[-4:].any()
     assert info["taken"] == pytest.approx(info["reward_prize"] / 5.0)
-    env = SeastarTaskEnv(task="prizes", fidelity="fast")
+    env = SeastarSwimEnv(actions="pairs", task="prizes", fidelity="fast")
     _, info = env.reset(seed=0)
     hub = info["hub_position"]
-    env._task.prizes[0] = [*(hub + [0.0151, 0.0]), 2.0]
-    env._task.prizes[0, 0, :2] = hub + [0.0149, 0.0]
-    env._task._hub = hub[None].copy()
+    env._robots.episode.prizes[0] = [*(hub + [0.0151, 0.0]), 2.0]
+    env._robots.episode.prizes[0, 0, :2] = hub + [0.0149, 0.0]
+    env._robots.episode.hub = hub[None].copy()
     assert env.step(0)[4]["taken"] == 2.0
-    env._task.prizes[0] = [*(hub + [0.3, 0.0]), 0.0]
-    env._task.prizes[0, 0, 2] = 4.0
-    env._task._hub = hub[None] - [0.1, 0.0]  # as if it had come by a tenth of a metre
+    env._robots.episode.prizes[0] = [*(hub + [0.3, 0.0]), 0.0]
+    env._robots.episode.prizes[0, 0, 2] = 4.0
+    env._robots.episode.hub = hub[None] - [0.1, 0.0]  # as if it had come by a tenth of a metre
     gained = 2.0 * 4.0 * (np.exp(-3.0) - np.exp(-4.0))
     assert env.step(0)[4]["reward_progress"] == pytest.approx(gained, rel=1e-3)
 
@@ -459,24 +462,24 @@ def test_a_prize_within_reach_is_taken_once_and_in_time():
 def test_prizes_end_as_terminated_when_the_time_that_they_show_is_up(id):
     """What is observed ends an episode, and what is not observed cuts it off."""
     env, batch = made(id), gym.make_vec(id, 2, "vector_entry_point", fidelity="fast")
-    decisions = round(env.unwrapped.challenge.seconds / env.unwrapped.decision_period)
+    decisions = round(env.unwrapped.task.seconds / env.unwrapped.decision_period)
     env.reset(seed=0), batch.reset(seed=[0, 0])
     for _ in range(decisions):
         seen, _, terminated, truncated, info = env.step(0)
         _, _, all_terminated, all_truncated, _ = batch.step(np.zeros(2, int))
         assert not truncated and not all_truncated.any() and terminated == all_terminated.all()
         assert terminated == (seen[-5] < 1e-6)
-    assert terminated and not info["is_success"] and info["time"] == pytest.approx(env.unwrapped.challenge.seconds)
+    assert terminated and not info["is_success"] and info["time"] == pytest.approx(env.unwrapped.task.seconds)
 
 
 def test_prizes_are_seen_nearest_first_and_two_of_them_as_targets():
-    env = SeastarTaskEnv(task="prizes", fidelity="fast")
+    env = SeastarSwimEnv(actions="pairs", task="prizes", fidelity="fast")
     seen, info = env.reset(options={"instance": 2})
     shown = seen[-35:-5].reshape(10, 3)
     far = np.hypot(*shown[:, :2].T)
     np.testing.assert_allclose(far, 10.0 * np.sort(np.hypot(*info["prizes"][:, :2].T)), rtol=1e-6)
     np.testing.assert_allclose(seen[-4:].reshape(2, 2), shown[:2, :2], atol=1e-6)
-    heading = env._task.heading()[0]
+    heading = env._robots.heading()[0]
     away = info["prizes"][np.argmin(np.hypot(*info["prizes"][:, :2].T))]
     angle = np.arctan2(shown[0, 1], shown[0, 0]) + heading
     assert np.exp(1j * angle) == pytest.approx(np.exp(1j * np.arctan2(away[1], away[0])), abs=1e-6)
@@ -515,22 +518,24 @@ def test_privileged_observations_are_those_without_a_camera():
 
 
 OF_THEIR_OWN = (FailBlind, Miswired, ObstTrap, Prizes)
-"""Challenges that show more than robots, and are seen without noise; test_observation.py turns what a camera sees."""
+"""Tasks that show more than robots, and are seen without noise; test_observation.py turns what a camera sees."""
 
 
-@pytest.mark.parametrize("id", [id for id in IDS if isinstance(CHALLENGES[seastar_gym.TASKS[id][0]], OF_THEIR_OWN)])
+@pytest.mark.parametrize("id", [id for id in IDS if isinstance(NAMED[seastar_gym.TASKS[id].task], OF_THEIR_OWN)])
 def test_what_a_task_shows_of_its_own_is_carried_by_the_symmetry(id):
     """A robot turned by fifths of a turn, in a world that may be mirrored, swims and sees as the symmetry says."""
     env, other = made(id).unwrapped, made(id).unwrapped
     for element in (2, 3, 9):
         env.reset(options={"instance": 1}), other.reset(options={"instance": 1})
-        _carry(env._task, other._task, element)
+        _carry(env._robots, other._robots, element)
         for action in (7, 11, 2):
-            seen, theirs = (task.observe() for task in (env._task, other._task))
+            seen, theirs = (task.observe() for task in (env._robots, other._robots))
             np.testing.assert_allclose(theirs, symmetry_in(env).carry(seen, [element]), atol=2e-4)
             action = np.array([action])
             env.step(action[0]), other.step(symmetry_in(env).carry_actions(action, [element])[0])
-        np.testing.assert_array_equal(transform_commands(env._task.last_commands, [element]), other._task.last_commands)
+        np.testing.assert_array_equal(
+            transform_commands(env._robots.last_commands, [element]), other._robots.last_commands
+        )
 
 
 def _carry(ours, theirs, element):
@@ -538,11 +543,10 @@ def _carry(ours, theirs, element):
     flip = np.array([1.0, -1.0 if element % 2 else 1.0])
     heading = flip[1] * (ours.heading() + 0.4 * np.pi * ((element + 1) // 2))
     for name in ("waypoints", "discs", "prizes"):
-        if hasattr(ours, name):
-            world = getattr(theirs, name)
-            world[..., :2] *= flip
-    if hasattr(ours, "wiring"):
+        if hasattr(theirs.episode, name):
+            getattr(theirs.episode, name)[..., :2] *= flip
+    if ours.wiring is not None:
         theirs.wiring[:] = ours.wiring[:, limb_order(5)[element]]
     theirs.simulator.set_limb_strengths(ours.simulator.limb_strengths[:, limb_order(5)[element]])
     theirs.simulator.reset(np.array([True]), heading)
-    theirs._begin(np.array([True]))
+    theirs.task.begin(theirs, np.array([True]))

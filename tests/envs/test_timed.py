@@ -17,8 +17,7 @@ from seastar_gym import (
     ThermalSma,
 )
 from seastar_gym.accuracy.info import IN_TIME
-from seastar_gym.envs.commands import to_commands
-from seastar_gym.envs.masks import action_masks
+from seastar_gym.envs.commands import action_masks, to_commands
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 
@@ -188,4 +187,4 @@ def test_a_second_has_ten_pictures_of_commands_and_warm_wires():
     for env in (warm, cold):
         env.reset(seed=0)
         env.step(7)
-    assert warm._frame().wire_state.max() == pytest.approx(5 / 9) and cold._frame().wire_state is None
+    assert warm.frame().wire_state.max() == pytest.approx(5 / 9) and cold.frame().wire_state is None

@@ -11,9 +11,8 @@ from gymnasium.vector import AutoresetMode
 from episodes import SHORT, assert_same_steps, both
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar
-from seastar_gym.envs.batch_pictures import picture_size
-from seastar_gym.envs.buffers import Buffers
-from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.envs.rendering import picture_size
+from seastar_gym.envs.vector import Buffers, SeastarSwimVectorEnv
 
 ID = "SeastarSwim-v0"
 

@@ -15,17 +15,16 @@ from refusals import assert_refused
 from seastar_gym import TASKS, Scene, SmaPulse
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.commands import Actions, action_space, decisions_in, to_commands
-from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import SwimTask
-from seastar_gym.envs.tasks.envs import CHALLENGES
+from seastar_gym.envs.tasks import NAMED
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.disturbances import Disturbance
 from seastar_gym.evaluation.films import CLOSING_SECONDS
-from seastar_gym.evaluation.measures import MEASURES, SECONDS, measure_of, measure_of_challenge
+from seastar_gym.evaluation.measures import MEASURES, SECONDS, measure_of, measure_of_task
 from seastar_gym.evaluation.pictures import COLOURS, FPS, FRAMES_PER_STROKE
 from seastar_gym.evaluation.results import results, time_series, write_csv
-from seastar_gym.evaluation.rollout import Episodes, TaskBatch, rollout
+from seastar_gym.evaluation.rollout import Episodes, rollout
 from seastar_gym.evaluation.swim import RECORDED, swim, swims_of
 from seastar_gym.evaluation.tasks import make_batch
 
@@ -217,14 +216,12 @@ def test_episodes_of_a_batch_are_those_of_one_robot_each(kind):
 
 
 def test_who_has_arrived_rests_until_all_have():
-    task = SwimTask(SwimOptions("line", scene=Scene.preset("fast")), 2, 1)
-    robots, commands = TaskBatch(task), []
-    robots.reset(seed=0)
-    step = robots.step
-    robots.step = lambda actions: commands.append(np.array(actions)) or step(actions)
+    batch, commands = SeastarSwimVectorEnv(2, path="line", fidelity="fast", threads=1), []
+    step = batch.step
+    batch.step = lambda actions: commands.append(np.array(actions)) or step(actions)
     paths = [np.array(SHORT), np.array([[0.04, 0.0]])]
-    task._draw = lambda robot, rng, asked: task._set_path(robot, paths[robot])
-    early, late = swims_of("asked", rollout(robots, Asked(), seeds=0, record=RECORDED))
+    batch.set_attr("path", paths)
+    early, late = swims_of("asked", rollout(batch, Asked(), seeds=0, record=RECORDED))
     assert early.finished and late.finished and early.strokes < late.strokes == len(commands)
     assert [given[0].any() for given in commands] == [stroke < early.strokes for stroke in range(late.strokes)]
     assert all(given[1].any() for given in commands)
@@ -240,7 +237,7 @@ def test_who_has_arrived_rests_until_all_have():
 @pytest.mark.parametrize("id", TASKS)
 def test_every_task_is_measured_by_what_it_asks_for(id):
     """Prey that is caught, worth of prizes, the distance from the station, otherwise the time until all is done."""
-    challenge = TASKS[id][0].removeprefix("fast-")
+    challenge = TASKS[id].task.removeprefix("fast-")
     wanted = {each.__name__.lower(): measure for each, measure in MEASURES.items()}.get(challenge, SECONDS)
     assert measure_of(gym.make(id, fidelity="fast").unwrapped) is wanted
 
@@ -257,4 +254,4 @@ def test_measures_are_those_of_finished_and_unfinished_episodes():
         ("miswired", episodes, [400.0, 10.0]), ("prey", episodes, [4.0, 1.0]), ("prizes", episodes, [8.0, 2.0]),
         ("station", both, [2.0, 3.0]),
     ):  # fmt: skip
-        assert measure_of_challenge(CHALLENGES[challenge]).of(of).tolist() == pytest.approx(expected)
+        assert measure_of_task(NAMED[challenge]).of(of).tolist() == pytest.approx(expected)

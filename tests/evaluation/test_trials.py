@@ -9,10 +9,11 @@ from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import SwimOptions, make_scene
+from seastar_gym.envs.robots import Robots
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import SwimTask
+from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.evaluation import results, statistics
-from seastar_gym.evaluation.disturbances import DISTURBANCES, Disturbance, DisturbedTask
+from seastar_gym.evaluation.disturbances import DISTURBANCES, Disturbance, DisturbedRobots
 from seastar_gym.evaluation.many import swim_many
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.evaluation.trials import SETS, read_trials
@@ -23,8 +24,8 @@ N = 16
 
 def disturbed(path="pentagon", scene=FAST, **disturbance):
     rng = np.random.default_rng(0)
-    options = SwimOptions(path, scene=scene, random_heading=True)
-    return begun(DisturbedTask(Disturbance(**disturbance), rng, options, N, 1))
+    task, options = AlongPath(path, random_heading=True), SwimOptions(scene=scene)
+    return begun(DisturbedRobots(Disturbance(**disturbance), rng, task, options, N, 1))
 
 
 def begun(task):
@@ -38,12 +39,12 @@ def hubs_of(task):
 
 
 def test_nothing_disturbed_is_the_task_itself():
-    task, plain = disturbed(), begun(SwimTask(SwimOptions(scene=FAST, random_heading=True), N, 1))
+    task, plain = disturbed(), begun(Robots(AlongPath(random_heading=True), SwimOptions(scene=FAST), N, 1))
     commands = np.tile([0.0, 1.0, 0.0, 0.0, -1.0], (N, 1))
     for _ in range(3):
         np.testing.assert_array_equal(task.observe(), plain.observe())
-        np.testing.assert_array_equal(task.step(commands).commands, commands)
-        plain.step(commands)
+        task.step(commands), plain.step(commands)
+        np.testing.assert_array_equal(task.last_commands, commands)
     np.testing.assert_array_equal(hubs_of(task), plain.simulator.hub_position())
 
 
@@ -72,7 +73,8 @@ def test_a_current_carries_the_robots_its_own_way_and_the_waypoints_stay(mm_per_
 def test_every_limb_is_the_weak_one_of_some_robot():
     commands = np.tile([1.0, -1.0, 1.0, -1.0, 1.0], (N, 1))
     weak = disturbed(**vars(DISTURBANCES["a limb at half strength"]))
-    np.testing.assert_array_equal(weak.step(commands).commands, commands)
+    weak.step(commands)
+    np.testing.assert_array_equal(weak.last_commands, commands)
     strengths = np.ones((N, 5))
     strengths[np.arange(N), np.arange(N) % 5] = 0.5
     np.testing.assert_array_equal(weak.simulator.limb_strengths, strengths)
@@ -94,7 +96,7 @@ def test_noise_is_on_positions_and_has_its_size():
 def test_lost_strokes_are_lost_whole_and_as_often_as_said():
     lost_strokes = DISTURBANCES["every tenth stroke lost"]
     task, commands = disturbed(**vars(lost_strokes)), np.tile([0.0, 1.0, 0.0, 0.0, -1.0], (N, 1))
-    carried_out = np.array([task.step(commands).commands for _ in range(30)])
+    carried_out = np.array([task.step(commands) and task.last_commands for _ in range(30)])
     lost = (carried_out == 0.0).all(axis=2)
     assert lost.mean() == pytest.approx(0.1, abs=0.04)
     np.testing.assert_array_equal(carried_out[~lost], np.broadcast_to(commands, carried_out.shape)[~lost])

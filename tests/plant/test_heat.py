@@ -116,7 +116,7 @@ def test_what_policies_command_is_heated(name, options, policy, most):
     for decision in range(60):
         action, state = policy.predict(observation, state, np.array([decision == 0]), deterministic=True)
         observation, *_ = env.step(action)
-        command = np.sign(env.unwrapped._command).astype(int)
+        command = np.sign(env.unwrapped._robots.last_commands[0]).astype(int)
         resting = guard.resting()
         follows = ~((command > 0) & resting[:, 0] | (command < 0) & resting[:, 1])
         masked, asked = masked + (~follows).sum(), asked + (command != 0).sum()

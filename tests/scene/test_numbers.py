@@ -29,7 +29,7 @@ from seastar_gym import (
 )
 from seastar_gym.envs.randomization import LogUniform
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.tasks.envs import CHALLENGES
+from seastar_gym.envs.tasks import NAMED
 from seastar_gym.scene.checks import (
     LONGEST_SHOWN,
     require_count,
@@ -62,7 +62,7 @@ def parts_of(value):
 SCENES = [*(Scene(**parts) for parts in PARTS.values()), *(Scene(actuator=each) for each in ACTUATORS.values())]
 OTHERS = [
     HeadingTargets(0.5), HeadingTargets((0.5, 1.0)), Uniform(0.5, 1.0), LogUniform(0.5, 1.0), Normal(0.5, 1.0),
-    RewardWeights(), Sight(delay=Uniform(0.5, 1.0)), Sight(), *CHALLENGES.values(),
+    RewardWeights(), Sight(delay=Uniform(0.5, 1.0)), Sight(), *NAMED.values(),
 ]  # fmt: skip
 FOUND = {repr(part): part for part in parts_of((*SCENES, *OTHERS))}
 EXAMPLES = {type(part): part for part in reversed(FOUND.values())}
@@ -202,7 +202,7 @@ def test_a_whole_number_or_one_of_numpy_is_the_float():
 def test_numbers_of_environments_and_of_each_robot_are_floats_too():
     for number in (np.float32(0.02), np.float16(0.02), 1):
         env = SeastarSwimEnv(waypoint_radius=number, decision_period=1, scene=Scene())
-        assert repr(env._task.waypoint_radius) == repr(float(number)) and repr(env.decision_period) == "1.0"
+        assert repr(env.waypoint_radius) == repr(float(number)) and repr(env.decision_period) == "1.0"
     for robots in (np.array([1, 2]), np.array([1, 2], np.uint8), np.array([1, 2], np.float32), PerRobot((1, 2))):
         assert repr(Seastar(density=robots)) == repr(Seastar(density=np.array([1.0, 2.0])))
 

@@ -37,7 +37,8 @@ from seastar_gym import (
     register_part,
 )
 from seastar_gym.envs.options import SwimOptions
-from seastar_gym.envs.tasks.envs import CHALLENGES
+from seastar_gym.envs.tasks import NAMED
+from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.scene.actuators.pulse import HeatingAndCooling
 from seastar_gym.scene.per_robot import numbers_of
 from seastar_gym.scene.serial import KINDS, VERSION, from_dict, to_dict
@@ -82,7 +83,7 @@ def test_every_part_of_the_package_is_registered_and_in_the_tables():
 
 OF_ENVIRONMENTS = [
     RewardWeights(199.9, 0.0, 1 / 3), HeadingTargets((0.1, 1 / 3), 0.2), HeadingTargets("random"),
-    Sight(100 / 3, Uniform(0.1, 1 / 3), sees=3), *CHALLENGES.values(),
+    Sight(100 / 3, Uniform(0.1, 1 / 3), sees=3), *NAMED.values(),
     DomainRandomization({"robot.density": Uniform(900, 1100.1), "actuator.peak_angle": Uniform(0, 0.5)}),
     DomainRandomization({"fluid.density": LogUniform(1.0, 1 / 0.3), "actuator.peak_angle": Normal(0.5, 0.01)}),
 ]  # fmt: skip
@@ -120,9 +121,8 @@ def test_any_mapping_and_sequence_is_plain_data_of_scenes_and_of_what_environmen
     for part in OF_ENVIRONMENTS:
         assert from_dict(form(to_dict(part)), type(part)) == part
     path = [[0.1, 0.0], [0.2, 0.1]]
-    options = SwimOptions(path=form({"path": path})["path"], sight=form(to_dict(Sight())))
-    np.testing.assert_array_equal(options.path, path)
-    assert options.sight == Sight()
+    np.testing.assert_array_equal(AlongPath(form({"path": path})["path"]).path, path)
+    assert SwimOptions(sight=form(to_dict(Sight()))).sight == Sight()
 
 
 def test_arrays_are_sequences_of_plain_data_unless_entries_are_masked():

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse
-from seastar_gym.envs.swimming import first_after
+from seastar_gym.envs.robots import first_after
 from seastar_gym.simulator.pauses import completed, pausing
 from seastar_gym.simulator.schedule import interval_times, step_times
 

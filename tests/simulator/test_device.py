@@ -23,8 +23,8 @@ from seastar_gym import (
     SmaPulse,
     StrokeReport,
 )
-from seastar_gym.envs.buffers import Buffers
-from seastar_gym.envs.pictures import observing
+from seastar_gym.envs.observation import observing
+from seastar_gym.envs.vector import Buffers
 from seastar_gym.simd import cuda
 from seastar_gym.simd.compilation import kept_code
 from seastar_gym.simd.device import Program

@@ -8,7 +8,7 @@ import pytest
 
 from hubs import TEN, robot_with
 from seastar_gym import Body, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State
-from seastar_gym.envs.pictures import observed_rows
+from seastar_gym.envs.observation import observed_rows
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.scene.per_robot import side_by_side
 from seastar_gym.simd.dispatch import KnownCode, code_for

@@ -124,11 +124,11 @@ def test_greedy_rules_end_near_no_disc_and_swim_to_the_prize_of_most_worth_per_m
     assert 0.6 * np.hypot(*disc) < tasks.CLEAR < away
     batch = make_batch("SeastarPrizes-v0", 1, split="test", fidelity="fast")
     batch.reset(seed=0)
-    task, rule = batch.unwrapped._task, tasks.greedy(batch)
+    robots, rule = batch.unwrapped._robots, tasks.greedy(batch)
     for worth, towards in ((4.0, 1.0), (9.0, -1.0)):
-        task.prizes[0] = 0.0
-        task.prizes[0, :2] = [[0.1, 0.0, 3.0], [-0.2, 0.0, worth]]
-        end, heading = rule.hub[0, rule.choose(task.observe())[0]], task.heading()[0]
+        robots.episode.prizes[0] = 0.0
+        robots.episode.prizes[0, :2] = [[0.1, 0.0, 3.0], [-0.2, 0.0, worth]]
+        end, heading = rule.hub[0, rule.choose(robots.observe())[0]], robots.heading()[0]
         assert towards * (end @ [np.cos(heading), -np.sin(heading)]) > 1e-3
 
 

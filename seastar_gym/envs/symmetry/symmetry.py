@@ -201,7 +201,7 @@ class Symmetry:
         return self.carry_actions(actions, inverse(checked, self.group))
 
     def carry_masks(self, masks: NDArray[Any], elements: ArrayLike) -> NDArray[Any]:
-        """Masks of actions of the robots carried by the elements, shape (..., k), as in `seastar_gym.envs.masks`."""
+        """Masks of actions of the robots carried by the elements, shape (..., k), as in `seastar_gym.envs.commands`."""
         masks, elements = np.asarray(masks), np.asarray(elements, dtype=np.intp)
         if self.actions not in _SWAPPED_WIRES:
             before = action_table(self.actions, self.group)[inverse(elements, self.group)]

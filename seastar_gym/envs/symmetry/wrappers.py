@@ -13,11 +13,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from seastar_gym.envs.masks import sampling_mask
+from seastar_gym.envs.attributes import RobotsEnv
+from seastar_gym.envs.commands import sampling_mask
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.symmetry.group import memory_mirror, symmetry_of
 from seastar_gym.envs.symmetry.symmetry import FrameStack, Symmetry
-from seastar_gym.envs.task_env import TaskEnv
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror, complete
 from seastar_gym.scene.checks import require_kind
@@ -69,7 +69,7 @@ def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
 def symmetry_in(env: Any) -> Symmetry:
     """Symmetry of an environment or a batch; ValueError if its scene is not symmetric."""
     inner = getattr(env, "unwrapped", env)
-    if not isinstance(inner, TaskEnv):
+    if not isinstance(inner, RobotsEnv):
         raise ValueError(f"Symmetry is known of SeastarSwim-v0 and the timed environments alone, not of {inner!r}.")
     require_symmetry(inner.scene, inner.randomization)
     return Symmetry(symmetry_of(inner.scene), observed_mirror(inner), inner.layout, inner.actions)

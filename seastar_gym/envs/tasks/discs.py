@@ -12,10 +12,6 @@ from numpy.typing import NDArray
 
 from seastar_gym.interrupts import held_back
 
-with held_back():
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import dijkstra
-
 Floats = NDArray[np.float64]
 
 BOX = np.array([[-0.2, -0.4], [0.8, 0.4]])
@@ -95,6 +91,10 @@ class Ways(NamedTuple):
 
 def ways(discs: Floats, goal: Floats, clearance: float, step: float) -> Ways:
     """Shortest ways to a goal [m] that keep a clearance [m] from all discs, shape (m, 3), on a grid of a step [m]."""
+    with held_back():  # these take long to import, and other tasks do without
+        from scipy.sparse import csr_matrix
+        from scipy.sparse.csgraph import dijkstra
+
     grid = _grid(step)
     is_free = (rims(grid.nodes, discs).min(axis=-1, initial=np.inf) >= clearance).ravel()
     open_ = is_free[grid.first] & is_free[grid.last]

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Annotated
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 
 from seastar_gym.envs.headings import wrapped
-from seastar_gym.envs.layout import VELOCITY_SCALE, Entry
-from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.layout import VELOCITY_SCALE
 from seastar_gym.envs.randomization import LIMB_STRENGTHS
 from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.robots import Flags, Floats, Robots, Score
 from seastar_gym.envs.scenery import Scenery
-from seastar_gym.envs.swimming import Flags, Floats, Score
-from seastar_gym.envs.task import SwimTask
-from seastar_gym.envs.tasks.challenge import Challenge
-from seastar_gym.envs.tasks.numbered import Numbered, Split
+from seastar_gym.envs.waypoints import Waypoints
 from seastar_gym.scene import Scene
 from seastar_gym.scene.number import whole
 from seastar_gym.scene.serial import register_part
@@ -24,9 +21,26 @@ from seastar_gym.scene.serial import register_part
 MOST_DEAD = 2
 
 
+@dataclass(frozen=True)
+class AnyLimbs:
+    """Draws of dead limbs, all sets of so many with the same probability."""
+
+    dead: int
+
+    def first_values(self, scene: Scene, n_robots: int) -> dict[str, Floats]:
+        """Whole robots."""
+        return {LIMB_STRENGTHS: np.ones((n_robots, scene.robot.n_limbs))}
+
+    def draw(self, values: dict[str, Floats], robot: int, rng: np.random.Generator) -> None:
+        """Draw a robot's dead limbs, in place."""
+        strengths = values[LIMB_STRENGTHS]
+        strengths[robot] = 1.0
+        strengths[robot, rng.permutation(strengths.shape[1])[: self.dead]] = 0.0
+
+
 @register_part
 @dataclass(frozen=True)
-class FailBlind(Challenge):
+class FailBlind(Waypoints):
     """Waypoints for a robot of which some limbs are dead, and which sees its way, but not its limbs.
 
     `dead` limbs never move in an episode, whatever they are commanded. Nothing tells the robot which. Where its best
@@ -74,67 +88,45 @@ class FailBlind(Challenge):
     dead: Annotated[int, whole(0, MOST_DEAD)] = 2
     reward: RewardWeights = RewardWeights()
 
-    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> FailBlindTask:
-        """The task of so many robots."""
-        return FailBlindTask(self, options, n_robots, threads, split)
-
-
-@dataclass(frozen=True)
-class AnyLimbs:
-    """Draws of dead limbs, all sets of so many with the same probability."""
-
-    dead: int
-
-    def first_values(self, scene: Scene, n_robots: int) -> dict[str, Floats]:
-        """Whole robots."""
-        return {LIMB_STRENGTHS: np.ones((n_robots, scene.robot.n_limbs))}
-
-    def draw(self, values: dict[str, Floats], robot: int, rng: np.random.Generator) -> None:
-        """Draw a robot's dead limbs, in place."""
-        strengths = values[LIMB_STRENGTHS]
-        strengths[robot] = 1.0
-        strengths[robot, rng.permutation(strengths.shape[1])[: self.dead]] = 0.0
-
-
-class FailBlindTask(Numbered, SwimTask):
-    """Task of robots with dead limbs that see their way alone."""
-
     observes_commands = True
-    entries: tuple[Entry, ...] = ("vector", "pseudoscalar")
+    observes_actuators = False  # wires of dead limbs stay cold
+    entries = ("vector", "pseudoscalar")
     shows_limbs = False
+    tells_errors = False  # errors were measured of whole robots
     goals_are_waypoints = False
 
-    def __init__(self, config: FailBlind, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
-        self.config = config
-        self._hub, self._before = np.zeros((n_robots, 2)), np.zeros(n_robots)  # hub and heading at the last look
-        self._way, self._turn = np.zeros((n_robots, 2)), np.zeros(n_robots)  # of the last decision
-        options = replace(options, path="random", random_heading=True, reward=config.reward)
-        blind = replace(options, observe_actuators=False)  # wires of dead limbs stay cold
-        SwimTask.__init__(self, blind, n_robots, threads)
-        self._tells_errors = False  # errors were measured of whole robots
-        self._draws = AnyLimbs(config.dead)
-        self.drawn = self._draws.first_values(self.scene, n_robots)
-        self._number(split)
+    @property
+    def randomization(self) -> AnyLimbs:  # type: ignore[override]
+        """Dead limbs."""
+        return AnyLimbs(self.dead)
 
-    def _begin(self, robots: Flags) -> None:
-        super()._begin(robots)
-        self._hub[robots] = self.seen_hub()[robots]
-        self._before[robots] = self.seen_heading()[robots]
-        self._way[robots], self._turn[robots] = 0.0, 0.0
+    def draw(self, rng: np.random.Generator, scene: Scene) -> dict[str, Any]:
+        """A path; hub and heading at the last look, and way and turn of the last decision."""
+        still = {"hub": np.zeros(2), "heading": 0.0, "way": np.zeros(2), "turn": 0.0}
+        return {**super().draw(rng, scene), **still}
 
-    def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
-        place, heading, c, s = self.seen_hub(), self.seen_heading(), np.cos(self._before), np.sin(self._before)
-        x, y = (place - self._hub).T
-        self._way = np.stack([c * x + s * y, c * y - s * x], axis=1)
-        self._turn = wrapped(heading - self._before)
-        self._hub, self._before = place, heading
-        return super()._reward_terms(hub, pulses)
+    def begin(self, robots: Robots, begun: Flags) -> None:
+        """Swim to the first waypoint, and know where from."""
+        super().begin(robots, begun)
+        robots.episode.hub[begun] = robots.seen_hub()[begun]
+        robots.episode.heading[begun] = robots.seen_heading()[begun]
 
-    def _task_observation(self) -> Floats:
-        velocity = self._way / (VELOCITY_SCALE * self.decision_period)
-        return np.column_stack([velocity, self._turn])
+    def score(self, robots: Robots, hub: Floats, pulses: Floats) -> Score:
+        """That of all swims along waypoints; odometry, too."""
+        now, place, heading = robots.episode, robots.seen_hub(), robots.seen_heading()
+        c, s = np.cos(now.heading), np.sin(now.heading)
+        x, y = (place - now.hub).T
+        now.way = np.stack([c * x + s * y, c * y - s * x], axis=1)
+        now.turn = wrapped(heading - now.heading)
+        now.hub, now.heading = place, heading
+        return super().score(robots, hub, pulses)
 
-    def scenery(self, robot: int) -> Scenery:
-        """What pictures of a robot show besides its waypoints."""
-        dead = np.flatnonzero(self.drawn[LIMB_STRENGTHS][robot] == 0.0) + 1
+    def observation(self, robots: Robots) -> Floats:
+        """Odometry of the last decision."""
+        velocity = robots.episode.way / (VELOCITY_SCALE * robots.decision_period)
+        return np.column_stack([velocity, robots.episode.turn])
+
+    def scenery(self, robots: Robots, robot: int) -> Scenery:
+        """Which limbs are dead."""
+        dead = np.flatnonzero(robots.drawn[LIMB_STRENGTHS][robot] == 0.0) + 1
         return Scenery(note="dead limbs: " + (", ".join(map(str, dead)) or "none"))

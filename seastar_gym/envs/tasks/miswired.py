@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.robots import Flags, Floats, Robots
 from seastar_gym.envs.scenery import Scenery
-from seastar_gym.envs.swimming import Flags, Floats
-from seastar_gym.envs.task import SwimTask
-from seastar_gym.envs.tasks.challenge import Challenge
-from seastar_gym.envs.tasks.numbered import Numbered, Split
+from seastar_gym.envs.waypoints import Waypoints
+from seastar_gym.scene import Scene
 from seastar_gym.scene.number import within
 from seastar_gym.scene.serial import register_part
 
 
 @register_part
 @dataclass(frozen=True)
-class Miswired(Challenge):
+class Miswired(Waypoints):
     """Waypoints for a robot whose wires may be swapped, limb by limb, which it has to find out.
 
     At the start of an episode, each limb's two wires are swapped with probability `swap_probability`, and stay so: a
@@ -71,46 +69,24 @@ class Miswired(Challenge):
     swap_probability: Annotated[float, within(0.0, 1.0)] = 0.5
     reward: RewardWeights = RewardWeights()
 
-    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> MiswiredTask:
-        """The task of so many robots."""
-        return MiswiredTask(self, options, n_robots, threads, split)
-
-
-class MiswiredTask(Numbered, SwimTask):
-    """Task of robots whose wires may be swapped."""
-
     observes_commands = True
 
-    def __init__(self, config: Miswired, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
-        self.config = config
-        options = replace(options, path="random", random_heading=True, reward=config.reward)
-        SwimTask.__init__(self, options, n_robots, threads)
-        self.wiring = np.ones((n_robots, self.scene.robot.n_limbs))
-        self._number(split)
+    def draw(self, rng: np.random.Generator, scene: Scene) -> dict[str, Any]:
+        """A path, and which wires are swapped."""
+        path = super().draw(rng, scene)
+        swapped = rng.random(scene.robot.n_limbs) < self.swap_probability
+        return {**path, "wiring": np.where(swapped, -1.0, 1.0)}
 
-    def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
-        super()._draw(robot, rng, asked)
-        swapped = rng.random(self.wiring.shape[1]) < self.config.swap_probability
-        self.wiring[robot] = np.where(swapped, -1.0, 1.0)
+    def begin(self, robots: Robots, begun: Flags) -> None:
+        """Swap the wires, and swim to the first waypoint."""
+        robots.wiring = robots.episode.wiring
+        super().begin(robots, begun)
 
-    def _wired(self, commands: Floats) -> Floats:
-        return commands * self.wiring
+    def info(self, robots: Robots, hub: Floats) -> dict[str, NDArray[Any]]:
+        """Where robots are on their paths, and their wires."""
+        return {**super().info(robots, hub), "wiring": robots.episode.wiring.copy()}
 
-    def _refractory_wires(self) -> Flags:
-        return self._by_command(super()._refractory_wires())
-
-    def _by_command(self, of_wires: NDArray[Any]) -> NDArray[Any]:
-        """Values of wires + and -, shape (n_robots, n_limbs, 2), in the names that commands have for them."""
-        return np.where(self.wiring[..., None] < 0.0, of_wires[..., ::-1], of_wires)
-
-    def _observed_wires(self) -> Floats:
-        wires = super()._observed_wires().reshape(*self.wiring.shape, -1)
-        return self._by_command(wires).reshape(self.n_robots, -1)
-
-    def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
-        return {**super()._task_info(hub), "wiring": self.wiring.copy()}
-
-    def scenery(self, robot: int) -> Scenery:
-        """What pictures of a robot show besides its waypoints."""
-        swapped = np.flatnonzero(self.wiring[robot] < 0.0) + 1
+    def scenery(self, robots: Robots, robot: int) -> Scenery:
+        """Which wires are swapped."""
+        swapped = np.flatnonzero(robots.episode.wiring[robot] < 0.0) + 1
         return Scenery(note="wires swapped: " + (", ".join(map(str, swapped)) or "none"))

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.layout import Entry
-from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.robots import Floats, Robots, Score
 from seastar_gym.envs.scenery import Ring, Scenery
-from seastar_gym.envs.swimming import Floats, Score
-from seastar_gym.envs.task import SwimTask
-from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.discs import Ways, rims, ways
-from seastar_gym.envs.tasks.numbered import Numbered, Split
+from seastar_gym.envs.waypoints import Waypoints
+from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice
 from seastar_gym.scene.number import Range, not_negative, positive, ranging, whole
 from seastar_gym.scene.serial import register_part
@@ -24,11 +21,39 @@ from seastar_gym.scene.serial import register_part
 Potential = Literal["straight", "geodesic"]
 SEEN = 6
 """Number of discs that the robot sees."""
+N_HORSESHOE = 8
+"""Discs of a horseshoe, or of one that is absent."""
+PRESENCE = 0.8
+"""Share of the episodes with a horseshoe."""
+ARC: Range = (0.095, 0.13)
+"""Radius of the arc on which the centres of its discs lie [m]."""
+EXTENT: Range = (1.7, 2.0)
+"""Angle from the middle of the arc to its ends [rad]."""
+OVERLAP: Range = (0.55, 0.7)
+"""Radius of its discs, as a share of the distance of neighbours: more than a half, so that they overlap."""
+HOLE, WIDTH = 0.5, 2
+"""Share of the horseshoes with a hole, and the number of discs that are missing there."""
+OPENING = 0.5 * np.pi
+"""Largest angle between the way from the goal to the start and the direction in which a horseshoe opens [rad]."""
+FIRST, LAST = 0.12, 0.17
+"""Least distances, along the straight way, of a horseshoe's centre from the start and from the goal [m]."""
+ASIDE = 0.05
+"""Largest distance of the horseshoe's centre from the straight way [m]."""
+RADIUS: Range = (0.02, 0.045)
+"""Radius of a scattered disc [m]."""
+AROUND = 0.06
+"""Clearance of the start and of the goal [m]."""
+PASSAGE, SOLVING_STEP, STEP = 0.015, 0.02, 0.01
+"""Clearance of the way that is asked for, and steps of the grids of draws and of the geodesic potential [m]."""
+NEAREST_GOAL, FARTHEST_GOAL = 0.45, 0.6
+"""Between nearer goals and the start there is no room for a horseshoe; farther ones are too near to the grid's end."""
+MOST_DRAWS = 1000
+START = np.zeros((1, 2))
 
 
 @register_part
 @dataclass(frozen=True)
-class ObstTrap(Challenge):
+class ObstTrap(Waypoints):
     """A goal behind discs, most of which form a horseshoe that may be open towards the robot.
 
     A robot that swims towards the goal ends in the horseshoe, or at its side. It sees the discs around it alone; one
@@ -98,46 +123,61 @@ class ObstTrap(Challenge):
     reward: RewardWeights = RewardWeights()
 
     def __post_init__(self) -> None:
-        Challenge.__post_init__(self)
+        super().__post_init__()
         nearest, farthest = self.distance
         if nearest < NEAREST_GOAL or farthest > FARTHEST_GOAL:
             bounds = f"{NEAREST_GOAL} to {FARTHEST_GOAL} m"
             raise ValueError(f"ObstTrap.distance must lie from {bounds}, not {self.distance}.")
         require_choice("ObstTrap.potential", self.potential, get_args(Potential))
 
-    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> ObstTrapTask:
-        """The task of so many robots."""
-        return ObstTrapTask(self, options, n_robots, threads, split)
+    terms = (*Waypoints.terms, "reward_touch")
+    goals_are_waypoints = False
+    entries = ("vector", "scalar") * SEEN
+
+    def draw(self, rng: np.random.Generator, scene: Scene) -> dict[str, Any]:
+        """A goal, discs, and for the geodesic potential the ways around them."""
+        goal = np.array([rng.uniform(*self.distance), 0.0])
+        discs = draw_discs(rng, goal, self.scattered, self.longest_way)
+        around = {"ways": ways(discs, goal, PASSAGE, STEP).lengths} if self.potential == "geodesic" else {}
+        return {**self.along(goal[None]), "discs": discs, **around}
+
+    def measure_way_to_go(self, robots: Robots, hub: Floats) -> Floats:
+        """Length of the straight way to the goal, or of the shortest one around all discs [m], see `potential`."""
+        if self.potential == "straight":
+            return super().measure_way_to_go(robots, hub)
+        return Ways(robots.episode.ways, STEP)(hub[:, None])[:, 0]
+
+    def score(self, robots: Robots, hub: Floats, pulses: Floats) -> Score:
+        """That of all swims along waypoints, and the price of touching a disc, which ends the episode."""
+        score, touches = super().score(robots, hub, pulses), clearance(robots, hub) < 0.0
+        terms = {**score.terms, "reward_touch": -self.touch * touches.astype(np.float64)}
+        return Score(terms, score.success & ~touches, score.over | touches)
+
+    def observation(self, robots: Robots) -> Floats:
+        """The nearest discs."""
+        hub, discs = robots.seen_hub(), robots.episode.discs
+        order = np.argsort(rims(hub, discs), axis=1, kind="stable")[:, :SEEN]
+        nearest = np.take_along_axis(discs, order[..., None], axis=1)
+        seen = np.concatenate([robots.in_body_frame(nearest[..., :2] - hub[:, None]), nearest[..., 2:]], axis=-1)
+        return seen.reshape(robots.n_robots, -1) / robots.scene.robot.limb_length
+
+    def info(self, robots: Robots, hub: Floats) -> dict[str, NDArray[Any]]:
+        """Where robots are on their ways, and the discs."""
+        found = super().info(robots, hub)
+        return {**found, "clearance": clearance(robots, hub), "discs": robots.episode.discs.copy()}
+
+    def scenery(self, robots: Robots, robot: int) -> Scenery:
+        """The discs, and the end of who touched one."""
+        touches = clearance(robots, robots.simulator.hub_position())[robot] < 0.0
+        return Scenery(
+            obstacles=tuple(Ring(disc[:2], float(disc[2])) for disc in robots.episode.discs[robot]),
+            progress="touched a disc" if touches else None,
+        )
 
 
-N_HORSESHOE = 8
-"""Discs of a horseshoe, or of one that is absent."""
-PRESENCE = 0.8
-"""Share of the episodes with a horseshoe."""
-ARC: Range = (0.095, 0.13)
-"""Radius of the arc on which the centres of its discs lie [m]."""
-EXTENT: Range = (1.7, 2.0)
-"""Angle from the middle of the arc to its ends [rad]."""
-OVERLAP: Range = (0.55, 0.7)
-"""Radius of its discs, as a share of the distance of neighbours: more than a half, so that they overlap."""
-HOLE, WIDTH = 0.5, 2
-"""Share of the horseshoes with a hole, and the number of discs that are missing there."""
-OPENING = 0.5 * np.pi
-"""Largest angle between the way from the goal to the start and the direction in which a horseshoe opens [rad]."""
-FIRST, LAST = 0.12, 0.17
-"""Least distances, along the straight way, of a horseshoe's centre from the start and from the goal [m]."""
-ASIDE = 0.05
-"""Largest distance of the horseshoe's centre from the straight way [m]."""
-RADIUS: Range = (0.02, 0.045)
-"""Radius of a scattered disc [m]."""
-AROUND = 0.06
-"""Clearance of the start and of the goal [m]."""
-PASSAGE, SOLVING_STEP, STEP = 0.015, 0.02, 0.01
-"""Clearance of the way that is asked for, and steps of the grids of draws and of the geodesic potential [m]."""
-NEAREST_GOAL, FARTHEST_GOAL = 0.45, 0.6
-"""Between nearer goals and the start there is no room for a horseshoe; farther ones are too near to the grid's end."""
-MOST_DRAWS = 1000
-START = np.zeros((1, 2))
+def clearance(robots: Robots, hub: Floats) -> Floats:
+    """Distance of hubs [m], shape (n_robots, 2), from the nearest rim [m], shape (n_robots,)."""
+    return np.asarray(rims(hub, robots.episode.discs).min(axis=1))
 
 
 class Horseshoe(NamedTuple):
@@ -200,64 +240,3 @@ def draw_discs(rng: np.random.Generator, goal: Floats, scattered: int, longest_w
         if clear and ways(discs, goal, PASSAGE, SOLVING_STEP)(START)[0] <= longest_way:
             return discs
     raise ValueError(f"Of {MOST_DRAWS} fields of discs none can be passed: ask for fewer discs, or for longer ways.")
-
-
-class ObstTrapTask(Numbered, SwimTask):
-    """Task of robots that swim around discs."""
-
-    TERMS = (*SwimTask.TERMS, "reward_touch")
-    goals_are_waypoints = False
-    entries: tuple[Entry, ...] = ("vector", "scalar") * SEEN
-
-    def __init__(self, config: ObstTrap, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
-        self.config = config
-        self.discs = np.zeros((n_robots, N_HORSESHOE + config.scattered, 3))
-        self._is_geodesic = config.potential == "geodesic"
-        self._ways = Ways(np.zeros((n_robots, 1, 1)), STEP)
-        goal = np.array([[config.distance[0], 0.0]])
-        options = replace(options, path=goal, random_heading=True, reward=config.reward)
-        SwimTask.__init__(self, options, n_robots, threads)
-        if self._is_geodesic:
-            shape = ways(np.zeros((0, 3)), goal[0], 0.0, STEP).lengths.shape
-            self._ways = Ways(np.zeros((n_robots, *shape)), STEP)
-        self._number(split)
-
-    def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
-        goal = np.array([rng.uniform(*self.config.distance), 0.0])
-        self._set_path(robot, goal[None])
-        self.discs[robot] = draw_discs(rng, goal, self.config.scattered, self.config.longest_way)
-        if self._is_geodesic:
-            self._ways.lengths[robot] = ways(self.discs[robot], goal, PASSAGE, STEP).lengths
-
-    def _measure_way_to_go(self, hub: Floats) -> Floats:
-        if not self._is_geodesic:
-            return super()._measure_way_to_go(hub)
-        return self._ways(hub[:, None])[:, 0]
-
-    def clearance(self, hub: Floats) -> Floats:
-        """Distance of hubs [m], shape (n_robots, 2), from the nearest rim [m], shape (n_robots,)."""
-        return np.asarray(rims(hub, self.discs).min(axis=1))
-
-    def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
-        score = super()._reward_terms(hub, pulses)
-        touches = self.clearance(hub) < 0.0
-        terms = {**score.terms, "reward_touch": -self.config.touch * touches.astype(np.float64)}
-        return Score(terms, score.success & ~touches, score.over | touches)
-
-    def _task_observation(self) -> Floats:
-        hub = self.seen_hub()
-        order = np.argsort(rims(hub, self.discs), axis=1, kind="stable")[:, :SEEN]
-        nearest = np.take_along_axis(self.discs, order[..., None], axis=1)
-        seen = np.concatenate([self._in_body_frame(nearest[..., :2] - hub[:, None]), nearest[..., 2:]], axis=-1)
-        return seen.reshape(self.n_robots, -1) / self.scene.robot.limb_length
-
-    def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
-        return {**super()._task_info(hub), "clearance": self.clearance(hub), "discs": self.discs.copy()}
-
-    def scenery(self, robot: int) -> Scenery:
-        """The discs, and the end of who touched one."""
-        touches = self.clearance(self.simulator.hub_position())[robot] < 0.0
-        return Scenery(
-            obstacles=tuple(Ring(disc[:2], float(disc[2])) for disc in self.discs[robot]),
-            progress="touched a disc" if touches else None,
-        )

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.robots import Flags, Floats, Robots, Score, Task
 from seastar_gym.envs.scenery import Ring, Scenery
-from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
-from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.course import Courses, Pursuit, draw_course
-from seastar_gym.envs.tasks.numbered import Numbered, Split
+from seastar_gym.scene import Scene
 from seastar_gym.scene.number import Range, not_negative, positive, ranging, whole
 from seastar_gym.scene.serial import register_part
 
@@ -25,7 +23,7 @@ MOST_PREY = 12
 
 @register_part
 @dataclass(frozen=True)
-class Prey(Challenge):
+class Prey(Task):
     """A prey to catch, faster than the robot, on a closed course; then another one.
 
     A robot that swims to where the prey is trails behind it for ever. One that remembers the course, or foresees it,
@@ -89,85 +87,78 @@ class Prey(Challenge):
     catch: Annotated[float, not_negative("1")] = 10.0
     effort: Annotated[float, not_negative("1")] = 0.01
 
-    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> PreyTask:
-        """The task of so many robots."""
-        return PreyTask(self, options, n_robots, threads, split)
+    terms = ("reward_progress", "reward_catch", "reward_effort")
 
+    @property
+    def waypoint_radius(self) -> float:  # type: ignore[override]
+        """Radius of the prey in pictures [m]."""
+        return self.catch_radius
 
-class PreyTask(Numbered, Swimming):
-    """Task of robots that catch prey."""
+    def draw(self, rng: np.random.Generator, scene: Scene) -> dict[str, Any]:
+        """Courses around the robot, from time 0 on; that of the present prey, its distance, and what was caught."""
+        pursuit = Pursuit(self.robot_speed, self.catch_radius)
+        drawn = [draw_course(rng, self.radius, self.speed, self.epicycle, pursuit) for _ in range(MOST_PREY)]
+        return {"drawn": drawn, "course": np.zeros(8), "distance": 0.0, "catches": 0}
 
-    TERMS = ("reward_progress", "reward_catch", "reward_effort")
+    def begin(self, robots: Robots, begun: Flags) -> None:
+        """Let the first prey go."""
+        self._release(robots, begun, robots.simulator.hub_position())
 
-    def __init__(self, config: Prey, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
-        Swimming.__init__(self, replace(options, random_heading=True), n_robots, threads)
-        self.config, self.waypoint_radius = config, config.catch_radius
-        self.catches = np.zeros(n_robots, np.int64)
-        self._drawn_courses = np.zeros((n_robots, MOST_PREY, 8))  # around the robot, from time 0 on
-        self.courses = np.zeros((n_robots, 8))  # of the present prey
-        self._distance = np.zeros(n_robots)
-        self._number(split)
-
-    def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
-        config = self.config
-        for k in range(MOST_PREY):
-            can_be_met = Pursuit(config.robot_speed, config.catch_radius)
-            self._drawn_courses[robot, k] = draw_course(rng, config.radius, config.speed, config.epicycle, can_be_met)
-
-    def _begin(self, robots: Flags) -> None:
-        self.catches[robots] = 0
-        self._release(robots, self.simulator.hub_position())
-
-    def _release(self, robots: Flags, hub: Floats) -> None:
+    def _release(self, robots: Robots, begun: Flags, hub: Floats) -> None:
         """Let the next prey go, around the robots in a mask."""
-        for robot in np.flatnonzero(robots):
-            course = self._drawn_courses[robot, self.catches[robot] % MOST_PREY].copy()
+        now = robots.episode
+        for robot in np.flatnonzero(begun):
+            course = now.drawn[robot, now.catches[robot] % MOST_PREY].copy()
             course[:2] += hub[robot]
-            course[2] = self.simulator.time[robot]
-            self.courses[robot] = course
-        self._distance[robots] = self._measure(hub)[robots]
+            course[2] = robots.simulator.time[robot]
+            now.course[robot] = course
+        now.distance[begun] = self._distances(robots, hub)[begun]
 
-    def prey(self) -> tuple[Floats, Floats]:
+    def prey(self, robots: Robots) -> tuple[Floats, Floats]:
         """Places [m] and velocities [m/s] of the prey, shape (n_robots, 2) each."""
-        courses, time = Courses(self.courses), self.simulator.time
+        courses, time = Courses(robots.episode.course), robots.simulator.time
         return courses.place(time), courses.velocity(time)
 
-    def _measure(self, hub: Floats) -> Floats:
+    def _distances(self, robots: Robots, hub: Floats) -> Floats:
         """Distances of hubs from their prey [m]."""
-        away = self.prey()[0] - hub
+        away = self.prey(robots)[0] - hub
         return np.hypot(away[:, 0], away[:, 1])
 
-    def _targets(self) -> Floats:
-        place, velocity = self.prey()
+    def targets(self, robots: Robots) -> Floats:
+        """The prey, and where it would be if it swam straight on."""
+        place, velocity = self.prey(robots)
         return np.concatenate([place, place + LOOK_AHEAD * velocity], axis=1)
 
-    def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
-        before, self._distance = self._distance, self._measure(hub)
-        caught = self._distance <= self.config.catch_radius
+    def score(self, robots: Robots, hub: Floats, pulses: Floats) -> Score:
+        """Progress towards the prey, catches, and effort; success once `wanted` are caught."""
+        now = robots.episode
+        before, now.distance = now.distance, self._distances(robots, hub)
+        caught = now.distance <= self.catch_radius
         terms = {
-            "reward_progress": self.config.progress * (before - self._distance),
-            "reward_catch": self.config.catch * caught.astype(np.float64),
-            "reward_effort": -self.config.effort * pulses,
+            "reward_progress": self.progress * (before - now.distance),
+            "reward_catch": self.catch * caught.astype(np.float64),
+            "reward_effort": -self.effort * pulses,
         }
-        self.catches += caught
-        self._release(caught, hub)
-        return Score(terms, self.catches >= self.config.wanted, np.zeros(self.n_robots, bool))
+        now.catches += caught
+        self._release(robots, caught, hub)
+        return Score(terms, success=now.catches >= self.wanted)
 
-    def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
+    def info(self, robots: Robots, hub: Floats) -> dict[str, NDArray[Any]]:
+        """The prey, its course, and how many were caught."""
+        now = robots.episode
         return {
-            "distance": self._measure(hub),
-            "prey": self.prey()[0],
-            "course": self.courses.copy(),
-            "catches": self.catches.copy(),
+            "distance": self._distances(robots, hub),
+            "prey": self.prey(robots)[0],
+            "course": now.course.copy(),
+            "catches": now.catches.copy(),
         }
 
-    def scenery(self, robot: int) -> Scenery:
+    def scenery(self, robots: Robots, robot: int) -> Scenery:
         """The prey, where it swims, and its course."""
-        place, velocity = (of_all[robot] for of_all in self.prey())
-        round_trip = Courses(self.courses[robot]).once_round()
+        place, velocity = (of_all[robot] for of_all in self.prey(robots))
         return Scenery(
-            rings=(Ring(place, self.config.catch_radius),),
-            lines=(round_trip,),
+            rings=(Ring(place, self.catch_radius),),
+            lines=(Courses(robots.episode.course[robot]).once_round(),),
             arrows=(np.array([place, place + 5.0 * velocity]),),
-            progress=f"{self.catches[robot]} caught",
+            progress=f"{robots.episode.catches[robot]} caught",
         )

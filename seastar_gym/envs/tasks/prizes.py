@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.layout import Entry
-from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.robots import Flags, Floats, Robots, Score, Task
 from seastar_gym.envs.scenery import Ring, Scenery
-from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
-from seastar_gym.envs.tasks.challenge import Challenge
-from seastar_gym.envs.tasks.numbered import Numbered, Split
 from seastar_gym.envs.tasks.rounds import best_round, distances, greedy_round
+from seastar_gym.scene import Scene
 from seastar_gym.scene.number import not_negative, positive
 from seastar_gym.scene.serial import register_part
+
+WORTHS = np.array([1.0, 1.0, 2.0, 4.0])
+N_PRIZES = 10
+ATTRACTION = 0.1
+"""Distance over which a prize attracts [m]."""
+MOST_DRAWS = 1000
+ROUNDING = 1e-9
+"""Share of a time that is no time."""
 
 
 @register_part
 @dataclass(frozen=True)
-class Prizes(Challenge):
+class Prizes(Task):
     """Ten prizes of different worth, more than can be reached in time, among which the greedy choice is a poor one.
 
     Nothing is hidden. A controller that always swims to the prize of most worth per metre gets much less than one that
@@ -87,115 +92,98 @@ class Prizes(Challenge):
     prize: Annotated[float, not_negative("1")] = 5.0
     effort: Annotated[float, not_negative("1")] = 0.01
 
-    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> PrizesTask:
-        """The task of so many robots."""
-        return PrizesTask(self, options, n_robots, threads, split)
+    terms = ("reward_progress", "reward_prize", "reward_effort")
+    entries = (*("vector", "scalar") * N_PRIZES, "scalar")
+
+    @property
+    def waypoint_radius(self) -> float:  # type: ignore[override]
+        """Radius of the prizes in pictures [m]."""
+        return self.radius
+
+    def draw(self, rng: np.random.Generator, scene: Scene) -> dict[str, Any]:
+        """Prizes, the worth of those that are taken, and where the hub was when it was last scored."""
+        return {"prizes": draw_prizes(rng, self), "taken": 0.0, "hub": np.zeros(2)}
+
+    def begin(self, robots: Robots, begun: Flags) -> None:
+        """Know where the hub is."""
+        robots.episode.hub = robots.simulator.hub_position()
+
+    def targets(self, robots: Robots) -> Floats:
+        """The nearest and the second nearest prize that are left."""
+        hub = robots.seen_hub()
+        near = _nearest_first(robots, hub)
+        second = np.where(near[:, 1, 2:] > 0.0, near[:, 1, :2], near[:, 0, :2])
+        return np.concatenate([hub + near[:, 0, :2], hub + second], axis=1)
+
+    def observation(self, robots: Robots) -> Floats:
+        """Prizes, nearest first, and the share of time that is left."""
+        near = _nearest_first(robots, robots.seen_hub())
+        places = robots.in_body_frame(near[..., :2]) / robots.scene.robot.limb_length
+        seen = np.concatenate([places, near[..., 2:]], axis=-1).reshape(robots.n_robots, -1)
+        return np.column_stack([seen, np.maximum(0.0, 1.0 - robots.simulator.time / self.seconds)])
+
+    def score(self, robots: Robots, hub: Floats, pulses: Floats) -> Score:
+        """Attraction, prizes that are taken, and effort; success if none is left, and the end of the time."""
+        now, time, worth = robots.episode, robots.simulator.time, robots.episode.prizes[..., 2]
+        before, after = (np.exp(-_distances(robots, at) / ATTRACTION) for at in (now.hub, hub))
+        in_time = time <= self.seconds * (1.0 + ROUNDING)
+        reached = (_distances(robots, hub) <= self.radius) & in_time[:, None]
+        gained = np.where(reached, worth, 0.0).sum(axis=1)
+        terms = {
+            "reward_progress": self.progress * (worth * (after - before)).sum(axis=1),
+            "reward_prize": self.prize * gained,
+            "reward_effort": -self.effort * pulses,
+        }
+        worth[reached] = 0.0
+        now.taken += gained
+        now.hub = hub.copy()
+        none_left = (worth == 0.0).all(axis=1)
+        return Score(terms, none_left, none_left | (time >= self.seconds * (1.0 - ROUNDING)))
+
+    def info(self, robots: Robots, hub: Floats) -> dict[str, NDArray[Any]]:
+        """The prizes, and what is taken."""
+        nearest = _distances(robots, hub).min(axis=1)
+        return {
+            "distance": np.where(np.isinf(nearest), 0.0, nearest),
+            "taken": robots.episode.taken.copy(),
+            "prizes": robots.episode.prizes.copy(),
+        }
+
+    def scenery(self, robots: Robots, robot: int) -> Scenery:
+        """The prizes that are left, and what they are worth."""
+        prizes = robots.episode.prizes[robot]
+        left = prizes[prizes[:, 2] > 0.0]
+        return Scenery(
+            rings=tuple(Ring(prize[:2], self.radius, f"{prize[2]:g}") for prize in left),
+            progress=f"{robots.episode.taken[robot]:g} taken, {left[:, 2].sum():g} left",
+        )
 
 
-WORTHS = np.array([1.0, 1.0, 2.0, 4.0])
-N_PRIZES = 10
-ATTRACTION = 0.1
-"""Distance over which a prize attracts [m]."""
-MOST_DRAWS = 1000
+def _distances(robots: Robots, hub: Floats) -> Floats:
+    """Distances of hubs from the prizes that are left [m], shape (n_robots, N_PRIZES); infinite from others."""
+    prizes = robots.episode.prizes
+    away = prizes[..., :2] - hub[:, None]
+    return np.where(prizes[..., 2] > 0.0, np.hypot(away[..., 0], away[..., 1]), np.inf)
 
 
-def draw_prizes(rng: np.random.Generator, config: Prizes) -> Floats:
+def _nearest_first(robots: Robots, hub: Floats) -> Floats:
+    """Prizes relative to the hub, nearest first: x, y [m], worth; then zeros for those that are taken."""
+    prizes, far = robots.episode.prizes, _distances(robots, hub)
+    order = np.argsort(far, axis=1, kind="stable")[..., None]
+    seen = np.concatenate([prizes[..., :2] - hub[:, None], prizes[..., 2:]], axis=-1)
+    return np.take_along_axis(np.where(np.isinf(far)[..., None], 0.0, seen), order, axis=1)
+
+
+def draw_prizes(rng: np.random.Generator, task: Prizes) -> Floats:
     """Prizes around the origin: x, y [m], worth; shape (N_PRIZES, 3). ValueError: none were found."""
-    way = config.robot_speed * config.seconds
+    way = task.robot_speed * task.seconds
     for _ in range(MOST_DRAWS):
-        places = rng.uniform(-0.5 * config.side, 0.5 * config.side, (N_PRIZES, 2))
+        places = rng.uniform(-0.5 * task.side, 0.5 * task.side, (N_PRIZES, 2))
         worth = rng.choice(WORTHS, N_PRIZES)
         first, between = np.hypot(places[:, 0], places[:, 1]), distances(places)
-        wanted = (1.0 + config.gain) * greedy_round(first, between, worth, way)
-        if first.min() <= config.radius or wanted > worth.sum():
+        wanted = (1.0 + task.gain) * greedy_round(first, between, worth, way)
+        if first.min() <= task.radius or wanted > worth.sum():
             continue
         if best_round(first, between, worth, way).worth >= wanted:
             return np.column_stack([places, worth])
     raise ValueError(f"Of {MOST_DRAWS} draws of prizes, the best round brings so much more in none: ask for less gain.")
-
-
-class PrizesTask(Numbered, Swimming):
-    """Task of robots that take prizes."""
-
-    TERMS = ("reward_progress", "reward_prize", "reward_effort")
-    entries: tuple[Entry, ...] = (*("vector", "scalar") * N_PRIZES, "scalar")
-
-    def __init__(self, config: Prizes, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
-        Swimming.__init__(self, replace(options, random_heading=True), n_robots, threads)
-        self.config, self.waypoint_radius = config, config.radius
-        self.prizes = np.zeros((n_robots, N_PRIZES, 3))
-        self.taken = np.zeros(n_robots)
-        self._hub = np.zeros((n_robots, 2))
-        self._number(split)
-
-    def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
-        self.prizes[robot] = draw_prizes(rng, self.config)
-
-    def _begin(self, robots: Flags) -> None:
-        self.taken[robots] = 0.0
-        self._hub = self.simulator.hub_position()
-
-    def _distances(self, hub: Floats) -> Floats:
-        """Distances of hubs from the prizes that are left [m], shape (n_robots, N_PRIZES); infinite from others."""
-        away = self.prizes[..., :2] - hub[:, None]
-        return np.where(self.prizes[..., 2] > 0.0, np.hypot(away[..., 0], away[..., 1]), np.inf)
-
-    def _nearest_first(self, hub: Floats) -> Floats:
-        """Prizes relative to the hub, nearest first: x, y [m], worth; then zeros for those that are taken."""
-        far = self._distances(hub)
-        order = np.argsort(far, axis=1, kind="stable")[..., None]
-        seen = np.concatenate([self.prizes[..., :2] - hub[:, None], self.prizes[..., 2:]], axis=-1)
-        return np.take_along_axis(np.where(np.isinf(far)[..., None], 0.0, seen), order, axis=1)
-
-    def _targets(self) -> Floats:
-        hub = self.seen_hub()
-        near = self._nearest_first(hub)
-        second = np.where(near[:, 1, 2:] > 0.0, near[:, 1, :2], near[:, 0, :2])
-        return np.concatenate([hub + near[:, 0, :2], hub + second], axis=1)
-
-    def _task_observation(self) -> Floats:
-        near = self._nearest_first(self.seen_hub())
-        places = self._in_body_frame(near[..., :2]) / self.scene.robot.limb_length
-        seen = np.concatenate([places, near[..., 2:]], axis=-1).reshape(self.n_robots, -1)
-        return np.column_stack([seen, self._share_left()])
-
-    def _share_left(self) -> Floats:
-        """Share of time that is left."""
-        return np.maximum(0.0, 1.0 - self.simulator.time / self.config.seconds)
-
-    def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
-        config, worth = self.config, self.prizes[..., 2]
-        before, after = (np.exp(-self._distances(at) / ATTRACTION) for at in (self._hub, hub))
-        in_time = self.simulator.time <= config.seconds * (1.0 + ROUNDING)
-        reached = (self._distances(hub) <= config.radius) & in_time[:, None]
-        gained = np.where(reached, worth, 0.0).sum(axis=1)
-        terms = {
-            "reward_progress": config.progress * (worth * (after - before)).sum(axis=1),
-            "reward_prize": config.prize * gained,
-            "reward_effort": -config.effort * pulses,
-        }
-        worth[reached] = 0.0
-        self.taken += gained
-        self._hub = hub.copy()
-        none_left = (worth == 0.0).all(axis=1)
-        return Score(terms, none_left, none_left | (self.simulator.time >= config.seconds * (1.0 - ROUNDING)))
-
-    def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
-        nearest = self._distances(hub).min(axis=1)
-        return {
-            "distance": np.where(np.isinf(nearest), 0.0, nearest),
-            "taken": self.taken.copy(),
-            "prizes": self.prizes.copy(),
-        }
-
-    def scenery(self, robot: int) -> Scenery:
-        """The prizes that are left, and what they are worth."""
-        left = self.prizes[robot, self.prizes[robot, :, 2] > 0.0]
-        return Scenery(
-            rings=tuple(Ring(prize[:2], self.config.radius, f"{prize[2]:g}") for prize in left),
-            progress=f"{self.taken[robot]:g} taken, {left[:, 2].sum():g} left",
-        )
-
-
-ROUNDING = 1e-9
-"""Share of a time that is no time."""

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, LogUniform, Uniform
 from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.robots import Robots
 from seastar_gym.envs.scenery import Scenery
 from seastar_gym.envs.sight import Sight
-from seastar_gym.envs.task import SwimTask
-from seastar_gym.envs.tasks.challenge import Challenge
-from seastar_gym.envs.tasks.numbered import Numbered, Split
+from seastar_gym.envs.waypoints import Waypoints
 from seastar_gym.scene.serial import register_part
 
 MODULUS, DELAY = "robot.youngs_modulus", "sight.delay"
@@ -20,7 +18,7 @@ MODULUS, DELAY = "robot.youngs_modulus", "sight.delay"
 
 @register_part
 @dataclass(frozen=True)
-class SimToReal(Challenge):
+class SimToReal(Waypoints):
     """Waypoints for a robot as a laboratory has it: seen by a camera, late, and not known exactly.
 
     A camera sees the hub and the heading, 30 times a second. Its delay differs from episode to episode, and so do the
@@ -90,27 +88,11 @@ class SimToReal(Challenge):
     )
     reward: RewardWeights = RewardWeights()
 
-    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> SimToRealTask:
-        """The task of so many robots."""
-        return SimToRealTask(self, options, n_robots, threads, split)
+    tells_errors = False  # errors were measured of equally strong limbs
 
-
-class SimToRealTask(Numbered, SwimTask):
-    """Task of robots that a camera sees, and whose numbers are drawn."""
-
-    def __init__(self, config: SimToReal, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
-        self.config = config
-        options = replace(
-            options, path="random", random_heading=True, reward=config.reward, randomization=config.randomization,
-            sight=config.sight if options.sight is None else options.sight,
-        )  # fmt: skip
-        SwimTask.__init__(self, options, n_robots, threads)
-        self._tells_errors = False  # errors were measured of equally strong limbs
-        self._number(split)
-
-    def scenery(self, robot: int) -> Scenery:
-        """What pictures of a robot show besides its waypoints."""
-        hidden = {**self.drawn, **self._lateness.drawn}
+    def scenery(self, robots: Robots, robot: int) -> Scenery:
+        """What is hidden of the robot and of the camera."""
+        hidden = robots.hidden
         notes = [f"modulus {hidden[MODULUS][robot] / 1e6:.2f} MPa"] if MODULUS in hidden else []
         notes += [f"seen {1e3 * hidden[DELAY][robot]:.0f} ms late"] if DELAY in hidden else []
         return Scenery(note=", ".join(notes))

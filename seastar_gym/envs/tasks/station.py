@@ -8,19 +8,36 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.robots import Flags, Floats, Robots, Score, Task
 from seastar_gym.envs.scenery import Ring, Scenery
-from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
-from seastar_gym.envs.tasks.challenge import Challenge
-from seastar_gym.envs.tasks.numbered import Numbered, Split
 from seastar_gym.scene import Scene, UniformCurrent, Water
 from seastar_gym.scene.number import Range, not_negative, positive, ranging
 from seastar_gym.scene.serial import register_part
 
+FARTHEST_COUNTED = 0.02
+"""Distance from the station beyond which `reward_distance` grows no more [m]."""
+U_X, U_Y = "fluid.current.u_x", "fluid.current.u_y"
+
+
+@dataclass(frozen=True)
+class AnyDirection:
+    """Draws of a uniform current with a speed in a range [m/s] and any direction."""
+
+    speed: Range
+
+    def first_values(self, scene: Scene, n_robots: int) -> dict[str, Floats]:
+        """Still water."""
+        return {U_X: np.zeros(n_robots), U_Y: np.zeros(n_robots)}
+
+    def draw(self, values: dict[str, Floats], robot: int, rng: np.random.Generator) -> None:
+        """Draw a robot's current, in place."""
+        speed, direction = rng.uniform(*self.speed), rng.uniform(-np.pi, np.pi)
+        values[U_X][robot], values[U_Y][robot] = speed * np.cos(direction), speed * np.sin(direction)
+
 
 @register_part
 @dataclass(frozen=True)
-class Station(Challenge):
+class Station(Task):
     """A point to keep the hub at, in a uniform current that is not told but shows in the velocities.
 
     The current would carry a resting robot by 0.1 to 0.3 m in an episode. It is hardly hidden: after one decision at
@@ -82,81 +99,62 @@ class Station(Challenge):
     nearness: Annotated[float, not_negative("1")] = 100.0
     effort: Annotated[float, not_negative("1")] = 0.01
 
-    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> StationTask:
-        """The task of so many robots."""
-        return StationTask(self, options, n_robots, threads, split)
-
-
-FARTHEST_COUNTED = 0.02
-"""Distance from the station beyond which `reward_distance` grows no more [m]."""
-U_X, U_Y = "fluid.current.u_x", "fluid.current.u_y"
-
-
-@dataclass(frozen=True)
-class AnyDirection:
-    """Draws of a uniform current with a speed in a range [m/s] and any direction."""
-
-    speed: Range
-
-    def first_values(self, scene: Scene, n_robots: int) -> dict[str, Floats]:
-        """Still water."""
-        return {U_X: np.zeros(n_robots), U_Y: np.zeros(n_robots)}
-
-    def draw(self, values: dict[str, Floats], robot: int, rng: np.random.Generator) -> None:
-        """Draw a robot's current, in place."""
-        speed, direction = rng.uniform(*self.speed), rng.uniform(-np.pi, np.pi)
-        values[U_X][robot], values[U_Y][robot] = speed * np.cos(direction), speed * np.sin(direction)
-
-
-class StationTask(Numbered, Swimming):
-    """Task of robots that keep a station; `scene` is that of still water, which is what they know."""
-
-    TERMS = ("reward_progress", "reward_distance", "reward_effort")
+    terms = ("reward_progress", "reward_distance", "reward_effort")
     observes_commands = True
+    tells_errors = False  # errors were measured in still water
 
-    def __init__(self, config: Station, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
-        scene, draws = options.modelled, AnyDirection(config.current)
-        water = Water() if scene.fluid is None else scene.fluid
-        flowing = replace(scene, fluid=replace(water, current=UniformCurrent()))
-        options = replace(options, scene=flowing, fidelity=None, random_heading=True)
-        Swimming.__init__(self, options, n_robots, threads, draws=draws)
-        self.config, self.scene, self.waypoint_radius = config, scene, config.tolerance
-        self.station = np.zeros((n_robots, 2))
-        self._distance = np.zeros(n_robots)
-        self._tells_errors = False  # errors were measured in still water
-        self._number(split)
+    @property
+    def waypoint_radius(self) -> float:  # type: ignore[override]
+        """Radius of the station in pictures [m]."""
+        return self.tolerance
 
-    def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
-        distance, direction = rng.uniform(*self.config.distance), rng.uniform(-np.pi, np.pi)
-        self.station[robot] = distance * np.cos(direction), distance * np.sin(direction)
+    @property
+    def randomization(self) -> AnyDirection:  # type: ignore[override]
+        """The current."""
+        return AnyDirection(self.current)
 
-    def _begin(self, robots: Flags) -> None:
-        self._distance[robots] = self._measure(self.simulator.hub_position())[robots]
+    def simulated(self, scene: Scene) -> Scene:
+        """The scene in a current; robots know that of still water."""
+        return replace(scene, fluid=replace(scene.fluid or Water(), current=UniformCurrent()))
 
-    def _measure(self, hub: Floats) -> Floats:
-        """Distances of hubs from their stations [m]."""
-        away = hub - self.station
-        return np.hypot(away[:, 0], away[:, 1])
+    def draw(self, rng: np.random.Generator, scene: Scene) -> dict[str, Any]:
+        """A station, and the distance from it."""
+        distance, direction = rng.uniform(*self.distance), rng.uniform(-np.pi, np.pi)
+        return {"station": [distance * np.cos(direction), distance * np.sin(direction)], "distance": 0.0}
 
-    def _targets(self) -> Floats:
-        return np.concatenate([self.station, self.station], axis=1)
+    def begin(self, robots: Robots, begun: Flags) -> None:
+        """Know how far the station is."""
+        robots.episode.distance[begun] = _distances(robots, robots.simulator.hub_position())[begun]
 
-    def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
-        before, self._distance = self._distance, self._measure(hub)
-        config, counted = self.config, np.minimum(self._distance, FARTHEST_COUNTED)
+    def targets(self, robots: Robots) -> Floats:
+        """The station, twice."""
+        return np.concatenate([robots.episode.station, robots.episode.station], axis=1)
+
+    def score(self, robots: Robots, hub: Floats, pulses: Floats) -> Score:
+        """Progress towards the station, the distance from it, and effort; success within its tolerance."""
+        now = robots.episode
+        before, now.distance = now.distance, _distances(robots, hub)
+        counted = np.minimum(now.distance, FARTHEST_COUNTED)
         terms = {
-            "reward_progress": config.progress * (before - self._distance),
-            "reward_distance": -config.nearness * self.decision_period * counted,
-            "reward_effort": -config.effort * pulses,
+            "reward_progress": self.progress * (before - now.distance),
+            "reward_distance": -self.nearness * robots.decision_period * counted,
+            "reward_effort": -self.effort * pulses,
         }
-        return Score(terms, self._distance <= config.tolerance, np.zeros(self.n_robots, bool))
+        return Score(terms, success=now.distance <= self.tolerance)
 
-    def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
-        return {"distance": self._measure(hub), "station": self.station.copy()}
+    def info(self, robots: Robots, hub: Floats) -> dict[str, NDArray[Any]]:
+        """The station, and the distance from it."""
+        return {"distance": _distances(robots, hub), "station": robots.episode.station.copy()}
 
-    def scenery(self, robot: int) -> Scenery:
+    def scenery(self, robots: Robots, robot: int) -> Scenery:
         """The station; pictures show the current by themselves."""
+        now = robots.episode
         return Scenery(
-            rings=(Ring(self.station[robot], self.config.tolerance),),
-            progress=f"{1000.0 * self._distance[robot]:.1f} mm off",
+            rings=(Ring(now.station[robot], self.tolerance),), progress=f"{1000.0 * now.distance[robot]:.1f} mm off"
         )
+
+
+def _distances(robots: Robots, hub: Floats) -> Floats:
+    """Distances of hubs from their stations [m]."""
+    away = hub - robots.episode.station
+    return np.hypot(away[:, 0], away[:, 1])

@@ -1,54 +1,62 @@
-"""Common base of the environments of one robot and of a batch: task, action mode, and options of a reset."""
+"""Attributes of the environments of one robot and of a batch: their arguments, their robots, and specs that JSON takes.
+
+    spec = EnvSpec.from_json(env.spec.to_json())
+    env = gym.make(spec)
+"""  # fmt: skip
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ParamSpec, TypeVar
+from dataclasses import fields, replace
+from enum import Enum
+from os import PathLike, fspath
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, action_space, command_table
 from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.randomization import DomainRandomization
+from seastar_gym.envs.robots import Robots, Split, Task
 from seastar_gym.envs.sight import Drawn, Sight
-from seastar_gym.envs.spec import PlainSpec
-from seastar_gym.envs.swimming import Swimming
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror
 from seastar_gym.scene.checks import shown
+from seastar_gym.scene.serial import KINDS, to_dict
 from seastar_gym.simulator import Simulator
 
-_P = ParamSpec("_P")
-Result = TypeVar("Result")
 
+class RobotsEnv:
+    """Base of the environments: their robots, and the spaces of one of them.
 
-class TaskEnv(PlainSpec):
-    """Base of the environments: their task, and the spaces of one robot."""
+    The spec holds arguments as plain data: a scene as `Scene.to_dict` writes it, for one. Arguments that have no plain
+    form, such as a scene with an actuator of one's own, stay as they are: the spec makes environments as any other
+    does, but refuses to be written.
+    """
 
     actions: Actions
+    _robots: Robots
     _arguments: frozenset[str] = frozenset()
     """Names of the constructor's arguments, which are attributes, too. Once the environment is made, setting one holds
-    from the next episode on, or is refused, see `Swimming.ask`."""
+    from the next episode on, or is refused, see `Robots.ask`."""
     _is_made = False
-    _option = "path"
-    """Name of the option by which a reset asks for something of the task."""
-    _running = False
-    """Whether an episode has begun and was not interrupted."""
+    _spec: EnvSpec | None = None
 
-    def _set_task(self, task: Swimming) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
-        """Take the task; returns the spaces of one robot's actions and observations."""
-        n_limbs = task.scene.robot.n_limbs
-        self._task, self.actions = task, task.options.actions
+    def _take(self, robots: Robots) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
+        """Take the robots; returns the spaces of one robot's actions and observations."""
+        n_limbs = robots.scene.robot.n_limbs
+        self._robots, self.actions = robots, robots.options.actions
         actions_of_one = action_space(self.actions, n_limbs)
         has_table = isinstance(actions_of_one, spaces.Discrete)
         self.command_table = command_table(self.actions, n_limbs) if has_table else None
-        return actions_of_one, spaces.Box(-np.inf, np.inf, (task.layout.size,), np.float32)
+        return actions_of_one, spaces.Box(-np.inf, np.inf, (robots.layout.size,), np.float32)
 
     def __setattr__(self, name: str, value: Any) -> None:
         if self._is_made and name in self._arguments:
-            self._ask(name, (value,) * self._task.n_robots)
+            self._ask(name, (value,) * self._robots.n_robots)
         else:
             super().__setattr__(name, value)
 
@@ -59,79 +67,93 @@ class TaskEnv(PlainSpec):
         return self._argument(name, 0)
 
     def _argument(self, name: str, robot: int) -> Any:
-        return getattr(self._task.options_of[robot], name)
+        options, task = self._robots.options, self._robots.tasks[robot]
+        return getattr(options if hasattr(options, name) else task, name, None)  # None: the task has no such number
 
     def _ask(self, name: str, values: Sequence[Any]) -> None:
         """Have an argument hold from the next episode of every robot on. values: One for each robot."""
-        self._task.ask(name, values)
+        self._robots.ask(name, values)
 
-    def _to_the_end(self, change: Callable[_P, Result], *args: _P.args, **kwargs: _P.kwargs) -> Result:
-        """What a step or reset returns: after an interruption, robots and task disagree, and only a reset helps."""
-        was_running, self._running = self._running, False
-        try:
-            result = change(*args, **kwargs)
-        except ValueError:  # refused before anything changed
-            self._running = was_running
-            raise
-        self._running = True
-        return result
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How `gym.make` made the environment, None if it did not."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = None if spec is None else _as_plain(spec)
+
+    @property
+    def task(self) -> Task:
+        """What the robots swim for; a `AlongPath` of waypoints unless another task was given."""
+        return self._robots.task
+
+    @property
+    def split(self) -> Split:
+        """Which episodes of a task are drawn."""
+        return self._robots.split
 
     @property
     def decision_period(self) -> float:
         """Time between decisions [s], which a step takes."""
-        return self._task.decision_period
+        return self._robots.decision_period
+
+    @property
+    def timed(self) -> float | None:
+        """Time between decisions [s], None where they are strokes of the actuator."""
+        return self._robots.timed
 
     @property
     def observe_actuators(self) -> bool:
         """Whether observations have the memory of the actuators."""
-        return self._task.options.observe_actuators
+        return self._robots.options.observe_actuators
 
     @property
     def added_mirror(self) -> Mirror:
         """What a mirror does to the numbers that the task adds to a limb's in the observation."""
-        return self._task.added_mirror
+        return self._robots.added_mirror
 
     @property
     def layout(self) -> Layout:
         """What one robot's observation consists of, and the places of all that."""
-        return self._task.layout
+        return self._robots.layout
 
     @property
     def headings(self) -> HeadingTargets | None:
         """Headings that are asked for at the waypoints, None if none are."""
-        return self._task.options.headings
+        return getattr(self.task, "headings", None)
 
     @property
     def sight(self) -> Sight | None:
         """Camera through which robots are seen, None for full sight."""
-        return self._task.options.sight
+        return self._robots.options.sight
 
     @property
     def action_delay(self) -> Drawn:
         """Time from a decision to the heat of wires [s], or its distribution."""
-        return self._task.options.action_delay
+        return self._robots.options.action_delay
 
     @property
     def scene(self) -> Scene:
         """Scene as it was given, before `randomization` draws any of its numbers."""
-        return self._task.scene
+        return self._robots.scene
 
     @property
     def randomization(self) -> DomainRandomization | None:
         """Distributions of the numbers that are drawn for every episode."""
-        return self._task.options.randomization
+        return self._robots.options.randomization
 
     def privileged_observations(self) -> NDArray[np.float32]:
         """What would be observed now without a `Sight`: the true state, for rewards and critics of a training.
 
         Shape (n_robots, size), in the layout of `SeastarSwim-v0` in this scene, `Layout.of(scene)`.
         """
-        return self._task.privileged_observations()
+        return self._robots.privileged_observations()
 
     @property
     def simulator(self) -> Simulator:
         """Simulator of all robots of the environment."""
-        return self._task.simulator
+        return self._robots.simulator
 
 
 def arguments_of(init: Callable[..., None]) -> frozenset[str]:
@@ -148,3 +170,37 @@ def checked_options(options: Mapping[str, Any] | None, known: set[str]) -> Mappi
     if unknown:
         raise ValueError(f"Unknown reset option(s) {shown(sorted(unknown, key=str))}: known are {sorted(known)}.")
     return options or {}
+
+
+class _UnwritableSpec(EnvSpec):
+    def to_json(self) -> str:
+        """Refuse, with the reason."""
+        _plain(self.kwargs)
+        return super().to_json()
+
+
+def _as_plain(spec: EnvSpec) -> EnvSpec:
+    try:
+        return replace(spec, kwargs=_plain(spec.kwargs))
+    except ValueError:
+        return _UnwritableSpec(**{one.name: getattr(spec, one.name) for one in fields(spec) if one.init})
+
+
+def _plain(value: Any) -> Any:
+    """An argument, or several, as JSON has them."""
+    match value:
+        case _ if KINDS.get(type(value).__name__) is type(value):
+            return to_dict(value)
+        case Enum():
+            return value.value
+        case PathLike():
+            return fspath(value)
+        case np.ndarray() | np.generic():
+            return value.tolist()
+        case None | bool() | int() | float() | str():
+            return value
+        case Sequence() if not isinstance(value, bytes):
+            return [_plain(one) for one in value]
+        case Mapping():
+            return {name: _plain(one) for name, one in value.items()}
+    raise ValueError(f"The spec of an environment with {value!r} among its arguments cannot be written.")

@@ -1,13 +1,7 @@
-"""Robots that swim by decisions, whatever they are asked to do: the base of every task.
+"""Robots that swim by decisions, and the `Task` that says what they swim for.
 
-A task is a subclass that says what is drawn for an episode, where the targets of an observation are, and how a decision
-is scored:
-
-    _draw(robot, rng, asked)    draw what an episode of a robot is about
-    _begin(robots)              the robots in a mask are at rest at the origin now
-    _targets()                  two points of every robot's observation [m], such as waypoints
-    _reward_terms(hub, pulses)  terms of the reward, success and end of a decision
-    _task_info(hub)             entries of info that belong to the task
+`Robots` knows quantities: where they are, what they see, what a decision does. A `Task` knows goals: what is drawn for
+an episode, where the targets of an observation are, and how a decision is scored.
 """
 
 from __future__ import annotations
@@ -17,27 +11,26 @@ import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
-from types import ModuleType
-from typing import Any, NamedTuple, Protocol
+from types import ModuleType, SimpleNamespace
+from typing import Any, Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.accuracy.info import errors_in_info, read_certificate
-from seastar_gym.envs.commands import checked_decision_period, unless_strokes
-from seastar_gym.envs.lag import Lag, Piece
-from seastar_gym.envs.layout import HEADINGS, N_STATIONS, Entry, Layout
-from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
-from seastar_gym.envs.observation import to_float32
+from seastar_gym.envs.commands import action_masks, can_be_masked, masked_limbs
+from seastar_gym.envs.delays import Lag, Piece, Tracker
+from seastar_gym.envs.layout import N_STATIONS, Entry, Layout
+from seastar_gym.envs.observation import axes_of, lengths_of, observed_rows, rows_on_device, to_float32
 from seastar_gym.envs.options import SwimOptions
-from seastar_gym.envs.pictures import axes_of, lengths_of, observed_rows, rows_on_device
-from seastar_gym.envs.randomization import ACTION_DELAY, LIMB_STRENGTHS, drawn_scene
+from seastar_gym.envs.randomization import ACTION_DELAY, LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.scenery import NOTHING, Scenery
-from seastar_gym.envs.sight import Lateness, Sees, bounds_of, entries_of, stations_seen
-from seastar_gym.envs.tracker import Tracker
+from seastar_gym.envs.sight import Lateness, Sees, Sight, bounds_of, entries_of, stations_seen
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror, complete
+from seastar_gym.scene.checks import as_array, require_choice, shown
+from seastar_gym.scene.number import check_numbers
 from seastar_gym.simulator import Simulator, StrokeReport
 from seastar_gym.simulator.growth import is_watched
 from seastar_gym.simulator.pauses import completed, pausing
@@ -49,14 +42,17 @@ Flags = NDArray[np.bool_]
 ROUNDING = 1e-9
 """Fraction of a time that is no time."""
 
+Split = Literal["train", "test"]
+SIZES: dict[Split, int] = {"train": 2_000_000_000, "test": 1_000}
+"""Number of episodes of each split. They share none."""
+
 
 class Outcome(NamedTuple):
-    """Reward, end and info of a decision, and the commands that were followed; arrays over robots."""
+    """Reward, end and info of a decision; arrays over robots."""
 
     reward: Floats
     terminated: Flags
     info: dict[str, NDArray[Any]]
-    commands: Floats
 
 
 class Score(NamedTuple):
@@ -64,8 +60,8 @@ class Score(NamedTuple):
 
     terms: dict[str, Floats]
     """Terms of the reward by their names in `info`."""
-    success: Flags
-    over: Flags
+    success: Flags | Literal[False] = False
+    over: Flags | Literal[False] = False
     """Whether the episode ends, by success or failure."""
 
 
@@ -79,54 +75,145 @@ class Draws(Protocol):
         """Draw all numbers of a robot, in place."""
 
 
-class Swimming(ABC):
-    """Task of `n_robots` robots.
+class Task(ABC):
+    """What robots swim for: a frozen dataclass of numbers, whose docstring is the contract that users read.
+
+    The annotations of its fields declare what its numbers may be. A task keeps nothing of an episode: that stands in
+    `robots.episode`, an array for every name that `draw` returns, whose first axis are the robots. Methods may change
+    those arrays, or put others in their places.
+
+    Episodes are numbered, and what is drawn for one follows from its split and its number alone: a reset draws the
+    number, or takes that of `options={"instance": number}`.
+    """
+
+    terms: tuple[str, ...]
+    """Names of the reward's terms."""
+    entries: tuple[Entry, ...] = ()
+    """What the numbers of `observation` are."""
+    observes_commands = False
+    """Whether the last command of every limb is observed, after the memory of its actuator."""
+    observes_actuators = True
+    """Whether the memory of the actuators may be observed."""
+    shows_limbs = True
+    """Whether the stations of the limbs and the hub's velocity are observed."""
+    random_heading = True
+    """Whether robots are turned at random at the start of every episode."""
+    waypoint_radius = 0.01
+    """Radius of waypoints in pictures [m]."""
+    randomization: Draws | None = None
+    """Numbers of the scene that are drawn for every episode."""
+    sight: Sight | None = None
+    """Camera through which robots are seen, unless the environment is given another."""
+    tells_errors = True
+    """Whether `info` has measured errors, which are of whole robots in still water."""
+    goals_are_waypoints = False
+    """Whether an episode is about reaching waypoints, in an observation that tells of them in their places only."""
+    option = "instance"
+    """Name of the option by which a reset asks for a certain episode."""
+    per_episode: tuple[str, ...] = ()
+    """Fields that an environment may change from one episode to the next."""
+
+    def __post_init__(self) -> None:
+        check_numbers(self, f"{type(self).__name__}.")
+
+    @abstractmethod
+    def draw(self, rng: np.random.Generator, scene: Scene) -> dict[str, Any]:
+        """What an episode of one robot of a scene is about, and what is kept of it: numbers or arrays by name."""
+
+    @abstractmethod
+    def targets(self, robots: Robots) -> Floats:
+        """Two points of every robot's observation in the world frame [m], shape (n_robots, 4)."""
+
+    @abstractmethod
+    def score(self, robots: Robots, hub: Floats, pulses: Floats) -> Score:
+        """Score of a decision that ended with the hubs at `hub` [m]. pulses: Heat, see `pulses_of`."""
+
+    def begin(self, robots: Robots, begun: Flags) -> None:  # noqa: B027  # most tasks draw all that they need
+        """Begin the episodes of the robots in a mask, which are at rest with their hubs at the origin."""
+
+    def info(self, robots: Robots, hub: Floats) -> dict[str, NDArray[Any]]:
+        """Entries of info that belong to the task; arrays over robots, copies."""
+        return {}
+
+    def observation(self, robots: Robots) -> Floats:
+        """Further entries of the observation, shape (n_robots, k), see `entries`."""
+        return np.zeros((robots.n_robots, 0))
+
+    def scenery(self, robots: Robots, robot: int) -> Scenery:
+        """What pictures of a robot show besides its waypoints."""
+        return NOTHING
+
+    def simulated(self, scene: Scene) -> Scene:
+        """Scene that is simulated, where robots know another one."""
+        return scene
+
+    def waypoints_of(self, robots: Robots, robot: int) -> Floats:
+        """Waypoints of a robot's present episode [m], shape (n, 2), a copy; n is 0 in tasks without."""
+        return np.zeros((0, 2))
+
+    def headings_of(self, robots: Robots, robot: int) -> Floats | None:
+        """Asked headings of a robot's present episode [rad], shape (n,), a copy; None if none are asked for."""
+        return None
+
+    def radius_of(self, robots: Robots, robot: int) -> float:
+        """Radius of a robot's waypoints [m]."""
+        return self.waypoint_radius
+
+
+class Robots:
+    """`n_robots` robots that swim for a task.
 
     Every robot has an episode and a generator of its own, so a robot of a batch does what it would do alone.
 
     options: Of the environment, see `SeastarSwimEnv`. threads: Of the simulator, one for every processor if None.
-    draws: Numbers of the scene that are drawn for every episode. effort: Whether info has the actuators' work.
+    effort: Whether info has the actuators' work. split: Which episodes are drawn.
     """
-
-    TERMS: tuple[str, ...]
-    """Names of the reward's terms."""
-    waypoint_radius: float
-    """Radius of waypoints [m]."""
-    observes_commands = False
-    """Whether the last command of every limb is observed, after the memory of its actuator."""
-    entries: tuple[Entry, ...] = ()
-    """What the numbers of `_task_observation` are, but for asked headings."""
-    shows_limbs = True
-    """Whether the stations of the limbs and the hub's velocity are observed."""
-    per_episode: tuple[str, ...] = ()
-    """Options that may change from one episode to the next, see `ask`."""
-    goals_are_waypoints = False
-    """Whether an episode is about reaching waypoints, in an observation that tells of them in their places only."""
 
     def __init__(
         self,
+        task: Task,
         options: SwimOptions,
         n_robots: int,
         threads: int | None,
         *,
-        draws: Draws | None = None,
         effort: bool = False,
+        split: Split = "train",
     ):
+        require_choice("split", split, get_args(Split))
+        if task.option != "instance" and split != "train":
+            raise ValueError(
+                "split is for tasks, whose episodes are numbered: leave it out for paths, which have seeds."
+            )
+        draws = options.randomization if task.randomization is None else task.randomization
+        if task.randomization is not None and options.randomization is not None:
+            raise ValueError(f"{type(task).__name__} draws numbers of the scene itself: leave out randomization.")
+        options = replace(
+            options, sight=options.sight or task.sight,
+            randomization=draws if isinstance(draws, DomainRandomization) else None,
+            observe_actuators=options.observe_actuators and task.observes_actuators,
+        )  # fmt: skip
+        self.task, self.options, self.split = task, options, split
+        self.per_episode = task.per_episode
+        """Fields of the task that may change from one episode to the next, see `ask`."""
+        self.tasks = [task] * n_robots
+        """Task of every robot's next episode."""
+        self.episode = SimpleNamespace()
+        """What the task drew and keeps of the present episodes: arrays, whose first axis are the robots."""
+        self.wiring: Floats | None = None
+        """1 for limbs with wires as they should be, -1 for those whose wires are swapped, shape (n_robots, n_limbs)."""
         scene = options.modelled
-        self.options = options
-        self.options_of = [options] * n_robots
-        """Options of every robot's next episode."""
-        self.decision_period = checked_decision_period(options.decision_period, scene)
-        self._tells_errors = True
+        self.decision_period = options.period
+        self.timed = None if self.decision_period == scene.actuator.period else self.decision_period
+        """Time between decisions [s], None where they are strokes of the actuator."""
         self._can_be_masked = can_be_masked(scene.actuator)
-        self.scene = self._drawn_from = scene
+        self.scene, self._drawn_from = scene, task.simulated(scene)
         self._draws = draws
-        self.drawn = {} if draws is None else draws.first_values(scene, n_robots)
+        self.drawn = {} if draws is None else draws.first_values(self._drawn_from, n_robots)
         self.simulator = Simulator(
-            drawn_scene(scene, self.drawn), n_robots, threads, options.error_bars, effort, options.device
+            drawn_scene(self._drawn_from, self.drawn), n_robots, threads, options.error_bars, effort, options.device
         )
         self._effort = effort
-        self.certificate = read_certificate(options.certificate, scene, unless_strokes(self.decision_period, scene))
+        self.certificate = read_certificate(options.certificate, scene, self.timed)
         self._names_of_errors = tuple(self._errors_of(self.simulator.scene))
         # Scene and strengths of limbs, and the errors of both.
         self._known: tuple[Scene | None, bytes, dict[str, Floats]] = None, b"", {}
@@ -137,9 +224,11 @@ class Swimming(ABC):
                 'hub_hinge="opening" or a smaller peak angle.'
             )
         self.n_robots = n_robots
+        self.instance = np.zeros(n_robots, np.int64)
+        """Number of every robot's episode in its split."""
         self.waypoint_index = np.zeros(n_robots, np.int64)  # the waypoint to swim to; 0 in tasks without
         self.last_commands = np.zeros((n_robots, scene.robot.n_limbs))
-        self._energy = np.zeros(n_robots)  # since the reset [J]
+        self.energy = np.zeros(n_robots)  # since the reset [J]
         delay, n_limbs = options.late[ACTION_DELAY], scene.robot.n_limbs
         self._lateness = Lateness(options.late, n_robots)
         is_late = options.sight is not None or bounds_of(delay)[1] > 0.0
@@ -148,68 +237,38 @@ class Swimming(ABC):
         if options.sight is not None:
             self._tracker = Tracker(options.sight.rate, self._sees, n_limbs, self._lateness.values)
 
-    @abstractmethod
-    def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
-        """Draw what an episode of a robot is about. asked: What the options of a reset ask for, None for nothing."""
-
-    @abstractmethod
-    def _begin(self, robots: Flags) -> None:
-        """Begin the episodes of the robots in a mask, which are at rest with their hubs at the origin."""
-
-    @abstractmethod
-    def _targets(self) -> Floats:
-        """Two points of every robot's observation in the world frame [m], shape (n_robots, 4)."""
-
-    @abstractmethod
-    def _reward_terms(self, hub: Floats, pulses: Floats) -> Score:
-        """Score of a decision that ended with the hubs at `hub` [m]. pulses: Heat, see `pulses_of`."""
-
-    @abstractmethod
-    def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
-        """Entries of info that belong to the task; arrays over robots."""
-
     def ask(self, name: str, values: Sequence[Any]) -> None:
-        """Have an option hold from the next episode of every robot on.
+        """Have a field of the task hold from the next episode of every robot on.
 
-        values: One for each robot. ValueError, and nothing changes: one of them, or the option, cannot be changed.
+        values: One for each robot. ValueError, and nothing changes: one of them, or the field, cannot be changed.
         """
         if name not in self.per_episode:
             known = ", ".join(self.per_episode)
             others = f", or change {known}, which hold from the next episode on" if known else ""
             raise ValueError(f"This environment was made with its {name}: make another one with another{others}.")
-        made: dict[tuple[int, int], SwimOptions] = {}
-        for options, value in zip(self.options_of, values, strict=True):
-            if (id(options), id(value)) not in made:
-                made[id(options), id(value)] = replace(options, **{name: value})
-        self.options_of = [made[id(options), id(value)] for options, value in zip(self.options_of, values, strict=True)]
+        self.tasks = self._changed(name, values)
 
-    def radius_of(self, robot: int) -> float:
-        """Radius of a robot's waypoints [m]."""
-        return self.waypoint_radius
-
-    def waypoints_of(self, robot: int) -> Floats:
-        """Waypoints of a robot's present episode [m], shape (n, 2), a copy; n is 0 in tasks without."""
-        return np.zeros((0, 2))
-
-    def scenery(self, robot: int) -> Scenery:
-        """What pictures of a robot show besides its waypoints."""
-        return NOTHING
+    def _changed(self, name: str, values: Sequence[Any]) -> list[Task]:
+        """Tasks of all robots with other values of a field."""
+        made: dict[tuple[int, int], Task] = {}
+        for task, value in zip(self.tasks, values, strict=True):
+            if (id(task), id(value)) not in made:
+                made[id(task), id(value)] = replace(task, **{name: value})  # type: ignore[type-var]  # a dataclass
+        return [made[id(task), id(value)] for task, value in zip(self.tasks, values, strict=True)]
 
     @functools.cached_property
     def layout(self) -> Layout:
         """What one robot's observation consists of."""
-        asked = HEADINGS if self.options.headings is not None else ()
         of_sight = () if self.options.sight is None else entries_of(self._sees)
-        bare = Layout.of(self.scene, self.options.observe_actuators, asked + self.entries + of_sight)
-        shown = len(stations_seen(self._sees))
-        return replace(
-            bare, of_limb=bare.of_limb + self.observes_commands, shows_limbs=shown > 0, stations=shown or N_STATIONS
-        )
+        bare = Layout.of(self.scene, self.options.observe_actuators, self.task.entries + of_sight)
+        seen = len(stations_seen(self._sees))
+        of_limb = bare.of_limb + self.task.observes_commands
+        return replace(bare, of_limb=of_limb, shows_limbs=seen > 0, stations=seen or N_STATIONS)
 
     @property
     def _sees(self) -> Sees | int:
         """What is seen of the robots, see `Sight`."""
-        if not self.shows_limbs:
+        if not self.task.shows_limbs:
             return "pose"
         return "nodes" if self.options.sight is None else self.options.sight.sees
 
@@ -225,28 +284,72 @@ class Swimming(ABC):
     def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
         """Begin a new episode of the robots in a mask, shape (n_robots,).
 
-        generators: Random generator of every robot, which draws its task, its heading, then numbers of its scene.
-        asked: What the options of the reset ask for, such as a path.
+        generators: Random generator of every robot, which draws the number of its episode; that draws the task, the
+        heading, then numbers of the scene. asked: What the options of the reset ask for, see `Task.option`.
         """
+        tasks = self.tasks
+        if self.task.option == "instance":
+            generators = self._numbered(robots, generators, asked)
+        elif asked is not None:
+            tasks = self._changed(self.task.option, [asked] * self.n_robots)
         headings = np.zeros(self.n_robots)
-        for robot in np.flatnonzero(robots):
-            self._draw(int(robot), generators[robot], asked)
-            if self.options_of[robot].random_heading:
+        for robot in np.flatnonzero(robots).tolist():
+            self._keep(robot, tasks[robot].draw(generators[robot], self.scene))
+            if tasks[robot].random_heading:
                 headings[robot] = generators[robot].uniform(-np.pi, np.pi)
             if self._draws is not None:
-                self._draws.draw(self.drawn, int(robot), generators[robot])
-            self._lateness.draw(int(robot), generators[robot])
+                self._draws.draw(self.drawn, robot, generators[robot])
+            self._lateness.draw(robot, generators[robot])
         if self.drawn:
             self.simulator.set_scene(drawn_scene(self._drawn_from, self.drawn), robots)
             strengths = np.asarray(self.scene.limb_strengths or 1.0) * self.drawn.get(LIMB_STRENGTHS, 1.0)
             self.simulator.set_limb_strengths(strengths)
         self.simulator.reset(robots, headings)
-        self._energy[robots], self.last_commands[robots] = 0.0, 0.0
+        self.energy[robots], self.last_commands[robots] = 0.0, 0.0
         if self._lag is not None:
             self._lag.begin(robots, self._lateness.values[ACTION_DELAY])
         if self._tracker is not None:
             self._tracker.begin(robots, generators, self.simulator)
-        self._begin(robots)
+        self.task.begin(self, robots)
+
+    def _numbered(
+        self, robots: Flags, generators: list[np.random.Generator], asked: object
+    ) -> list[np.random.Generator]:
+        """Generators of the next episodes of the robots in a mask, by their numbers.
+
+        asked: Number of the episode, or one for each robot, shape (n_robots,); None draws them.
+        """
+        wanted = None if asked is None else self._checked_numbers(asked)
+        of_episodes = list(generators)
+        for robot in np.flatnonzero(robots).tolist():
+            number = generators[robot].integers(SIZES[self.split]) if wanted is None else wanted[robot]
+            self.instance[robot] = number
+            of_episodes[robot] = np.random.default_rng([list(SIZES).index(self.split), int(number)])
+        return of_episodes
+
+    def _checked_numbers(self, asked: object) -> NDArray[np.int64]:
+        numbers = as_array("instance", asked)
+        whole = numbers.dtype.kind in "iu" and numbers.shape in ((), (self.n_robots,))
+        if not whole or not ((numbers >= 0) & (numbers < SIZES[self.split])).all():
+            raise ValueError(
+                f'instance must be a whole number from 0 to {SIZES[self.split] - 1} in the split "{self.split}", or '
+                f"one for each of {self.n_robots} robot(s), not {shown(asked)}."
+            )
+        return np.broadcast_to(numbers.astype(np.int64), (self.n_robots,))
+
+    def _keep(self, robot: int, drawn: dict[str, Any]) -> None:
+        """Keep what was drawn for a robot. Rows of different lengths stand side by side, behind the shorter ones 0."""
+        kept = vars(self.episode)
+        for name, value in drawn.items():
+            value = np.asarray(value)
+            if name not in kept:
+                kept[name] = np.zeros((self.n_robots, *value.shape), value.dtype)
+            if value.ndim == 0:
+                kept[name][robot] = value
+                continue
+            if (missing := len(value) - kept[name].shape[1]) > 0:
+                kept[name] = np.pad(kept[name], [(0, 0), (0, missing), *[(0, 0)] * (value.ndim - 1)])
+            kept[name][robot, : len(value)], kept[name][robot, len(value) :] = value, 0
 
     def observe(self) -> NDArray[np.float32]:
         """Observations, shape (n_robots, size), a fresh array; see layout.py."""
@@ -257,9 +360,11 @@ class Swimming(ABC):
         found[:, at.actuators] = self._remembered()
         if at.shows_limbs:
             found[:, at.stations_and_hub] = tracker.of_limbs(lengths_of(self.simulator))
-        found[:, at.further] = np.concatenate([self._task_observation(), tracker.entries(self.simulator.time)], axis=1)
-        away = self._targets().reshape(-1, 2, 2) - tracker.hub[:, None]
-        found[:, at.waypoints] = self._in_body_frame(away / lengths_of(self.simulator)[:, None, None]).reshape(-1, 4)
+        found[:, at.further] = np.concatenate(
+            [self.task.observation(self), tracker.entries(self.simulator.time)], axis=1
+        )
+        away = self.task.targets(self).reshape(-1, 2, 2) - tracker.hub[:, None]
+        found[:, at.waypoints] = self.in_body_frame(away / lengths_of(self.simulator)[:, None, None]).reshape(-1, 4)
         return found
 
     @functools.cached_property
@@ -271,7 +376,7 @@ class Swimming(ABC):
         """`observe` as a fresh array of the simulator's device. What a `Sight` shows is copied there."""
         if self._tracker is not None:
             return self.simulator.arrays.asarray(self.observe())
-        seen = to_float32(rows_on_device(self.simulator, self._targets()), self.n_robots)
+        seen = to_float32(rows_on_device(self.simulator, self.task.targets(self)), self.n_robots)
         return self._with_more(seen, self.simulator.arrays)
 
     def _with_more(self, seen: Any, arrays: ModuleType) -> Any:
@@ -283,7 +388,7 @@ class Swimming(ABC):
         found[:, at.stations_and_hub] = seen[:, : at.stations_and_hub.stop]
         found[:, at.waypoints] = seen[:, self._without_more.waypoints]
         found[:, at.actuators] = arrays.asarray(self._remembered())
-        found[:, at.further] = arrays.asarray(self._task_observation())
+        found[:, at.further] = arrays.asarray(self.task.observation(self))
         return found
 
     def privileged_observations(self) -> NDArray[np.float32]:
@@ -296,7 +401,7 @@ class Swimming(ABC):
 
     def _seen_now(self) -> NDArray[np.float32]:
         """Observations of what the kernel fills, without delay, shape (n_robots, k)."""
-        return to_float32(observed_rows(self.simulator, self._targets()), self.n_robots)
+        return to_float32(observed_rows(self.simulator, self.task.targets(self)), self.n_robots)
 
     def seen_hub(self) -> Floats:
         """Hubs as robots are seen by who decides [m], shape (n_robots, 2), a copy."""
@@ -313,7 +418,7 @@ class Swimming(ABC):
     def _remembered(self) -> Floats:
         """Numbers of the limbs that stand before the targets, shape (n_robots, k), limb after limb."""
         wires = self._observed_wires() if self.options.observe_actuators else np.zeros((self.n_robots, 0))
-        if not self.observes_commands:
+        if not self.task.observes_commands:
             return wires
         of_limbs = [wires.reshape(*self.last_commands.shape, -1), self.last_commands[..., None]]
         return np.concatenate(of_limbs, axis=-1).reshape(self.n_robots, -1)
@@ -321,38 +426,39 @@ class Swimming(ABC):
     @property
     def added_mirror(self) -> Mirror:
         """What a mirror does to the numbers that the task adds to a limb's in the observation, see `memory_mirror`."""
-        return ((0, -1),) if self.observes_commands else ()
+        return ((0, -1),) if self.task.observes_commands else ()
 
     def _observed_wires(self) -> Floats:
         """Memory of the actuators in the names of the commands, shape (n_robots, k), limb after limb."""
-        return self.simulator.observe_actuators()
+        wires = self.simulator.observe_actuators()
+        if self.wiring is None:
+            return wires
+        return self._by_command(wires.reshape(*self.wiring.shape, -1)).reshape(self.n_robots, -1)
 
-    def _task_observation(self) -> Floats:
-        """Further entries of the observation, such as asked headings, shape (n_robots, k)."""
-        return np.zeros((self.n_robots, 0))
+    def _by_command(self, of_wires: NDArray[Any]) -> NDArray[Any]:
+        """Values of wires + and -, shape (n_robots, n_limbs, 2), in the names that commands have for them."""
+        if self.wiring is None:
+            return of_wires
+        return np.where(self.wiring[..., None] < 0.0, of_wires[..., ::-1], of_wires)
 
     def heading(self) -> Floats:
         """Direction of every robot's body frame [rad], shape (n_robots,): the same bits for one robot and for many."""
         c, s = axes_of(self.simulator)
         return np.asarray(np.arctan2(s, c))
 
-    def _in_body_frame(self, vectors: Floats) -> Floats:
+    def in_body_frame(self, vectors: Floats) -> Floats:
         """Vectors of the world frame, shape (n_robots, ..., 2), in the frames in which robots are seen."""
         c, s = (part.reshape(-1, *[1] * (vectors.ndim - 2)) for part in self._seen_axes())
         x, y = vectors[..., 0], vectors[..., 1]
         return np.stack([c * x + s * y, c * y - s * x], axis=-1)
 
-    def headings_of(self, robot: int) -> Floats | None:
-        """Asked headings of a robot's present episode [rad], shape (n,), a copy; None if none are asked for."""
-        return None
-
     def action_masks(self) -> Flags:
-        """Actions that wires can follow now, shape (n_robots, k), see masks.py."""
+        """Actions that wires can follow now, shape (n_robots, k), see commands.py."""
         return action_masks(self.options.actions, self._refractory_wires())
 
     def _refractory_wires(self) -> Flags:
         """Wires that cannot be heated now, by their names in commands, shape (n_robots, n_limbs, 2)."""
-        return self.simulator.refractory_wires()
+        return self._by_command(self.simulator.refractory_wires())
 
     def followed(self, commands: Floats) -> Floats:
         """Commands with zeros for limbs whose wire cannot follow its command now, shape (n_robots, n_limbs)."""
@@ -362,11 +468,11 @@ class Swimming(ABC):
 
     def _wired(self, commands: Floats) -> Floats:
         """Commands as they reach the limbs, shape (n_robots, n_limbs)."""
-        return commands
+        return commands if self.wiring is None else commands * self.wiring
 
     def step(self, commands: Floats) -> Outcome:
         """Advance every robot by one decision."""
-        followed = self.followed(commands)
+        followed = self.last_commands = self.followed(commands)
         if self._lag is None:
             report = self.simulator.advance(self.decision_period, self._wired(followed))
         else:
@@ -375,7 +481,7 @@ class Swimming(ABC):
 
     def step_in_parts(self, commands: Floats, parts: int) -> Generator[float, None, Outcome]:
         """One decision in `parts` parts; yields the time since it began [s] after each, and returns the Outcome."""
-        followed = self.followed(commands)
+        followed = self.last_commands = self.followed(commands)
         if self._lag is None:
             report = yield from self.simulator.advance_in_parts(self.decision_period, self._wired(followed), parts)
         else:
@@ -416,14 +522,16 @@ class Swimming(ABC):
     def _judge(self, commands: Floats, followed: Floats, report: StrokeReport) -> Outcome:
         """Outcome of a decision. commands: Those that were given. followed: Those that were followed."""
         hub = self.simulator.hub_position()
-        self._energy += report.energy
-        self.last_commands = followed
+        self.energy += report.energy
         if self._tracker is not None:
             self._tracker.look(self.simulator.time)
-        score = self._reward_terms(hub, pulses_of(report.heating_time, followed))
+        score = self.task.score(self, hub, pulses_of(report.heating_time, followed))
+        if score.success is False or score.over is False:
+            success, over = (np.zeros(self.n_robots, bool) if flags is False else flags for flags in score[1:])
+            score = Score(score.terms, success, over)
         info = self._info(hub, score, commands, followed, report)
         reward = functools.reduce(operator.add, score.terms.values())
-        return Outcome(reward, score.over | (report.status != 0), info, followed)
+        return Outcome(reward, score.over | (report.status != 0), info)
 
     def _info(
         self, hub: Floats | None, score: Score, commands: Floats, followed: Floats, report: StrokeReport
@@ -450,7 +558,7 @@ class Swimming(ABC):
         angle = np.full(self.n_robots, min(self.scene.robot.opening_angle, np.pi))
         known = {"status": counts, "newton_iterations": counts, "smallest_opening_angle": angle}
         report = StrokeReport(**{**dict.fromkeys(StrokeReport._fields, none), **known})
-        score, still = Score(dict.fromkeys(self.TERMS, none), never, never), np.zeros_like(self.last_commands)
+        score, still = Score(dict.fromkeys(self.task.terms, none), never, never), np.zeros_like(self.last_commands)
         return self._info(None, score, still, still, report)
 
     def facts(self, hub: Floats | None = None) -> dict[str, NDArray[Any]]:
@@ -462,18 +570,23 @@ class Swimming(ABC):
         return {
             "time": self.simulator.time,
             "hub_position": hub,
-            **self._task_info(hub),
+            **self.task.info(self, hub),
             **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
-            **(self._errors() if self._tells_errors else {}),
+            **(self._errors() if self.task.tells_errors else {}),
             **({"error_estimate": self.simulator.error_estimate} if self.options.error_bars else {}),
             **({"energy_growth": self.simulator.energy_growth} if self._tells_growth else {}),
             **({} if self._tracker is None else {"sight_age": self._tracker.age(self.simulator.time)}),
-            **{name: values.copy() for name, values in self.drawn.items()},
-            **self._lateness.drawn,
+            **self.hidden,
+            **({"instance": self.instance.copy()} if self.task.option == "instance" else {}),
         }
 
+    @property
+    def hidden(self) -> dict[str, Floats]:
+        """Drawn numbers of the scene, of the sight and of the delay of actions, by their names, copies."""
+        return {**{name: values.copy() for name, values in self.drawn.items()}, **self._lateness.drawn}
+
     def _errors_of(self, scene: Scene) -> dict[str, float]:
-        return errors_in_info(scene, self.certificate, unless_strokes(self.decision_period, self.scene))
+        return errors_in_info(scene, self.certificate, self.timed)
 
     def _errors(self) -> dict[str, Floats]:
         """Measured errors and speed, shape (n_robots,) each, not copies; NaN for robots with weak limbs."""
