@@ -20,6 +20,7 @@ import secrets
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FunctionType
 
 import llvmlite
 import numba
@@ -30,10 +31,9 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 
 from seastar_gym.interrupts import held_back, let_through
-from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.lanes import N_LANES, PLAIN, Form
 from seastar_gym.simd.ownership import ForeignFolderError, is_own, opened_by_owner, own_folder
-from seastar_gym.simd.pipeline import EntryCompiler, KernelCompiler
-from seastar_gym.simd.plain import plain_kernels
+from seastar_gym.simd.pipeline import EntryCompiler, KernelCompiler, compiler_of
 
 PACKAGE = Path(__file__).resolve().parent.parent
 DIGEST_SIZE = hashlib.sha256().digest_size  # bytes
@@ -62,25 +62,14 @@ class Kernel(CPUDispatcher):
                     self.add_overload(self._compiler.compile(sig, None))
 
     def __call__(self, *args, **kwargs):
-        name = self.py_func.__name__
-        raise TypeError(
-            f"{name} is a kernel, which only compiled code can call: call it from an @entry_point, "
-            f"or {name}.plain in Python."
-        )
-
-    @property
-    def plain(self):
-        """The kernel in plain Python, on the lanes of numpy_lanes.py."""
-        return plain_kernels()(self)
+        return self.py_func(*args, **kwargs)
 
 
 def kernel(function, **options):
-    """Compile `function` as a building block; with NUMBA_DISABLE_JIT=1 it stays the Python function that it is."""
+    """Compile `function` as a building block. Called in Python it is that, on the lanes of numpy_lanes.py."""
     compiled = numba.njit(**BLOCK, **options)(function)
-    if isinstance(compiled, CPUDispatcher):
+    if isinstance(compiled, CPUDispatcher):  # nothing is with NUMBA_DISABLE_JIT=1
         compiled.__class__ = Kernel  # numba offers no other way to say how its dispatchers are called
-    else:
-        compiled.plain = compiled
     return compiled
 
 
@@ -246,6 +235,10 @@ def _foreign(refused: ForeignFolderError) -> str:
 class EntryPoint(CPUDispatcher):
     """A function that Python calls, each kind of which one process compiles while others wait for it."""
 
+    def at(self, form: Form):
+        """The same function, which borrows arrays as rows of a form."""
+        return self if form == PLAIN else _at(self, form)
+
     def compile(self, sig):
         try:
             with held_back():
@@ -318,10 +311,30 @@ def _say_that_some_are_foreign(folder):
 
 
 def entry_point(function):
-    """Compile `function` for calls from Python, with the GIL released and the machine code kept on disk."""
+    """Compile `function` for calls from Python, with the GIL released and the machine code kept on disk.
+
+    Its `at(form)` is the same on rows of another form.
+    """
     if numba.config.DISABLE_JIT:
-        return np.errstate(all="ignore")(function)
-    compiled = numba.njit(**STRICT)(function)
+        quiet = np.errstate(all="ignore")(function)
+        quiet.at = lambda form: quiet
+        return quiet
+    return _entry_point(function, EntryCompiler)
+
+
+@global_compiler_lock
+@functools.cache
+def _at(entry, form):
+    function = entry.py_func
+    # Code is known by its function's name, in a process as on disk.
+    name = f"{function.__name__}_{form.name}_{form.width}_{form.stride}"
+    named = FunctionType(function.__code__, function.__globals__, name, function.__defaults__, function.__closure__)
+    named.__qualname__, named.__module__ = name, function.__module__
+    return _entry_point(named, compiler_of(form))
+
+
+def _entry_point(function, compiler):
+    compiled = numba.njit(**{**STRICT, "pipeline_class": compiler})(function)
     compiled.__class__ = EntryPoint
     try:
         compiled._cache = _DigestCache(function)

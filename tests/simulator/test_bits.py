@@ -44,6 +44,7 @@ from seastar_gym import (
 )
 from seastar_gym.scene.per_robot import side_by_side
 from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simulator import batch
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
 from simulator.test_conservation import CURLED
 from strokes import finished
@@ -277,6 +278,16 @@ def test_a_robot_has_its_bits(name, way):
 
 
 # Another width of lanes
+
+
+@pytest.mark.parametrize("name", ["default strokes", "body", "adaptive", "nasty, every term, implicit-midpoint"])
+def test_few_robots_on_narrow_lanes_have_their_bits(monkeypatch, name):
+    few = N_LANES // 2
+    monkeypatch.setattr(batch, "FEW", few)
+    for robots in (np.array([0]), np.arange(1, 1 + few)):
+        for one, wanted in zip(swim(ROWS[name], robots), expected(name), strict=True):
+            for field in one:
+                np.testing.assert_array_equal(one[field], wanted[field][robots], err_msg=field)
 
 
 @pytest.mark.parametrize(
