@@ -6,7 +6,7 @@ in a called file would silently run the old code. Ours lives in a folder named a
 package that defines kernels, the versions of numba, llvmlite and numpy and the lane width: whatever changes, the old
 code cannot be found. Every file begins with a digest of the rest: what was cut off or written over is not there, and is
 compiled and written anew. What cannot be written is compiled in every process, and so is all where others than the user
-could have written it (ownership.py): numba keeps pickles. Processes that want the same code at once wait for the first
+could have written it: numba keeps pickles. Processes that want the same code at once wait for the first
 of them, which compiles it, and load it then.
 """
 
@@ -17,6 +17,7 @@ import logging
 import os
 import pickle
 import secrets
+import stat
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -32,7 +33,6 @@ from numba.core.registry import CPUDispatcher
 
 from seastar_gym.interrupts import held_back, let_through
 from seastar_gym.simd.lanes import N_LANES, PLAIN, Form
-from seastar_gym.simd.ownership import ForeignFolderError, is_own, opened_by_owner, own_folder
 from seastar_gym.simd.pipeline import EntryCompiler, KernelCompiler, compiler_of
 
 PACKAGE = Path(__file__).resolve().parent.parent
@@ -97,6 +97,58 @@ def source_digest(package: Path = PACKAGE) -> str:
 
 
 digest_of_this_process = functools.cache(source_digest)
+
+
+# Only this user, or root, may have put code there that runs. A folder must belong to one of the two, and neither group
+# nor others may write in it; nor in a folder above it, through which it could be replaced, but for sticky ones such as
+# /tmp. Windows has no such bits, and is not asked.
+WRITABLE = stat.S_IWGRP | stat.S_IWOTH
+FOLDER, FILE = 0o755, 0o644
+"""Rights of what is made here, whatever the umask adds."""
+
+
+class ForeignFolderError(Exception):
+    """A folder whose files others may have written; says why, to end a sentence with."""
+
+
+def own_folder(folder: Path) -> Path:
+    """The folder without links, made if it is not there. ForeignFolderError, or OSError where it cannot be made."""
+    folder = folder.resolve()
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    require_own(folder)
+    for place in reversed(missing):
+        place.mkdir(FOLDER, exist_ok=True)
+    require_own(folder)  # another may have been faster in a sticky folder
+    return folder
+
+
+def require_own(folder: Path) -> None:
+    """ForeignFolderError unless only this user, or root, can write into a folder without links, as far as it exists."""
+    for place in filter(Path.exists, (folder, *folder.parents)):
+        found, is_above = place.stat(), place != folder
+        of_system = is_above and found.st_uid == Path(place.anchor).stat().st_uid  # in some containers root is nobody
+        if _is_foreign(found) and not of_system:
+            raise ForeignFolderError(f"{place} belongs to another user")
+        if _is_writable(found) and not (is_above and found.st_mode & stat.S_ISVTX):
+            raise ForeignFolderError(f"others than its owner may write in {place}")
+
+
+def is_own(found: os.stat_result) -> bool:
+    """Whether only this user, or root, can have written a file."""
+    return not (_is_foreign(found) or _is_writable(found))
+
+
+def _is_foreign(found: os.stat_result) -> bool:
+    return hasattr(os, "geteuid") and found.st_uid not in (0, os.geteuid())
+
+
+def _is_writable(found: os.stat_result) -> bool:
+    return hasattr(os, "geteuid") and bool(found.st_mode & WRITABLE)
+
+
+def opened_by_owner(file: str, flags: int) -> int:
+    """Opener of a new file into which no other user can write."""
+    return os.open(file, flags, FILE)
 
 
 class _DigestLocator(UserWideCacheLocator):
@@ -319,7 +371,7 @@ def entry_point(function):
         quiet = np.errstate(all="ignore")(function)
         quiet.at = lambda form: quiet
         return quiet
-    return _entry_point(function, EntryCompiler)
+    return _entry_point(function, PLAIN)
 
 
 @global_compiler_lock
@@ -330,11 +382,11 @@ def _at(entry, form):
     name = f"{function.__name__}_{form.name}_{form.width}_{form.stride}"
     named = FunctionType(function.__code__, function.__globals__, name, function.__defaults__, function.__closure__)
     named.__qualname__, named.__module__ = name, function.__module__
-    return _entry_point(named, compiler_of(form))
+    return _entry_point(named, form)
 
 
-def _entry_point(function, compiler):
-    compiled = numba.njit(**{**STRICT, "pipeline_class": compiler})(function)
+def _entry_point(function, form):
+    compiled = numba.njit(**{**STRICT, "pipeline_class": compiler_of(form)})(function)
     compiled.__class__ = EntryPoint
     try:
         compiled._cache = _DigestCache(function)

@@ -22,7 +22,7 @@ from numba.core.registry import cpu_target
 
 from seastar_gym.simd import compilation
 from seastar_gym.simd.lanes import Form, Rows, absent, registers
-from seastar_gym.simd.linking import linked
+from seastar_gym.simd.pipeline import linked
 
 N_LANES = 32
 """Robots in a row of memory: as many as threads that run in step."""

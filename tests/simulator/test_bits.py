@@ -280,12 +280,18 @@ def test_a_robot_has_its_bits(name, way):
 # Another width of lanes
 
 
-@pytest.mark.parametrize("name", ["default strokes", "body", "adaptive", "nasty, every term, implicit-midpoint"])
+FEW = {name: ROWS[name] for name in ("default strokes", "body", "adaptive", "nasty, every term, implicit-midpoint")}
+FEW["held, along limbs"] = Row(
+    Scene(replace(TEN, along=AlongLimb(0.7), stiffening=Stiffening(2.0)), numerics=MIDPOINT, held_nodes=(9,))
+)
+
+
+@pytest.mark.parametrize("name", FEW)
 def test_few_robots_on_narrow_lanes_have_their_bits(monkeypatch, name):
-    few = N_LANES // 2
-    monkeypatch.setattr(batch, "FEW", few)
-    for robots in (np.array([0]), np.arange(1, 1 + few)):
-        for one, wanted in zip(swim(ROWS[name], robots), expected(name), strict=True):
+    whole = swim(FEW[name])
+    monkeypatch.setattr(batch, "FEW", N_LANES // 2)
+    for robots in (np.array([0]), np.arange(1, 1 + N_LANES // 2)):
+        for one, wanted in zip(swim(FEW[name], robots), whole, strict=True):
             for field in one:
                 np.testing.assert_array_equal(one[field], wanted[field][robots], err_msg=field)
 
