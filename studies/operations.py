@@ -1,11 +1,12 @@
 """Number of floating-point operations of the kernels, counted by running their source on lanes that count.
 
-The kernels are loaded as plain Python, see seastar_gym/simd/plain.py, so the count is that of the code that runs, for
-one robot of any scene. It does not depend on the machine, and tests bound it.
+Kernels that Python calls run in Python, see seastar_gym/simd/numpy_lanes.py, so the count is that of the code that
+runs, for one robot of any scene. It does not depend on the machine, and tests bound it.
 """
 
 from collections import Counter
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
@@ -18,9 +19,8 @@ from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Scene
 from seastar_gym.simd import numpy_lanes
-from seastar_gym.simd.modules import FOLDER
+from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from seastar_gym.simd.plain import PlainKernels
 from seastar_gym.simulator import Simulator
 
 FLOPS = {"add": 1, "multiply": 1, "fused": 2, "divide": 1, "root": 1}
@@ -51,17 +51,28 @@ class Constant(Counted):
     __slots__ = ()
 
 
+load, load_at, store = numpy_lanes.load, numpy_lanes.load_at, numpy_lanes.store
+
+
 def _load(rows: Any, row: int) -> Counted:
     _counts["load"] += rows.ndim > 1
-    return Counted(numpy_lanes.load(rows, row).numbers)
+    return Counted(load(rows, row).numbers)
 
 
 def _store(rows: Any, row: int, value: Any) -> None:
     _counts["store"] += 1
-    numpy_lanes.store(rows, row, value)
+    store(rows, row, value)
+
+
+COUNTING: dict[str, Any] = {
+    "load": _load, "store": _store, "splat": Constant,
+    "load_at": lambda rows, row: Counted(load_at(rows, row).numbers),
+}  # fmt: skip
+"""Functions in place of those of numpy_lanes.py."""
 
 
 @np.errstate(all="ignore")
+@patch.multiple(numpy_lanes, **COUNTING)
 def count_operations(scene: Scene) -> dict[str, Counter[str]]:
     """Operations of one robot in the middle of a heating ramp, by part.
 
@@ -69,11 +80,7 @@ def count_operations(scene: Scene) -> dict[str, Counter[str]]:
     the root nodes and the hub) and "substitution" (with the Newton step); "iteration" is their sum. "step" counts the
     operations of a time step outside iterations, for schemes with one stage.
     """
-    counting = PlainKernels(
-        n_lanes=1, folder=FOLDER, load=_load, store=_store, splat=Constant,
-        load_at=lambda rows, row: Counted(numpy_lanes.load_at(rows, row).numbers),
-    )  # fmt: skip
-    work, rods, scheme, actuation, state, a = _moving_robot(scene, counting)
+    work, rods, scheme, actuation, state, a = _moving_robot(scene)
     h = Counted(scene.numerics.step)
     parts: dict[str, Counter[str]] = {}
 
@@ -86,26 +93,26 @@ def count_operations(scene: Scene) -> dict[str, Counter[str]]:
     def limbs() -> None:
         D, r = (Counted(1.0), Counted(0.0), Counted(1.0)), (Counted(0.0), Counted(0.0))
         for limb in range(rods.n_limbs):
-            D, r, *_ = counting(sweep_limb)(rods, work, stage, limb, None, D, r)
+            D, r, *_ = sweep_limb(rods, work, stage, limb, None, D, r)
 
     def step() -> None:
-        begun = counting(begin_stage)(rods, work, scheme, 0, *state, a, h)
-        counting(set_natural_hub_angles)(rods, work, actuation, Counted(1.0))
-        counting(end_step)(rods, work, scheme, begun, *state, a, h, Mask(True))
+        begun = begin_stage(rods, work, scheme, 0, *state, a, h)
+        set_natural_hub_angles(rods, work, actuation, Counted(1.0))
+        end_step(rods, work, scheme, begun, *state, a, h, Mask(True))
 
-    stage = counting(begin_stage)(rods, work, scheme, 0, *state, a, h)
-    counting(set_natural_hub_angles)(rods, work, actuation, Counted(1.0))
-    counted("hub hinges", lambda: counting(assemble_hub)(rods, work, stage, None))
+    stage = begin_stage(rods, work, scheme, 0, *state, a, h)
+    set_natural_hub_angles(rods, work, actuation, Counted(1.0))
+    counted("hub hinges", lambda: assemble_hub(rods, work, stage, None))
     counted("limbs", limbs)
     unit = (Counted(1.0), Counted(0.0), Counted(1.0))
-    counted("ring", lambda: counting(solve_hub)(rods, work, unit, unit[:2]))
-    counted("substitution", lambda: counting(take_step)(rods, work, Mask(True), Mask(False), Counted(1.0)))
+    counted("ring", lambda: solve_hub(rods, work, unit, unit[:2]))
+    counted("substitution", lambda: take_step(rods, work, Mask(True), Mask(False), Counted(1.0)))
     parts["iteration"] = sum(parts.values(), Counter())
     counted("step", step)
     return parts
 
 
-def _moving_robot(scene: Scene, counting: PlainKernels) -> tuple[Any, ...]:
+def _moving_robot(scene: Scene) -> tuple[Any, ...]:
     """Memory, coefficients, scheme, actuation, state rows and accelerations of a robot with bending limbs."""
     simulator = Simulator(scene, threads=1)
     command = np.zeros((1, scene.robot.n_limbs))
@@ -113,10 +120,12 @@ def _moving_robot(scene: Scene, counting: PlainKernels) -> tuple[Any, ...]:
     stroke = simulator.stroke_in_parts(command, 20)
     next(stroke)
     scheme, rods = scheme_of(scene.numerics.scheme, scene.numerics.damping), make_rods(scene)
-    work = counting(make_work)(rods, scheme.n_stages)
-    angles = 0.5 * scene.actuator.peak_angle * command.T
-    q, v = simulator.positions.reshape(-1, 1), simulator.velocities.reshape(-1, 1)
-    a = np.zeros(((len(q) + 1) * scheme.n_stages, 1))
+    work = make_work(rods, scheme.n_stages)
+    angles, q, v = (
+        np.repeat(numbers.reshape(-1, 1), N_LANES, axis=1)
+        for numbers in (0.5 * scene.actuator.peak_angle * command, simulator.positions, simulator.velocities)
+    )
+    a = np.zeros(((len(q) + 1) * scheme.n_stages, N_LANES))
     return work, rods, scheme, Actuation(angles, angles), (q, v), a
 
 

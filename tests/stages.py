@@ -46,7 +46,7 @@ def rods_of(robot: Seastar, fluid: bool = True) -> Rods:
 def turn_limbs(rods: Rods, work: Work, delta_psi: np.ndarray) -> None:
     """Fill `work` with what is natural of limbs turned by delta_psi [rad], shape (N_LANES, n_limbs) or (n_limbs,)."""
     turns = np.broadcast_to(delta_psi, (N_LANES, rods.n_limbs)).T.copy()
-    set_natural_hub_angles.plain(rods, work, Actuation(0.0 * turns, turns), Lanes(1.0))
+    set_natural_hub_angles(rods, work, Actuation(0.0 * turns, turns), Lanes(1.0))
 
 
 class RandomStages:
@@ -93,9 +93,9 @@ class RandomStages:
         work.q[:], work.q_hat[:], work.v_hat[:] = map(rows, (self.frozen, self.q_hat, self.v_hat))
         turn_limbs(rods, work, self.delta_psi)
         stage = Stage(work.q_hat, work.v_hat, gamma, 1.0 / gamma, ahead)
-        freeze_fluid.plain(rods, work)
-        freeze_contact.plain(rods, work, stage, rows(self.q if q_0 is None else q_0))
-        freeze_strains.plain(rods, work, work.q_hat)
+        freeze_fluid(rods, work)
+        freeze_contact(rods, work, stage, rows(self.q if q_0 is None else q_0))
+        freeze_strains(rods, work, work.q_hat)
         work.q[:] = rows(self.q if q is None else q)
         return work, stage
 
@@ -103,9 +103,9 @@ class RandomStages:
         """Phi, decrement and pivot per lane, and the Newton direction, shape (N_LANES, n_nodes, 2)."""
         work, stage = self.begin(rods, **places)
         before = work.q.copy()
-        phi, decrement, pivot = factorise.plain(rods, work, stage, convex)
-        decrement = solve_coupled.plain(rods, work, EVERYONE, decrement)
-        largest = move_along.plain(rods, work, EVERYONE, None, Lanes(1.0))
+        phi, decrement, pivot = factorise(rods, work, stage, convex)
+        decrement = solve_coupled(rods, work, EVERYONE, decrement)
+        largest = move_along(rods, work, EVERYONE, None, Lanes(1.0))
         phi, decrement, pivot, largest = (np.broadcast_to(plain(x), N_LANES) for x in (phi, decrement, pivot, largest))
         return SimpleNamespace(
             phi=phi, decrement=decrement, pivot=pivot, largest=largest, direction=-nodes(work.step),
@@ -151,17 +151,17 @@ def begun_on_body(rods: Rods, directions: np.ndarray, stage: SimpleNamespace, ah
     """
     work, gamma = make_work(rods, 1), Lanes(stage.gamma)
     q_hat, v_hat = unknown_rows(rods, stage.u_hat), unknown_rows(rods, stage.v_hat)
-    move_roots.plain(rods, q_hat, v_hat)
+    move_roots(rods, q_hat, v_hat)
     begun = Stage(q_hat, v_hat, gamma, 1.0 / gamma, ahead)
     rates = (stage.first - stage.u_hat) / stage.gamma
     work.q[:] = unknown_rows(rods, stage.first)
-    place_roots.plain(rods, work.q)
-    freeze_contact.plain(rods, work, begun, q_hat)
-    freeze_body.plain(rods, work, begun, tuple(Lanes(rates[k]) for k in (0, 1, -1)))
-    freeze_fluid.plain(rods, work)
-    freeze_strains.plain(rods, work, q_hat)
+    place_roots(rods, work.q)
+    freeze_contact(rods, work, begun, q_hat)
+    freeze_body(rods, work, begun, tuple(Lanes(rates[k]) for k in (0, 1, -1)))
+    freeze_fluid(rods, work)
+    freeze_strains(rods, work, q_hat)
     natural = directions + stage.delta_psi
     work.hub_direction[:] = np.stack([np.cos(natural), np.sin(natural)], axis=1).reshape(-1, 1)
     work.q[:] = unknown_rows(rods, stage.u)
-    place_roots.plain(rods, work.q)
+    place_roots(rods, work.q)
     return work, begun

@@ -22,9 +22,9 @@ g, d           g, d             m       gap between a node and an edge of anothe
 h, gamma       h, gamma         s       time step; coefficient of a stage times h
 Phi            phi, energy      J       incremental potential of a stage, see potential.py
 
-Kernels are called by entry points alone, or one by one as plain Python: `drag_slopes.plain(c, wx, wy)`. What they may
-ask of a processor is listed in numpy_lanes.py. NUMBA_DISABLE_JIT=1 runs everything so, in any debugger, thousands of
-times slower.
+Entry points call the machine code of kernels. What Python calls itself, `drag_slopes(c, wx, wy)`, runs in Python. What
+kernels may ask of a processor is listed in numpy_lanes.py. NUMBA_DISABLE_JIT=1 runs everything so, in any debugger,
+thousands of times slower.
 
 Work of a Newton iteration of the chapter's discretisation (46 nodes), counted by studies/operations.py; shares of
 the time are those of an AVX-512 processor, by `python -m studies.speed.throughput` at commit 055100c4:

@@ -128,10 +128,11 @@ class Work(NamedTuple):
     body: body.BodyWork | None
 
 
-def make_work(rods: Rods, n_stages: int, again: bool = False) -> Work:
+def make_work(rods: Rods, n_stages: int, again: bool = False, width: int = N_LANES) -> Work:
     """Zeroed memory for one lane group of such rods and a scheme of `n_stages` stages.
 
     again: Whether linear systems are solved for other right-hand sides, too, as they are with contact.
+    width: Robots for whom kernels compute at a time.
     """
     n_limbs, n_edges, n_nodes, n_points = rods.n_limbs, rods.n_edges, rods.n_nodes, rods.n_points
 
@@ -164,7 +165,7 @@ def make_work(rods: Rods, n_stages: int, again: bool = False) -> Work:
         added_mass=None if rods.added_mass is None else rows(3 * rods.n_places),
         pivots=rows(2 * n_nodes) if again or rods.contact is not None else None,
         root_pivots=rows(2 * (n_limbs + 1)) if again or rods.contact is not None else None,
-        contact=contact.memory(rods.contact, n_limbs, rods.edges_per_limb, n_points),
+        contact=contact.memory(rods.contact, n_limbs, rods.edges_per_limb, n_points, width),
         tension=None if rods.damping is None else rows(n_edges),
         bending=None if rods.damping is None else rows(n_edges),
         body=body.memory(rods.body, n_limbs, n_stages),

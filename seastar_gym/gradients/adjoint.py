@@ -12,19 +12,20 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.report import MOMENTS, REPORT_ROWS, SMALLEST_HUB_T, WORK
 from seastar_gym.der.stepping.schemes import SCHEMES
+from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.gradients.history import (
     CAPACITY,
     COUNTERS,
     INTERVAL,
+    KEPT,
     N_STEPS,
     OF_STEP,
     Kept,
-    keeping_advance,
     n_numbers,
 )
 from seastar_gym.gradients.memory import WorkOfGradient, as_rows_of_tape, with_places, works
-from seastar_gym.gradients.replay import Rows, Slopes, Tape, pulling_back
+from seastar_gym.gradients.replay import Rows, Slopes, Tape, pull_back
 from seastar_gym.gradients.replay import Scene as SceneOnTape
 from seastar_gym.gradients.stencils import arrays_of
 from seastar_gym.gradients.swim import (
@@ -261,7 +262,7 @@ class Record:
             counters, found = np.zeros(COUNTERS), np.empty((capacity + 1, n_rows))
             counters[CAPACITY] = capacity
             kept = Kept(counters, rows, rows.ravel(), found.ravel(), n_rows, n_q, self._n_a)
-            keeping_advance()(
+            advance.at(KEPT)(
                 self._rods, WorkOfGradient(*self._work, kept, None), self._scheme,  # type: ignore[call-arg]
                 SCHEMES["implicit-euler"], _actuation(self._n_limbs, N_LANES), q[None], v[None], a[None], peaks, times,
                 shape[None], self._n_limbs, failed, report, self._limits, effort,
@@ -377,9 +378,7 @@ class _Sweep:
         while True:
             of = Slopes(self.of_q.copy(), self.of_v.copy(), np.zeros(record._n_a), 0.0 * turned, of_work)
             tape = Tape(self._entries, self._entries.view(np.uint32), self._slopes, first)
-            outcome = pulling_back()(
-                scene, tape, self._rows, places, self._beside, places_beside, kept, times, turned, of
-            )
+            outcome = pull_back(scene, tape, self._rows, places, self._beside, places_beside, kept, times, turned, of)
             if outcome == 0:
                 break
             if outcome == 2:

@@ -1,26 +1,30 @@
 """What a swim leaves of each time step for `replay.py`, which differentiates it: where it began, and its solutions.
 
-`keeping_advance` is `advance` of der/stepping/stroke.py, to the same bits and on the lanes of `Simulator`.
+`advance` of der/stepping/stroke.py at the form `KEPT` leaves it, to the same bits and on the lanes of `Simulator`.
 """
 
-from collections.abc import Callable
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba.core.compiler_lock import global_compiler_lock
 from numpy.typing import NDArray
 
-from seastar_gym.der.stepping import interval, steps, stroke
 from seastar_gym.der.stepping.interval import FALLBACK_AFTER, cover_interval
 from seastar_gym.der.stepping.momentum import correct_momentum
 from seastar_gym.der.stepping.newton import minimise
 from seastar_gym.der.stepping.steps import try_step
-from seastar_gym.der.stepping.stroke import advance
-from seastar_gym.simd import compilation, lanes
-from seastar_gym.simd.compilation import entry_point, kernel
-from seastar_gym.simd.lanes import N_LANES, any_lane, load, load_number, select, splat, store, store_number
-from seastar_gym.simd.modules import COMPILATION, LANES, KernelModules
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import (
+    N_LANES,
+    Form,
+    any_lane,
+    load,
+    load_number,
+    registers,
+    select,
+    splat,
+    store,
+    store_number,
+)
 
 INTERVAL, START, SIZE, LIMIT, RETRYING, FALLBACK, OF_STEP = range(7)
 """Numbers of a step: that of its interval between two times, its beginning and its length as shares of that, its
@@ -115,33 +119,8 @@ def cover_and_count(rods, work, scheme, fallback, actuation, q, v, a, duration, 
     return alive
 
 
-class KeepingKernels(KernelModules):
-    """The kernels on the lanes of `Simulator`, whose steps leave what they began with and what they found."""
-
-    def __init__(self) -> None:
-        super().__init__({LANES: lanes, COMPILATION: compilation})
-        vars(self._module_of(stroke.__name__))["cover_interval"] = self(cover_and_count)
-        vars(self._module_of(interval.__name__))["try_step"] = self(try_and_keep)
-        of_steps = {"minimise": self(minimise_and_keep), "correct_momentum": self(correct_and_keep)}
-        vars(self._module_of(steps.__name__)).update(of_steps)
-
-
-groups_on_keeping_lanes: Callable[..., None]
-"""`advance` with kernels that keep, once somebody has asked for it."""
-
-
-@entry_point
-def _advance_and_keep(
-    rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shape, n_turning, failed, report, limits, effort
-):  # fmt: skip
-    groups_on_keeping_lanes(  # noqa: F821 - there when it is compiled
-        rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shape, n_turning, failed, report, limits, effort
-    )  # fmt: skip
-
-
-@global_compiler_lock
-@cache
-def keeping_advance() -> Callable[..., None]:
-    """The entry point; its arguments are those of `advance`, and `work` has a history in its field `kept`."""
-    globals()["groups_on_keeping_lanes"] = kernel(KeepingKernels()(advance).py_func)
-    return _advance_and_keep
+KEPT = Form("kept", registers, instead={
+    cover_interval: cover_and_count, try_step: try_and_keep, minimise: minimise_and_keep,
+    correct_momentum: correct_and_keep,
+})  # fmt: skip
+"""Rows of `Simulator` whose steps leave what they began with and what they found in a field `kept` of `work`."""

@@ -8,18 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.der import potential
 from seastar_gym.der.body.body import place_roots
-from seastar_gym.der.linear.star_matrix import load_pair, store_pair
-from seastar_gym.der.potential import factorise
-from seastar_gym.der.stepping import steps
+from seastar_gym.der.linear.star_matrix import eliminate_node, load_pair, store_pair, store_root
+from seastar_gym.der.potential import factorise, solve_hub
+from seastar_gym.der.stepping.momentum import correct_momentum
+from seastar_gym.der.stepping.newton import minimise
 from seastar_gym.der.stepping.steps import Step, try_step
 from seastar_gym.gradients.history import LIMIT, OF_STAGE, OF_STEP, PHI, RETRYING, SETBACKS, SIZE, START
-from seastar_gym.simd import compilation, tape_lanes
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import N_LANES, any_lane, load, load_number, splat, store, store_number
-from seastar_gym.simd.modules import COMPILATION, LANES, KernelModules
-from seastar_gym.simd.tape_lanes import ROW, at_place, end_of_tape, leave_places
+from seastar_gym.simd.lanes import N_LANES, Form, any_lane, load, load_number, splat, store, store_number
+from seastar_gym.simd.tape_lanes import ROW, at_place, end_of_tape, leave_places, recorded
 
 
 class Replayed(NamedTuple):
@@ -125,16 +123,8 @@ def leave_right_hand_side_of_root(work, limb, D, H, r):
     store_pair(work.ring, 2 * limb, r)
 
 
-class TapeKernels(KernelModules):
-    """The kernels on a tape. Stages read what Newton's method has found, and put their solution on the tape."""
-
-    def __init__(self) -> None:
-        super().__init__({LANES: tape_lanes, COMPILATION: compilation})
-        of_steps = {"minimise": read_minimum, "correct_momentum": put_solution}
-        of_potential = {
-            "eliminate_node": leave_right_hand_side,
-            "store_root": leave_right_hand_side_of_root,
-            "solve_hub": leave_right_hand_sides_of_hub,
-        }
-        for module, instead in ((steps, of_steps), (potential, of_potential)):
-            vars(self._module_of(module.__name__)).update({name: self(own) for name, own in instead.items()})
+TAPED = Form("taped", recorded, instead={
+    minimise: read_minimum, correct_momentum: put_solution, eliminate_node: leave_right_hand_side,
+    store_root: leave_right_hand_side_of_root, solve_hub: leave_right_hand_sides_of_hub,
+})  # fmt: skip
+"""Rows on a tape. Stages read what Newton's method has found, and put their solution on the tape."""

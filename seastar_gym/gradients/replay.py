@@ -8,12 +8,9 @@ eliminated on the lanes of `Simulator`. The tape is read for one step after the 
 (q, v and a) takes derivatives from each to the one before.
 """
 
-from collections.abc import Callable
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.core.compiler_lock import global_compiler_lock
 from numpy.typing import NDArray
 
 from seastar_gym.der.body.body import move_roots
@@ -26,15 +23,13 @@ from seastar_gym.der.stepping.schemes import Scheme
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.gradients.history import FALLBACK, INTERVAL, OF_STEP, SIZE
-from seastar_gym.gradients.on_tape import TapeKernels, replay_steps
+from seastar_gym.gradients.on_tape import TAPED, replay_steps
 from seastar_gym.simd.compilation import entry_point, kernel
-from seastar_gym.simd.lanes import N_LANES, borrow, load, load_number, store
+from seastar_gym.simd.lanes import N_LANES, PLAIN, borrow, load, load_number, store
 from seastar_gym.simd.tape_lanes import ENTRY, FACTOR, PLACE, begin_tape, end_of_tape, tape_is_full
 
-replay_steps_on_tape: Any = None
-fill_moments_on_tape: Any = None
-move_roots_on_tape: Any = None
-"""Kernels on a tape, once somebody has asked for them."""
+on_lanes, on_tape = borrow.at(PLAIN), borrow.at(TAPED)
+"""Arrays as rows of `Simulator`, and as rows on a tape."""
 
 
 @kernel
@@ -195,13 +190,13 @@ def write_tape(scene, tableau, tape, rows, places, steps, times, shape):
     scene.work.replayed.stage[0] = 0.0
     scene.report[:] = 0.0
     begin_tape(tape.entries, behind)
-    same = replay_steps_on_tape(
-        borrow(scene.rods), borrow(scene.work), borrow(tableau), borrow(scene.actuation), borrow(rows.q),
-        borrow(rows.v), borrow(rows.a), borrow(scene.limits), borrow(scene.report),
+    same = replay_steps(
+        on_tape(scene.rods), on_tape(scene.work), on_tape(tableau), on_tape(scene.actuation), on_tape(rows.q),
+        on_tape(rows.v), on_tape(rows.a), on_tape(scene.limits), on_tape(scene.report),
     )  # fmt: skip
     for k in range(tableau.n_stages):
         take_slot(scene.work.replayed, k, -1)
-        factorise_stage(borrow(scene.own_rods), borrow(scene.own_work), borrow(tableau), k, borrow(scene.own_h))
+        factorise_stage(on_lanes(scene.own_rods), on_lanes(scene.own_work), on_lanes(tableau), k, on_lanes(scene.own_h))
         take_slot(scene.work.replayed, -1, k)
     return 1 if tape_is_full() != 0 else 0 if same else 2, end_of_tape()
 
@@ -227,7 +222,7 @@ def pull_through_stage(scene, tape, rows, places, lane, k, end):
     for row in range(n):
         own_work.step[row, lane] = tape.slopes[first + row]
         tape.slopes[first + row] = 0.0
-    solve_for_slopes(borrow(scene.own_rods), borrow(own_work))
+    solve_for_slopes(on_lanes(scene.own_rods), on_lanes(own_work))
     for row in range(n):
         of = k * n + row
         tape.slopes[places.residual[of, PLACE]] -= rows.residual[of, FACTOR + lane] * own_work.step[row, lane]
@@ -264,8 +259,8 @@ def pull_through_work(scene, tape, rows, places, step, shape, of, behind):
     at_end = place_rows(rows.start, places.start, at_start)
     behind = max(behind, place_rows(rows.end, places.end, at_end))
     begin_tape(tape.entries, behind)
-    fill_moments_on_tape(
-        borrow(scene.rods), borrow(scene.work), borrow(scene.turned), borrow(rows.q), borrow(rows.moments)
+    fill_moments(
+        on_tape(scene.rods), on_tape(scene.work), on_tape(scene.turned), on_tape(rows.q), on_tape(rows.moments)
     )
     if tape_is_full() != 0:
         return 1
@@ -292,7 +287,7 @@ def pull_through_roots(scene, tape, rows, places, step, of):
     put_rows(rows.v, 0, step, OF_STEP + rows.q.shape[0])
     behind = place_rows(rows.v, places.v, place_rows(rows.q, places.q, tape.first))
     begin_tape(tape.entries, behind)
-    move_roots_on_tape(borrow(scene.rods), borrow(rows.q), borrow(rows.v))
+    move_roots(on_tape(scene.rods), on_tape(rows.q), on_tape(rows.v))
     seed(tape, rows.q, places.q, 0, of.q)
     seed(tape, rows.v, places.v, 0, of.v)
     read_tape(tape, 0, behind, end_of_tape())
@@ -306,7 +301,7 @@ def begins(kept, n):
 
 
 @entry_point
-def _pull_back(scene, tape, rows, places, beside, places_beside, kept, times, shape, of):
+def pull_back(scene, tape, rows, places, beside, places_beside, kept, times, shape, of):
     """Take slopes at the end of a swim through some intervals to its beginning, in place.
 
     rows, beside: Rows of steps, and of where intervals begin, and the same as whole numbers.
@@ -339,14 +334,3 @@ def _pull_back(scene, tape, rows, places, beside, places_beside, kept, times, sh
         n = first
     pull_through_roots(scene, tape, rows, places, kept[0], of)
     return 0
-
-
-@global_compiler_lock
-@cache
-def pulling_back() -> Callable[..., int]:
-    """The entry point."""
-    kernels = TapeKernels()
-    globals()["replay_steps_on_tape"] = kernels(replay_steps)
-    globals()["fill_moments_on_tape"] = kernels(fill_moments)
-    globals()["move_roots_on_tape"] = kernels(move_roots)
-    return _pull_back

@@ -12,7 +12,7 @@ from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.report import MOMENTS, REPORT_ROWS, SMALLEST_HUB_T, WORK
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.terms.hub import Actuation
-from seastar_gym.gradients.kernels import advance_slopes
+from seastar_gym.gradients.implicit import advance_slopes
 from seastar_gym.gradients.memory import widened
 from seastar_gym.gradients.stencils import arrays_of
 from seastar_gym.gradients.unknowns import Rotations, Start, slopes_of_start, strengths_of, unknowns_of

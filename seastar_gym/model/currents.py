@@ -43,12 +43,9 @@ def _(current: GridCurrent) -> Current:
 
 
 def velocities_at(current: AnyCurrent, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Velocities of the fluid [m/s] at points [m], both of shape (..., 2), in a current of one robot.
-
-    The first call in a process loads the plain kernels, so it is no call for a thread.
-    """
+    """Velocities of the fluid [m/s] at points [m], both of shape (..., 2), in a current of one robot."""
     x, y = (Lanes(points[..., axis]) for axis in (0, 1))
     found = np.empty(points.shape)
-    for axis, velocity in enumerate(current_velocity.plain(current_rows(current), x, y)):
+    for axis, velocity in enumerate(current_velocity(current_rows(current), x, y)):
         found[..., axis] = velocity.numbers
     return found

@@ -6,7 +6,7 @@ in a called file would silently run the old code. Ours lives in a folder named a
 package that defines kernels, the versions of numba, llvmlite and numpy and the lane width: whatever changes, the old
 code cannot be found. Every file begins with a digest of the rest: what was cut off or written over is not there, and is
 compiled and written anew. What cannot be written is compiled in every process, and so is all where others than the user
-could have written it (ownership.py): numba keeps pickles. Processes that want the same code at once wait for the first
+could have written it: numba keeps pickles. Processes that want the same code at once wait for the first
 of them, which compiles it, and load it then.
 """
 
@@ -17,9 +17,11 @@ import logging
 import os
 import pickle
 import secrets
+import stat
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FunctionType
 
 import llvmlite
 import numba
@@ -30,10 +32,8 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 
 from seastar_gym.interrupts import held_back, let_through
-from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simd.ownership import ForeignFolderError, is_own, opened_by_owner, own_folder
-from seastar_gym.simd.pipeline import EntryCompiler, KernelCompiler
-from seastar_gym.simd.plain import plain_kernels
+from seastar_gym.simd.lanes import N_LANES, PLAIN, Form
+from seastar_gym.simd.pipeline import EntryCompiler, KernelCompiler, compiler_of
 
 PACKAGE = Path(__file__).resolve().parent.parent
 DIGEST_SIZE = hashlib.sha256().digest_size  # bytes
@@ -62,25 +62,14 @@ class Kernel(CPUDispatcher):
                     self.add_overload(self._compiler.compile(sig, None))
 
     def __call__(self, *args, **kwargs):
-        name = self.py_func.__name__
-        raise TypeError(
-            f"{name} is a kernel, which only compiled code can call: call it from an @entry_point, "
-            f"or {name}.plain in Python."
-        )
-
-    @property
-    def plain(self):
-        """The kernel in plain Python, on the lanes of numpy_lanes.py."""
-        return plain_kernels()(self)
+        return self.py_func(*args, **kwargs)
 
 
 def kernel(function, **options):
-    """Compile `function` as a building block; with NUMBA_DISABLE_JIT=1 it stays the Python function that it is."""
+    """Compile `function` as a building block. Called in Python it is that, on the lanes of numpy_lanes.py."""
     compiled = numba.njit(**BLOCK, **options)(function)
-    if isinstance(compiled, CPUDispatcher):
+    if isinstance(compiled, CPUDispatcher):  # nothing is with NUMBA_DISABLE_JIT=1
         compiled.__class__ = Kernel  # numba offers no other way to say how its dispatchers are called
-    else:
-        compiled.plain = compiled
     return compiled
 
 
@@ -108,6 +97,58 @@ def source_digest(package: Path = PACKAGE) -> str:
 
 
 digest_of_this_process = functools.cache(source_digest)
+
+
+# Only this user, or root, may have put code there that runs. A folder must belong to one of the two, and neither group
+# nor others may write in it; nor in a folder above it, through which it could be replaced, but for sticky ones such as
+# /tmp. Windows has no such bits, and is not asked.
+WRITABLE = stat.S_IWGRP | stat.S_IWOTH
+FOLDER, FILE = 0o755, 0o644
+"""Rights of what is made here, whatever the umask adds."""
+
+
+class ForeignFolderError(Exception):
+    """A folder whose files others may have written; says why, to end a sentence with."""
+
+
+def own_folder(folder: Path) -> Path:
+    """The folder without links, made if it is not there. ForeignFolderError, or OSError where it cannot be made."""
+    folder = folder.resolve()
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    require_own(folder)
+    for place in reversed(missing):
+        place.mkdir(FOLDER, exist_ok=True)
+    require_own(folder)  # another may have been faster in a sticky folder
+    return folder
+
+
+def require_own(folder: Path) -> None:
+    """ForeignFolderError unless only this user, or root, can write into a folder without links, as far as it exists."""
+    for place in filter(Path.exists, (folder, *folder.parents)):
+        found, is_above = place.stat(), place != folder
+        of_system = is_above and found.st_uid == Path(place.anchor).stat().st_uid  # in some containers root is nobody
+        if _is_foreign(found) and not of_system:
+            raise ForeignFolderError(f"{place} belongs to another user")
+        if _is_writable(found) and not (is_above and found.st_mode & stat.S_ISVTX):
+            raise ForeignFolderError(f"others than its owner may write in {place}")
+
+
+def is_own(found: os.stat_result) -> bool:
+    """Whether only this user, or root, can have written a file."""
+    return not (_is_foreign(found) or _is_writable(found))
+
+
+def _is_foreign(found: os.stat_result) -> bool:
+    return hasattr(os, "geteuid") and found.st_uid not in (0, os.geteuid())
+
+
+def _is_writable(found: os.stat_result) -> bool:
+    return hasattr(os, "geteuid") and bool(found.st_mode & WRITABLE)
+
+
+def opened_by_owner(file: str, flags: int) -> int:
+    """Opener of a new file into which no other user can write."""
+    return os.open(file, flags, FILE)
 
 
 class _DigestLocator(UserWideCacheLocator):
@@ -246,6 +287,10 @@ def _foreign(refused: ForeignFolderError) -> str:
 class EntryPoint(CPUDispatcher):
     """A function that Python calls, each kind of which one process compiles while others wait for it."""
 
+    def at(self, form: Form):
+        """The same function, which borrows arrays as rows of a form."""
+        return self if form == PLAIN else _at(self, form)
+
     def compile(self, sig):
         try:
             with held_back():
@@ -318,10 +363,30 @@ def _say_that_some_are_foreign(folder):
 
 
 def entry_point(function):
-    """Compile `function` for calls from Python, with the GIL released and the machine code kept on disk."""
+    """Compile `function` for calls from Python, with the GIL released and the machine code kept on disk.
+
+    Its `at(form)` is the same on rows of another form.
+    """
     if numba.config.DISABLE_JIT:
-        return np.errstate(all="ignore")(function)
-    compiled = numba.njit(**STRICT)(function)
+        quiet = np.errstate(all="ignore")(function)
+        quiet.at = lambda form: quiet
+        return quiet
+    return _entry_point(function, PLAIN)
+
+
+@global_compiler_lock
+@functools.cache
+def _at(entry, form):
+    function = entry.py_func
+    # Code is known by its function's name, in a process as on disk.
+    name = f"{function.__name__}_{form.name}_{form.width}_{form.stride}"
+    named = FunctionType(function.__code__, function.__globals__, name, function.__defaults__, function.__closure__)
+    named.__qualname__, named.__module__ = name, function.__module__
+    return _entry_point(named, form)
+
+
+def _entry_point(function, form):
+    compiled = numba.njit(**{**STRICT, "pipeline_class": compiler_of(form)})(function)
     compiled.__class__ = EntryPoint
     try:
         compiled._cache = _DigestCache(function)

@@ -1,10 +1,10 @@
 """The kernels once more, for processors with a thread for each robot: the same source, and the same bits.
 
-The modules of `der` are loaded again, on lanes whose values hold one number while a row of memory holds that of N_LANES
-robots: neighbouring threads read neighbouring numbers. Numba makes the code of LLVM of them, which knows no processor
-yet, and LLVM makes of that either code for NVIDIA's processors (cuda.py), or for the one that we run on (scalar.py),
-which is how it is tested where there is no other. No sum and product are contracted, quotients and roots are rounded to
-nearest, and sines or exponentials do not occur in kernels.
+A kernel computes for one robot at a time, where a row of memory holds the numbers of N_LANES robots: neighbouring
+threads read neighbouring numbers. Numba makes the code of LLVM of it, which knows no processor yet, and LLVM makes of
+that either code for NVIDIA's processors (cuda.py), or for the one that we run on (scalar.py), which is how it is tested
+where there is no other. No sum and product are contracted, quotients and roots are rounded to nearest, and sines or
+exponentials do not occur in kernels.
 
 Numbers of rows, offsets and switches are constants of the code, so a machine's code is that of one mesh.
 """
@@ -21,11 +21,13 @@ from numba.core import config, types
 from numba.core.registry import cpu_target
 
 from seastar_gym.simd import compilation
-from seastar_gym.simd.linking import linked
-from seastar_gym.simd.modules import COMPILATION, WIDTH, KernelModules, made_module
+from seastar_gym.simd.lanes import Form, Rows, absent, registers
+from seastar_gym.simd.pipeline import linked
 
 N_LANES = 32
 """Robots in a row of memory: as many as threads that run in step."""
+FORM = Form("device", registers, width=1, stride=N_LANES)
+"""What robots share as they work, such as the list of contacts, each has for itself."""
 I64, F64 = ir.IntType(64), ir.DoubleType()
 POINTER = ir.PointerType(F64)
 CONSTANT = {types.int64: I64, types.float64: F64, types.boolean: ir.IntType(8)}  # as numba passes them
@@ -34,25 +36,6 @@ DEFINITION = re.compile(r"^(define .*) \{$", re.MULTILINE)
 ROBOT, ALL_ROBOTS = "swim_robot", "swim_robots"
 GIVEN = ("times", "n_intervals", "shape")
 """Arguments of the code that every call has anew; the others are in memory, or constants."""
-
-
-class DeviceKernels(KernelModules):
-    """The kernels once more, for one robot at a time, with rows of N_LANES robots in memory.
-
-    What the robots of a lane group share as they work, such as the list of contacts, each has for itself here.
-    """
-
-    def __init__(self) -> None:
-        super().__init__({WIDTH: made_module(WIDTH, N_LANES=N_LANES, WIDTH=1), COMPILATION: compilation})
-
-    def type_of_rows(self, shared: bool) -> types.Type:
-        """Numba's type of rows, of which all robots share each number or have one of their own."""
-        return self._modules["seastar_gym.simd.lanes"].Rows(shared=shared)
-
-    @property
-    def absent(self) -> types.Type:
-        """Numba's type of a term that is not there."""
-        return self._modules["seastar_gym.simd.lanes"].absent
 
 
 class Operand(NamedTuple):
@@ -98,15 +81,15 @@ def leaves(bundle: Any, name: str) -> list[tuple[str, np.ndarray]]:
 class Program:
     """The code of a kernel that advances one robot, and the memory that it works in.
 
-    kernels: Where the kernel is from. kernel: One of these, which returns nothing. bundles: What it gets, by the name
+    kernel: One that returns nothing. bundles: What it gets, by the name
     of its argument: named tuples of arrays, of numbers and of None. Arrays of shape (rows,) are shared by all robots,
     those of shape (rows, any) are their own. memory: Names of bundles whose arrays are all their own.
     """
 
-    def __init__(self, kernels: DeviceKernels, kernel: Any, bundles: dict[str, Any], memory: tuple[str, ...]):
+    def __init__(self, kernel: Any, bundles: dict[str, Any], memory: tuple[str, ...]):
         if config.DISABLE_JIT:
             raise RuntimeError('With NUMBA_DISABLE_JIT=1 nothing is compiled, and devices have no code: use "cpu".')
-        self._kernels, self._kernel = kernels, kernel
+        self._kernel = kernel
         self.memory = Memory()
         self._operands: list[Operand] = []
         self._types = [self._describe(value, name, name in memory) for name, value in bundles.items()]
@@ -117,16 +100,16 @@ class Program:
             is_count = isinstance(value, int)
             shared = is_count or value.ndim == 1
             self._operands.append(Operand("given", name if shared else "own_shape", None))
-            return types.int64 if is_count else self._kernels.type_of_rows(shared)
+            return types.int64 if is_count else Rows(FORM, shared)
         if isinstance(value, np.ndarray):
             is_own = own or value.ndim > 1
             self._operands.append(self.memory.place(name, len(value), is_own))
-            return self._kernels.type_of_rows(not is_own)
+            return Rows(FORM, not is_own)
         if hasattr(value, "_fields"):
             fields = [self._describe(getattr(value, field), f"{name}.{field}", own) for field in value._fields]
             return types.containers.BaseTuple.from_types(fields, type(value))
         if value is None:
-            return self._kernels.absent
+            return absent
         kind = _type_of_number(value)
         self._operands.append(Operand("constant", kind.cast_python_value(value), kind))
         return kind

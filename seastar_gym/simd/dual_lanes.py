@@ -1,46 +1,35 @@
 """`Lanes` that carry a derivative: a value and its slope in one direction for every robot, forward differentiation.
 
-A kernel that is compiled on these lanes in place of those of lanes.py computes what it always does, to the same bits,
+A kernel that is compiled on these lanes in place of plain ones computes what it always does, to the same bits,
 and beside it the slopes of all that it computes. Every robot has a direction of its own. A row of memory that robots do
 not share holds the numbers of N_LANES robots, and their slopes behind them; shared numbers have none. What robots do
 is decided by values alone, so slopes are those of the branch that was taken. Where a slope does not exist it is zero,
 as that of a root of zero is: kernels take roots of squared speeds, by which they multiply.
 
-Beside the functions of lanes.py there are `slope_of` and `with_slope`.
+Beside the functions of lanes.py there are `slope_of` and `with_slope`. The form is `DUAL` of gradients/implicit.py.
 """
 
 from llvmlite import ir
-from numba.core import cgutils, types
+from numba.core import cgutils
 from numba.core.datamodel import models
-from numba.extending import intrinsic, register_model
 
-from seastar_gym.simd import lanes as plain
-from seastar_gym.simd.kind import Kind, function_of, negated
-from seastar_gym.simd.lanes import N_LANES as N_LANES
-from seastar_gym.simd.lanes import VECTOR, Rows, mask, registers
-from seastar_gym.simd.lanes import WIDTH as WIDTH
-from seastar_gym.simd.lanes import any_lane as any_lane
-from seastar_gym.simd.lanes import borrow as borrow
-from seastar_gym.simd.lanes import load_number as load_number
-from seastar_gym.simd.lanes import store_number as store_number
+from seastar_gym.simd.lanes import (
+    F64,
+    N_LANES,
+    PLAIN,
+    Lanes,
+    Numbers,
+    function_of,
+    negated,
+    of_lanes,
+    operation,
+    registers,
+)
 
 ROW = 2 * N_LANES
 """Numbers in a row of memory that robots do not share."""
-ZERO = ir.Constant(VECTOR, [0.0] * WIDTH)
-
-
-class Lanes(types.Type):
-    def __init__(self):
-        super().__init__(name=f"DualLanes({WIDTH} of {N_LANES})")
-
-
-lanes = Lanes()
-
-
-@register_model(Lanes)
-class _LanesModel(models.StructModel):
-    def __init__(self, dmm, fe_type):
-        super().__init__(dmm, fe_type, [("value", plain.lanes), ("slope", plain.lanes)])
+VECTOR = ir.VectorType(F64, N_LANES)
+ZERO = ir.Constant(VECTOR, [0.0] * N_LANES)
 
 
 def _sum(builder, a, b):
@@ -58,20 +47,23 @@ def _minus(builder, slope):
     return None if slope is None else negated(builder, slope)
 
 
-class Duals(Kind):
+class Duals(Numbers):
     """Numbers are (value, slope), vectors; a slope of None is zero."""
 
-    def opened(self, context, builder, value):
-        found = cgutils.create_struct_proxy(lanes)(context, builder, value=value)
+    def model(self, manager, kind):
+        return models.StructModel(manager, kind, [("value", Lanes(PLAIN)), ("slope", Lanes(PLAIN))])
+
+    def opened(self, context, builder, kind, value):
+        found = cgutils.create_struct_proxy(kind)(context, builder, value=value)
         return found.value, found.slope
 
-    def closed(self, context, builder, number):
-        made = cgutils.create_struct_proxy(lanes)(context, builder)
+    def closed(self, context, builder, kind, number):
+        made = cgutils.create_struct_proxy(kind)(context, builder)
         made.value, made.slope = (ZERO if part is None else part for part in number)
         return made._getvalue()
 
-    def plain(self, builder, value):
-        return registers.plain(builder, value), None
+    def plain(self, builder, value, width):
+        return registers.plain(builder, value, width), None
 
     def value(self, number):
         return number[0]
@@ -90,24 +82,24 @@ class Duals(Kind):
         rise = _sum(builder, a[1], _minus(builder, _times(builder, b[1], quotient)))
         return quotient, None if rise is None else builder.fdiv(rise, b[0])
 
-    def minus(self, builder, x):
+    def negate(self, builder, x):
         return tuple(_minus(builder, part) for part in x)
 
-    def root(self, builder, x):
+    def sqrt(self, builder, x):
         root = function_of("sqrt", builder, x[0])
         rise = builder.fdiv(x[1], builder.fadd(root, root))
         return root, builder.select(builder.fcmp_ordered("==", root, ZERO), ZERO, rise)
 
-    def magnitude(self, builder, x):
+    def absolute(self, builder, x):
         negative = builder.fcmp_ordered("<", x[0], ZERO)
         return function_of("fabs", builder, x[0]), builder.select(negative, _minus(builder, x[1]), x[1])
 
-    def whole(self, builder, x):
+    def floor(self, builder, x):
         return function_of("floor", builder, x[0]), None
 
     def product_sum(self, builder, c, a, b, negate):
         if negate:
-            a = self.minus(builder, a)
+            a = self.negate(builder, a)
         value = function_of("fma", builder, a[0], b[0], c[0])
         rise = _sum(builder, _times(builder, a[1], b[0]), _times(builder, b[1], a[0]))
         return value, _sum(builder, c[1], rise)
@@ -124,7 +116,7 @@ class Duals(Kind):
         behind = builder.gep(element, [ir.Constant(row.type, N_LANES)])
         return [builder.bitcast(pointer, VECTOR.as_pointer()) for pointer in (element, behind)]
 
-    def read(self, builder, rows, row):
+    def read(self, builder, rows, row, form):
         parts = []
         for pointer in self.pointers(builder, rows, row):
             part = builder.load(pointer)
@@ -132,28 +124,30 @@ class Duals(Kind):
             parts.append(part)
         return parts
 
-    def write(self, builder, rows, row, number):
+    def write(self, builder, rows, row, number, form):
         for pointer, part in zip(self.pointers(builder, rows, row), number, strict=True):
             builder.store(ZERO if part is None else part, pointer).align = 8
 
     def gathered(self, builder, rows, value):
         return registers.gathered(builder, rows, value), None
 
+    def slope_of(self, builder, x):
+        return x[1], None
 
-duals = Duals(lanes, mask, Rows)
-load, load_at, store = intrinsic(duals.load), intrinsic(duals.load_at), intrinsic(duals.store)
-splat, select = intrinsic(duals.splat), intrinsic(duals.select)
-sqrt, absolute, floor = intrinsic(duals.sqrt), intrinsic(duals.absolute), intrinsic(duals.floor)
-add_product, subtract_product = intrinsic(duals.add_product), intrinsic(duals.subtract_product)
+    def with_slope(self, builder, x, slope):
+        return x[0], slope[0]
 
 
-@intrinsic
+duals = Duals()
+
+
+@operation
 def slope_of(typing_context, x):
     """The slope of lanes, as lanes without one."""
-    return duals.function((x,), lambda builder, number: (number[1], None))
+    return of_lanes("slope_of", (x,), Duals)
 
 
-@intrinsic
+@operation
 def with_slope(typing_context, x, slope):
     """Lanes with the value of x and another slope: the value of `slope`."""
-    return duals.function((x, slope), lambda builder, number, other: (number[0], other[0]))
+    return of_lanes("with_slope", (x, slope), Duals)

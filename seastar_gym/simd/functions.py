@@ -7,7 +7,7 @@ by other processes, and is not found once anything in it has changed, wherever t
 import hashlib
 from collections.abc import Callable
 from functools import cache
-from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,8 @@ from numba.core.errors import NumbaError
 from numba.core.registry import CPUDispatcher
 from numba.extending import NativeValue, register_model, unbox
 
-from seastar_gym.simd import numpy_lanes
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import Rows, borrow, lanes
+from seastar_gym.simd.lanes import PLAIN, Lanes, Rows
 
 PACKAGE = "seastar_gym."
 KERNELS: dict[str, Callable] = {}
@@ -54,14 +53,14 @@ def _unboxed(kind, value, frame):
 
 
 class Handed:
-    """A kernel as a member of a bundle. Called in Python, it computes on the lanes of numpy_lanes.py."""
+    """A kernel as a member of a bundle."""
 
     def __init__(self, function: Callable, digest: str):
-        self._plain, self._numba_type_ = plain_function(function), HandedType(digest)
+        self._kernel, self._numba_type_ = function, HandedType(digest)
         KERNELS.setdefault(digest, function)
 
     def __call__(self, *arguments: Any) -> Any:
-        return self._plain(*arguments)
+        return self._kernel(*arguments)
 
 
 @cache
@@ -80,7 +79,7 @@ def require_compiled(name: str, function: Callable) -> None:
     if not isinstance(function, CPUDispatcher):
         return
     try:
-        function.compile((Rows(shared=True), types.intp, lanes, lanes))
+        function.compile((Rows(PLAIN, shared=True), types.intp, Lanes(PLAIN), Lanes(PLAIN)))
     except NumbaError as failure:
         lines = [line.strip() for line in str(failure).splitlines()]
         why = next(line for line in lines if line and not line.startswith("Failed in "))
@@ -138,28 +137,3 @@ def code_digest(function: Callable) -> str:
 
     add("", function)
     return digest.hexdigest()[:32]
-
-
-def plain_function(function: Callable) -> Callable:
-    """A function on lanes as plain Python, on the lanes of numpy_lanes.py, and so with all that it names."""
-    made: dict[Any, Any] = {}
-
-    def plain(value: Any) -> Any:
-        name = getattr(value, "__name__", None) or getattr(value, "_name", None)
-        if name in numpy_lanes.FUNCTIONS and type(value) is type(borrow):
-            return getattr(numpy_lanes, name)
-        value = _python(value)
-        if not isinstance(value, FunctionType) or isinstance(value, BuiltinFunctionType):
-            return value
-        if value not in made:
-            code = value.__code__
-            cells = value.__closure__
-            made[value] = FunctionType(code, {}, value.__name__, value.__defaults__, cells)
-            closure = tuple(type(cell)(plain(cell.cell_contents)) for cell in cells) if cells else None
-            named = {name: plain(each) for name, each in _named(value).items() if "." not in name}
-            builtins = {"__builtins__": value.__globals__.get("__builtins__")}
-            made[value] = FunctionType(code, named | builtins, value.__name__, value.__defaults__, closure)
-        return made[value]
-
-    quiet: Callable = np.errstate(all="ignore")(plain(function))  # as machine code is where it divides by zero
-    return quiet

@@ -1,13 +1,16 @@
 """The plain twin of lanes.py on numpy: kernels run on it as the Python that they are, slowly, step by step.
 
-With NUMBA_DISABLE_JIT=1 the whole package does; plain.py loads them beside the compiled ones. What kernels may ask of
-lanes is this and no more, and another processor would need no more either:
+A kernel that Python calls does, to be called one by one, stepped through or counted, and with NUMBA_DISABLE_JIT=1 the
+whole package:
+
+    potential, c_speed, c_over_speed = drag_slopes(Lanes(0.3), Lanes(wx), Lanes(wy))
+
+What kernels may ask of lanes is this and no more, and another processor would need no more either:
 
 Lanes           one float64 per robot, a value: + - * / with lanes and plain numbers, -x, and += -= *= /=, which make a
                 new value; < <= > >= == give a mask, in which NaN is false
 Mask            one truth per robot: & | ~ with masks; neither `if` nor `and` can ask it
 N_LANES         number of robots in a row (here values have any shape: that of the rows they come from, or none)
-WIDTH           number of robots in a value: all of a row, or one where each has a thread, see device.py
 borrow          an array of rows, or a named tuple of such, of numbers and of None, as kernels read it
 load            load(rows, row) -> Lanes: shape (rows, N_LANES), or (rows,) for numbers that all robots share
 store           store(rows, row, lanes or number), in rows that are not shared

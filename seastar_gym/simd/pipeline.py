@@ -1,15 +1,22 @@
-"""Numba's compiler as kernels need it: absent terms are constants, and what is found out for one kernel holds for all.
+"""Numba's compiler as kernels need it.
 
-Numba would search its templates at every operator, look for what kernels do not have, and optimise every kernel by
-itself, although only compiled code calls it (linking.py). None of that changes a bit.
+Absent terms are constants, what depends on the form of rows is put in place, and what is found out for one kernel holds
+for all.
+
+Numba would search its templates at every operator, look for what kernels do not have, and link, optimise and emit every
+kernel by itself, with all that it calls, although only compiled code calls it: here that is done once, for what Python
+calls. None of that changes a bit.
 """
 
 import functools
 import gc
 import operator
+from types import SimpleNamespace
 
 from numba.core import ir, types
+from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import (
     FunctionPass,
     LoweringPass,
@@ -19,6 +26,7 @@ from numba.core.compiler_machinery import (
 )
 from numba.core.interpreter import Interpreter, peep_hole_delete_with_exit, peep_hole_fuse_dict_add_updates
 from numba.core.ir_utils import get_definition, guard
+from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import (
     InlineOverloads,
     NativeLowering,
@@ -41,7 +49,7 @@ from numba.core.untyped_passes import (
     WithLifting,
 )
 
-from seastar_gym.simd.linking import Part, Whole
+from seastar_gym.simd.lanes import PLAIN, Bundle, Operation
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)
@@ -89,6 +97,53 @@ def _type_of(function, arguments, value):
         if isinstance(bundle, types.BaseNamedTuple) and value.attr in bundle.fields:
             return bundle.types[bundle.fields.index(value.attr)]
     return None
+
+
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _OfForm(FunctionPass):
+    """Puts in place what depends on the form of rows: `borrow`, `splat`, and the kernels that replace others there.
+
+    The form of a kernel is that of its arguments; that of an entry point is what its compiler was told.
+    """
+
+    _name = "of_form"
+
+    def __init__(self):
+        FunctionPass.__init__(self)
+
+    def run_pass(self, state):
+        form = state.form or next(filter(None, map(form_of, state.args)), None)
+        if form is None:
+            return False
+        function, changed = state.func_ir, False
+        for block in function.blocks.values():
+            for statement in block.find_insts(ir.Assign):
+                named = statement.value
+                if not isinstance(named, ir.Global | ir.FreeVar):
+                    continue
+                there = _there(form, named.value, state.func_id.func)
+                if there is not named.value:
+                    statement.value = ir.Global(named.name, there, named.loc)
+                    function._definitions[statement.target.name] = [statement.value]
+                    changed = True
+        if changed:
+            state.typingctx.refresh()
+        return changed
+
+
+def _there(form, value, caller):
+    """What a global of a kernel is on rows of a form; a kernel that replaces another one can call that."""
+    if isinstance(value, CPUDispatcher):
+        other = form.instead.get(value)
+        return value if other is None or other.py_func is caller else other
+    return value.at(form) if isinstance(value, Operation) and hasattr(value, "at") else value
+
+
+def form_of(kind):
+    """Form of lanes, a mask, rows or a borrowed bundle, or of the first in a tuple; None for anything else."""
+    if isinstance(kind, types.BaseTuple) and not isinstance(kind, Bundle):
+        return next(filter(None, map(form_of, kind)), None)
+    return getattr(kind, "form", None)
 
 
 class _Interpreter(Interpreter):
@@ -158,6 +213,89 @@ class _Typed(NopythonTypeInference):
             state.typingctx = context
 
 
+MANGLED = "seastar_gym"
+"""Part of the name of every kernel."""
+
+
+class Part(JITCodeLibrary):
+    """Code that compiled code alone calls: its own, one module, without that of the kernels which it calls."""
+
+    def add_ir_module(self, ir_module):
+        for function in ir_module.functions:
+            if function.blocks:
+                function.linkage = "linkonce_odr"  # whoever links it may inline it and leave it out
+        super().add_ir_module(ir_module)
+
+    def add_llvm_module(self, ll_module):
+        """Keep the module, simplified: LLVM would inline less of what is not, and fast strokes take 5 to 7 % longer."""
+        ll_module.data_layout = self._codegen._data_layout
+        passes, builder = self._codegen._function_pass_manager()
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
+        self._final_module = ll_module
+
+    def _get_module_for_linking(self):
+        return self._final_module
+
+    def finalize(self):
+        self._raise_if_finalized()
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name):
+        return 0
+
+    @property
+    def codegen(self):
+        """There is no machine code that an environment of Python's could be given to."""
+        return SimpleNamespace(set_env=lambda name, environment: None)
+
+
+class Whole(JITCodeLibrary):
+    """Code that Python calls, with that of all kernels below it, each linked in once."""
+
+    def finalize(self):
+        self._linking_libraries = _reached(self)
+        super().finalize()
+
+    def _optimize_final_module(self):
+        """Optimise once: numba's first pass gathers reference counts, of which kernels have none."""
+        missing = [each.name for each in self._final_module.functions if each.is_declaration and MANGLED in each.name]
+        assert not missing, missing
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
+
+
+def _reached(library):
+    """The libraries that one calls, and those that these call, each once and after all that call it.
+
+    LLVM's linker leaves out what nothing calls yet.
+    """
+    found, seen = [], set()
+
+    def visit(caller):
+        for called in reversed(caller._linking_libraries):
+            if called not in seen:
+                seen.add(called)
+                if isinstance(called, Part):
+                    visit(called)
+                found.append(called)
+
+    visit(library)
+    return found[::-1]
+
+
+def linked(kernel, signature):
+    """A compiled kernel's description, and its LLVM code with that of all that it calls."""
+    compiled = kernel.overloads[signature]
+    with global_compiler_lock:
+        module = compiled.library._get_module_for_linking().clone()
+        for called in _reached(compiled.library):
+            module.link_in(called._get_module_for_linking(), preserve=True)
+    return compiled.fndesc, module
+
+
 class _Lowered(LoweringPass):
     """Has a function lowered into a library of the given kind."""
 
@@ -198,7 +336,12 @@ NEEDLESS = frozenset({
 
 
 class EntryCompiler(CompilerBase):
-    """Compiler of functions that Python calls. Absent terms are constants before numba looks for dead branches."""
+    """Compiler of functions that Python calls. Absent terms are constants before numba looks for dead branches.
+
+    form: Of the rows that arrays are borrowed as.
+    """
+
+    form = PLAIN
 
     def compile_extra(self, func):
         """Compile with all kernels below. Python's search for garbage would take an eighth of the time."""
@@ -211,13 +354,21 @@ class EntryCompiler(CompilerBase):
                 gc.enable()
 
     def define_pipelines(self):
+        self.state.form = self.form
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.add_pass_after(_AbsentTerms, RewriteSemanticConstants)
+        passes.add_pass_after(_OfForm, RewriteSemanticConstants)
         passes.passes = [each for each in passes.passes if each[0] not in NEEDLESS]
         lowering = [kind for kind, _ in passes.passes].index(NativeLowering)
         passes.add_pass_after(_AsWhole, passes.passes[lowering - 1][0])
         passes.finalize()
         return [passes]
+
+
+@functools.cache
+def compiler_of(form):
+    """The compiler of functions that borrow arrays as rows of a form."""
+    return type(EntryCompiler.__name__, (EntryCompiler,), {"form": form})
 
 
 class _PlainPasses(PassManager):
@@ -231,8 +382,8 @@ class _PlainPasses(PassManager):
 
 
 OF_KERNELS = (
-    _Read, FixupArgs, RewriteSemanticConstants, _AbsentTerms, DeadBranchPrune, GenericRewrites, _Typed, _AsPart,
-    NativeLowering, NoPythonBackend,
+    _Read, FixupArgs, RewriteSemanticConstants, _OfForm, _AbsentTerms, DeadBranchPrune, GenericRewrites, _Typed,
+    _AsPart, NativeLowering, NoPythonBackend,
 )  # fmt: skip
 """Numba's passes that kernels need: their variables have one type each, and what calls them owns the arrays."""
 
@@ -241,6 +392,7 @@ class KernelCompiler(CompilerBase):
     """Compiler of kernels, which only compiled code calls."""
 
     def define_pipelines(self):
+        self.state.form = None
         passes = _PlainPasses("kernel")
         passes.passes = [(kind, "") for kind in OF_KERNELS]
         passes.finalize()

@@ -1,6 +1,6 @@
 """`Lanes` that write down how they were computed: reverse differentiation.
 
-A kernel that is compiled on these lanes in place of those of lanes.py computes what it always does, to the same bits.
+A kernel that is compiled on these lanes in place of plain ones computes what it always does, to the same bits.
 Beside it, operations leave entries on a tape: which numbers went in, and the partial derivatives of every robot. Read
 from its end, the tape gives the derivatives of one number of a robot in all that it was computed from.
 
@@ -12,47 +12,38 @@ constant. An entry has two parents: both places as int32 in one number, then the
 for dual lanes, what robots do is decided by values alone, and where a slope does not exist it is zero.
 
 There is one tape in a process at a time. Beside the functions of lanes.py there are `begin_tape`, `end_of_tape`,
-`leave_places`, `tape_is_full` and `at_place`.
+`leave_places`, `tape_is_full` and `at_place`. The form is `TAPED` of gradients/on_tape.py.
 """
 
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.datamodel import models
-from numba.extending import intrinsic, register_model
 
-from seastar_gym.simd import lanes as plain
-from seastar_gym.simd.kind import F64, I1, I32, I64, Kind, function_of, negated
-from seastar_gym.simd.lanes import N_LANES as N_LANES
-from seastar_gym.simd.lanes import VECTOR, Rows, mask, registers
-from seastar_gym.simd.lanes import WIDTH as WIDTH
-from seastar_gym.simd.lanes import any_lane as any_lane
-from seastar_gym.simd.lanes import borrow as borrow
-from seastar_gym.simd.lanes import load_number as load_number
-from seastar_gym.simd.lanes import store_number as store_number
+from seastar_gym.simd.lanes import (
+    F64,
+    I1,
+    I32,
+    I64,
+    N_LANES,
+    PLAIN,
+    Lanes,
+    Numbers,
+    function_of,
+    negated,
+    operation,
+    registers,
+)
 
 FACTOR, PLACE, ROW = N_LANES, 2 * N_LANES, 2 * N_LANES + 1
 """Where factors and place stand in a row of memory that robots do not share, behind the values, and its numbers."""
 ENTRY = 1 + 2 * N_LANES
 """Numbers in an entry of the tape: places, then partial derivatives in the first parent and in the second."""
+VECTOR = ir.VectorType(F64, N_LANES)
 NOWHERE = ir.Constant(I64, 0)
-ZERO, ONE, MINUS_ONE = (ir.Constant(VECTOR, [number] * WIDTH) for number in (0.0, 1.0, -1.0))
+ZERO, ONE, MINUS_ONE = (ir.Constant(VECTOR, [number] * N_LANES) for number in (0.0, 1.0, -1.0))
 TAPE, RECORD, JOIN_THREE, CHOOSE = "seastar_tape", "seastar_record", "seastar_join_three", "seastar_choose"
 COUNT, LIMIT, BEGIN, FULL = range(4)
 """State of the tape: place of the next entry; where it ends; its memory; not 0 once an entry did not fit."""
-
-
-class Lanes(types.Type):
-    def __init__(self):
-        super().__init__(name=f"TapeLanes({WIDTH} of {N_LANES})")
-
-
-lanes = Lanes()
-
-
-@register_model(Lanes)
-class _LanesModel(models.StructModel):
-    def __init__(self, dmm, fe_type):
-        super().__init__(dmm, fe_type, [("value", plain.lanes), ("place", types.int64), ("factor", plain.lanes)])
 
 
 # The tape, and what writes on it; one of each once the parts of an entry point are linked
@@ -117,13 +108,13 @@ def _make_join_three(module, name):
 
 def _make_choose(module, name):
     """choose(robots, place, factor, place, factor) -> (place, factor): the first two for these robots."""
-    robots = ir.IntType(WIDTH)
+    robots = ir.IntType(N_LANES)
     function, build = _function(module, name, JOINED, robots, *(I64, VECTOR) * 2)
     which, *parents = function.args
     for all_or_none, parent in ((-1, parents[:2]), (0, parents[2:])):
         with build.if_then(build.icmp_unsigned("==", which, ir.Constant(robots, all_or_none))):
             build.ret(_as_joined(build, *parent))
-    robot = build.bitcast(which, ir.VectorType(I1, WIDTH))
+    robot = build.bitcast(which, ir.VectorType(I1, N_LANES))
     first = parents[0], build.select(robot, parents[1], ZERO)
     build.ret(_as_joined(build, *_joined(build, [first, (parents[2], build.select(robot, ZERO, parents[3]))])))
     return function
@@ -184,20 +175,24 @@ def _grown(builder, value, *parents):
     return (value, *_joined(builder, slopes)) if slopes else (value, None, None)
 
 
-class Recorded(Kind):
+class Recorded(Numbers):
     """Numbers are (value, place, factor): a vector, one place and a vector; a place of None is constant."""
 
-    def opened(self, context, builder, value):
-        found = cgutils.create_struct_proxy(lanes)(context, builder, value=value)
+    def model(self, manager, kind):
+        parts = [("value", Lanes(PLAIN)), ("place", types.int64), ("factor", Lanes(PLAIN))]
+        return models.StructModel(manager, kind, parts)
+
+    def opened(self, context, builder, kind, value):
+        found = cgutils.create_struct_proxy(kind)(context, builder, value=value)
         return found.value, found.place, found.factor
 
-    def closed(self, context, builder, number):
-        made = cgutils.create_struct_proxy(lanes)(context, builder)
+    def closed(self, context, builder, kind, number):
+        made = cgutils.create_struct_proxy(kind)(context, builder)
         made.value, made.place, made.factor = known(number)
         return made._getvalue()
 
-    def plain(self, builder, value):
-        return registers.plain(builder, value), None, None
+    def plain(self, builder, value, width):
+        return registers.plain(builder, value, width), None, None
 
     def value(self, number):
         return number[0]
@@ -215,21 +210,21 @@ class Recorded(Kind):
         quotient, inverse = builder.fdiv(a[0], b[0]), builder.fdiv(ONE, b[0])
         return _grown(builder, quotient, (a, inverse), (b, builder.fmul(negated(builder, quotient), inverse)))
 
-    def minus(self, builder, x):
+    def negate(self, builder, x):
         return _grown(builder, negated(builder, x[0]), (x, MINUS_ONE))
 
-    def root(self, builder, x):
+    def sqrt(self, builder, x):
         root = function_of("sqrt", builder, x[0])
         partial = builder.fdiv(ONE, builder.fadd(root, root))
         partial = builder.select(builder.fcmp_ordered("==", root, ZERO), ZERO, partial)
         return _grown(builder, root, (x, partial))
 
-    def magnitude(self, builder, x):
+    def absolute(self, builder, x):
         negative = builder.fcmp_ordered("<", x[0], ZERO)
         partial = builder.select(negative, MINUS_ONE, ONE)
         return _grown(builder, function_of("fabs", builder, x[0]), (x, partial))
 
-    def whole(self, builder, x):
+    def floor(self, builder, x):
         return function_of("floor", builder, x[0]), None, None
 
     def product_sum(self, builder, c, a, b, negate):
@@ -241,7 +236,7 @@ class Recorded(Kind):
         if when_true[1] is None and when_false[1] is None:
             return value, None, None
         (_, a, of_a), (_, b, of_b) = known(when_true), known(when_false)
-        same, which = (a, builder.select(condition, of_a, of_b)), builder.bitcast(condition, ir.IntType(WIDTH))
+        same, which = (a, builder.select(condition, of_a, of_b)), builder.bitcast(condition, ir.IntType(N_LANES))
         apart = builder.icmp_unsigned("!=", a, b)
         return value, *_unless(builder, apart, same, CHOOSE, _make_choose, [which, a, of_a, b, of_b])
 
@@ -253,13 +248,13 @@ class Recorded(Kind):
             builder.bitcast(builder.gep(first, [ir.Constant(row.type, at)]), kind.as_pointer()) for at, kind in parts
         ]
 
-    def read(self, builder, rows, row):
+    def read(self, builder, rows, row, form):
         parts = [builder.load(pointer) for pointer in self.pointers(builder, rows, row)]
         for part in parts:
             part.align = 8
         return tuple(parts)
 
-    def write(self, builder, rows, row, number):
+    def write(self, builder, rows, row, number, form):
         for part, pointer in zip(known(number), self.pointers(builder, rows, row), strict=True):
             builder.store(part, pointer).align = 8
 
@@ -273,30 +268,26 @@ def known(number):
     return (value, NOWHERE, ZERO) if place is None else (value, place, factor)
 
 
-recorded = Recorded(lanes, mask, Rows)
-load, load_at, store = intrinsic(recorded.load), intrinsic(recorded.load_at), intrinsic(recorded.store)
-splat, select = intrinsic(recorded.splat), intrinsic(recorded.select)
-sqrt, absolute, floor = intrinsic(recorded.sqrt), intrinsic(recorded.absolute), intrinsic(recorded.floor)
-add_product, subtract_product = intrinsic(recorded.add_product), intrinsic(recorded.subtract_product)
+recorded = Recorded()
 
 
-@intrinsic
+@operation
 def at_place(typing_context, x, place):
     """The value of x, as what stands at a place."""
-    if not (x == lanes and isinstance(place, types.Integer)):
+    if not (isinstance(x, Lanes) and x.form.numbers is recorded and isinstance(place, types.Integer)):
         return None
 
     def codegen(context, builder, sig, args):
-        return recorded.closed(context, builder, (recorded.opened(context, builder, args[0])[0], args[1], ONE))
+        return recorded.closed(context, builder, x, (recorded.opened(context, builder, x, args[0])[0], args[1], ONE))
 
-    return lanes(lanes, types.int64), codegen
+    return x(x, types.int64), codegen
 
 
 def _memory_of(context, builder, array_type, array):
     return builder.ptrtoint(context.make_array(array_type)(context, builder, array).data, I64)
 
 
-@intrinsic
+@operation
 def begin_tape(typing_context, entries, first):
     """Begin a tape in `entries`, ENTRY numbers each, behind what stands at places below `first`."""
     if not (isinstance(entries, types.Array) and isinstance(first, types.Integer)):
@@ -321,13 +312,13 @@ def _number_of_state(which):
     return types.intp(), codegen
 
 
-@intrinsic
+@operation
 def end_of_tape(typing_context):
     """The place behind the last entry."""
     return _number_of_state(COUNT)
 
 
-@intrinsic
+@operation
 def leave_places(typing_context, number):
     """Leave out so many places, for what has no parents."""
     if not isinstance(number, types.Integer):
@@ -344,7 +335,7 @@ def leave_places(typing_context, number):
     return types.void(types.intp), codegen
 
 
-@intrinsic
+@operation
 def tape_is_full(typing_context):
     """Not zero once an entry did not fit."""
     return _number_of_state(FULL)

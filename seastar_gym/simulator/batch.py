@@ -17,7 +17,7 @@ from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.model.schemes import scheme_for
 from seastar_gym.scene import Scene
 from seastar_gym.simd.dispatch import KnownCode
-from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.lanes import N_LANES, NARROW, PLAIN
 from seastar_gym.simd.rows import aligned_rows, from_rows, to_rows, write_rows
 from seastar_gym.simulator.report import SolverStatus
 from seastar_gym.simulator.workers import Workers
@@ -29,6 +29,10 @@ PARTS_PER_THREAD = 8
 its share to the others."""
 LARGEST_PART = 64
 """Lane groups in a part at most. An interrupt waits for the parts under way."""
+FEW = 0
+"""Robots at most in a batch that is advanced on NARROW lanes, to the same bits; N_LANES // 2 would fit. It is off. Few
+robots would be 1.4 times as fast, but who has small and large batches would wait for the compiler twice, some 10 s for
+each kind of scene, until machine code comes with the package."""
 ROWS = ("q", "v", "status")
 """Arrays of shape (n_groups, k, N_LANES) that an interval changes and the next one does not make anew."""
 MOVED = (*ROWS, "last_hub")
@@ -58,7 +62,7 @@ class Batch:
     def __init__(self, scene: Scene, n_robots: int, threads: int, effort: bool):
         self._scene, self.n_robots = scene, n_robots
         self._known_parts: dict[bool, list[slice]] = {}  # by whether coefficients are shared
-        self._code = KnownCode()
+        self._code, self._advance = KnownCode(), advance.at(NARROW if n_robots <= FEW else PLAIN)
         n_groups, n_limbs, n_rows = -(-n_robots // N_LANES), scene.robot.n_limbs, 2 * scene.robot.n_nodes
         self._scheme = scheme_for(scene)
         self.coefficients = Coefficients(scene, n_robots)
@@ -242,8 +246,8 @@ class Batch:
             work, actuation = self.memory[thread]
             shape, n_turning = self._shape_of(part, begin, end)
             self._call(
-                advance, self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"], actuation,
-                self.q[part], self.v[part], self.a[part], self.peaks[part], times, shape, n_turning,
+                self._advance, self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"],
+                actuation, self.q[part], self.v[part], self.a[part], self.peaks[part], times, shape, n_turning,
                 self.status[part], self.report[part], self.coefficients.limits(part.start), self.effort[part],
                 kind=shape.ndim,
             )  # fmt: skip

@@ -1,12 +1,10 @@
 """`DeviceBatch`: a batch of robots in the memory of a device with a thread for each of them, such as a GPU."""
 
-from functools import cache
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numba.core import config
-from numba.core.compiler_lock import global_compiler_lock
 from numpy.typing import NDArray
 
 from seastar_gym.der.rods import make_work
@@ -14,7 +12,7 @@ from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stroke import cover_intervals
 from seastar_gym.scene import Scene
 from seastar_gym.simd import cuda, device, scalar
-from seastar_gym.simd.device import DeviceKernels, Memory, Program, leaves
+from seastar_gym.simd.device import Memory, Program, leaves
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator.batch import MOVED, Batch
 
@@ -26,12 +24,6 @@ OF_INTERVAL = {"status": "failed", "report": "report", "effort": "effort"}
 """Arrays of a batch that an interval changes and the host reads, and their names in the kernel."""
 SHARE = device.N_LANES // N_LANES
 """Lane groups of the processor in one of a device."""
-
-
-@global_compiler_lock
-@cache
-def _kernels() -> DeviceKernels:
-    return DeviceKernels()
 
 
 def program_of(scene: Scene) -> Program:
@@ -120,7 +112,7 @@ class DeviceBatch(Batch):
         """The code of `filled`."""
         of_one = {name: rows[0] if getattr(rows, "ndim", 0) > 1 else rows for name, rows in numbers.items()}
         rows = {"q": self._on_host["q"][0], "v": self._on_host["v"][0], "rows": np.zeros((n_rows, N_LANES))}
-        return Program(_kernels(), _kernels()(kernel), rows | of_one, ())
+        return Program(kernel, rows | of_one, ())
 
     def save(self) -> dict[str, Any]:
         rows = {name: self._rows(name).copy() for name in self._on_device}
@@ -152,7 +144,7 @@ class DeviceBatch(Batch):
     def program(self, n_turning: int) -> Program:
         """The code for robots of which 0, 1 or all limbs have a shape of their own."""
         rods, (_, actuation) = self.coefficients.rods(0), self.memory[0]
-        work = _kernels()(make_work)(rods, self._scheme.n_stages)
+        work = make_work(rods, self._scheme.n_stages, width=device.FORM.width)
         shape = np.zeros((1, 1) if n_turning else 1)
         bundles = {
             "rods": rods, "work": work, "scheme": self._scheme, "fallback": SCHEMES["implicit-euler"],
@@ -161,7 +153,7 @@ class DeviceBatch(Batch):
             "failed": self.status[0], "report": self.report[0], "limits": self.coefficients.limits(0),
             "effort": self.effort[0], "asked": self.effort.size > 0,
         }  # fmt: skip
-        return Program(_kernels(), _kernels()(cover_intervals), bundles, ("work", "actuation"))
+        return Program(cover_intervals, bundles, ("work", "actuation"))
 
     def _put_all(self) -> None:
         """Bring to the device what it has not, or what has changed on the host."""

@@ -37,7 +37,7 @@ def actuation(begin: np.ndarray, end: np.ndarray) -> Actuation:
 
 def memory(turns: np.ndarray):
     work = make_work(RODS, 1)
-    set_natural_hub_angles.plain(RODS, work, actuation(0.0 * turns, turns), Lanes(1.0))
+    set_natural_hub_angles(RODS, work, actuation(0.0 * turns, turns), Lanes(1.0))
     return work
 
 
@@ -46,17 +46,17 @@ def memory(turns: np.ndarray):
 
 def test_the_hyperbolic_tangent_is_numpys():
     x = np.concatenate([np.linspace(-25.0, 25.0, 2001), [0.0, 1e-9, -1e-9]])
-    np.testing.assert_allclose(plain(hyperbolic_tangent.plain(Lanes(x))), np.tanh(x), rtol=2e-15, atol=0.0)
+    np.testing.assert_allclose(plain(hyperbolic_tangent(Lanes(x))), np.tanh(x), rtol=2e-15, atol=0.0)
 
 
 def test_stiffening_goes_from_one_to_its_ratio_by_the_logistic_function():
     """It is 1 at rest, and at every rotation without a ratio, to the last bit."""
     turns = np.linspace(-PEAK, PEAK, 9)
-    found = plain(stiffening.plain(RODS.along, Lanes(turns)))
+    found = plain(stiffening(RODS.along, Lanes(turns)))
     np.testing.assert_allclose(found, [STAR.at([delta, 0.0, 0.0]).factors[0] for delta in turns], rtol=1e-13)
     assert found[4] == 1.0 and found[0] == pytest.approx(RATIO, rel=1e-14)
     rods = make_rods(Scene(Seastar(3, 5, stiffening=Stiffening(1.0)), actuator=SmaPulse(PEAK)))
-    np.testing.assert_array_equal(plain(stiffening.plain(rods.along, Lanes(turns))), 1.0)
+    np.testing.assert_array_equal(plain(stiffening(rods.along, Lanes(turns))), 1.0)
 
 
 # Profiles
@@ -76,7 +76,7 @@ def test_hinges_turn_by_the_hat_functions_of_the_profile(profile, nodes):
 
 def test_what_moving_natural_curvature_stores_is_the_energy_of_the_hinges_left_behind():
     work = memory(0.0 * END)
-    moved = plain(add_moved_energy.plain(RODS, work, actuation(BEGIN, END), Lanes(0.0), Lanes(1.0), 0.0))
+    moved = plain(add_moved_energy(RODS, work, actuation(BEGIN, END), Lanes(0.0), Lanes(1.0), 0.0))
     begin, end = STAR.at(BEGIN), STAR.at(END)
     expected = sum(
         0.5 * max(f) / f[1] * EI * dl * (oracle.curvature(b, dl) - oracle.curvature(a, dl)) ** 2

@@ -174,10 +174,10 @@ def phi_of(oracle: Rigid, stage: SimpleNamespace, delta_psi=None):
 def run(rods, oracle, stage, convex=None):
     """(Phi, decrement, pivot, Newton direction in the unknowns) by the kernels."""
     work, kernel_stage = begun_on_body(rods, oracle.directions, stage, getattr(oracle, "ahead", False))
-    phi, decrement, pivot = factorise.plain(rods, work, kernel_stage, convex)
-    assert rods.contact is None or n_listed.plain(work) > 0
-    decrement = solve_coupled.plain(rods, work, EVERYONE, decrement)
-    move_along.plain(rods, work, EVERYONE, None, Lanes(1.0))
+    phi, decrement, pivot = factorise(rods, work, kernel_stage, convex)
+    assert rods.contact is None or n_listed(work) > 0
+    decrement = solve_coupled(rods, work, EVERYONE, decrement)
+    move_along(rods, work, EVERYONE, None, Lanes(1.0))
     return *(plain(x)[0] for x in (phi, decrement, pivot)), -unknowns(rods, work.step)
 
 
@@ -211,11 +211,11 @@ def stepped(scene: Scene, rods: Rods, start: SimpleNamespace, h: float) -> np.nd
     """Unknowns after a step of the scene's scheme, by the kernels."""
     tableau, limits = SCHEMES[scene.numerics.scheme], make_limits(scene)
     q, v, still = unknown_rows(rods, start.u), unknown_rows(rods, start.v_hat), np.zeros((N_LIMBS, N_LANES))
-    move_roots.plain(rods, q, v)
-    memory = np.zeros((memory_row.plain(rods, tableau, OF_BODY + tableau.n_stages), N_LANES))
+    move_roots(rods, q, v)
+    memory = np.zeros((memory_row(rods, tableau, OF_BODY + tableau.n_stages), N_LANES))
     step = Step(Lanes(0.0), Lanes(1.0), Lanes(h), Lanes(60.0), ~EVERYONE)
     args = rods, make_work(rods, tableau.n_stages), tableau, Actuation(still, still), q, v, memory, step
-    _, accepted, _ = try_step.plain(*args, EVERYONE, limits, np.zeros((len(REPORT_ROWS), N_LANES)))
+    _, accepted, _ = try_step(*args, EVERYONE, limits, np.zeros((len(REPORT_ROWS), N_LANES)))
     assert plain(accepted).all()
     return unknowns(rods, q)
 
@@ -247,12 +247,12 @@ def forces(body: Body, began: np.ndarray, guessed: np.ndarray, angle: float = 0.
     q_0, still = np.zeros_like(work.q), np.zeros_like(work.q)
     for rows, nodes in ((q_0, began), (work.q, guessed)):
         rows[:n], rows[n] = nodes.reshape(N_LANES, n).T, angle * rods.body.scale[0]
-        place_roots.plain(rods, rows)
+        place_roots(rods, rows)
     stage = Stage(q_0, still, Lanes(1.0), Lanes(1.0), False)
-    freeze_contact.plain(rods, work, stage, q_0)
+    freeze_contact(rods, work, stage, q_0)
     work.q[:n] *= 0.8
-    begin_body.plain(rods, work)
-    add_contact.plain(rods, work, stage, None, Lanes(0.0))
+    begin_body(rods, work)
+    add_contact(rods, work, stage, None, Lanes(0.0))
     return work.contact.force[:n].T.reshape(began.shape)
 
 
@@ -324,7 +324,7 @@ def test_steps_whose_ends_are_in_the_body_are_seen_in_their_own_robot(name):
         work = make_work(rods, 1)
         work.q[:], q_0 = unknown_rows(rods, end), unknown_rows(rods, start)
         for rows in (work.q, q_0):
-            place_roots.plain(rods, rows)
+            place_roots(rods, rows)
         stage = Stage(q_0, q_0, Lanes(1.0), Lanes(1.0), False)
-        found = plain(without_new_crossings.plain(rods, work, stage, q_0, EVERYONE))
+        found = plain(without_new_crossings(rods, work, stage, q_0, EVERYONE))
         assert found.all() == good and found.any() == good

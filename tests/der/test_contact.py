@@ -7,6 +7,7 @@ import oracle
 from hubs import HUBS
 from oracle import Star
 from seastar_gym import Contact, Scene, Seastar, SmaPulse
+from seastar_gym.der.contact import coupled
 from seastar_gym.der.contact.broad_phase import freeze_contact
 from seastar_gym.der.contact.contact import (
     SLOT_ROWS,
@@ -122,17 +123,17 @@ def test_a_tip_at_a_root_edge_of_its_neighbour_is_met(nodes_per_limb, side):
 
 
 def energy(touching) -> np.ndarray:
-    return plain(add_contact.plain(touching.rods, touching.work, touching.stage, None, Lanes(0.0)))
+    return plain(add_contact(touching.rods, touching.work, touching.stage, None, Lanes(0.0)))
 
 
 def listed_stiffness(touching, q) -> np.ndarray:
     """Stiffness of all listed pairs of every node at positions q [N/m], shape (n_nodes, N_LANES)."""
     rods, work = touching.rods, touching.work
     work.q[:] = rows(q)
-    freeze_contact.plain(rods, work, touching.stage, rows(q))
+    freeze_contact(rods, work, touching.stage, rows(q))
     total = np.zeros((rods.n_nodes, N_LANES))
-    for slot in range(n_listed.plain(work)):
-        total[members.plain(rods, work, slot)[0]] += work.contact.slots[SLOT_ROWS * slot + STIFFNESS]
+    for slot in range(n_listed(work)):
+        total[members(rods, work, slot)[0]] += work.contact.slots[SLOT_ROWS * slot + STIFFNESS]
     return total
 
 
@@ -153,11 +154,11 @@ def test_limbs_that_press_each_other_store_the_same_where_a_stage_asks_and_where
     """Without looking ahead; and it counts at the end of steps whose scheme gives it back."""
     touching = touching_limbs()
     args = touching.rods, touching.work
-    stored = plain(add_contact_energy.plain(*args, touching.work.q, Lanes(0.0)))
+    stored = plain(add_contact_energy(*args, touching.work.q, Lanes(0.0)))
     np.testing.assert_allclose(stored, energy(touching), rtol=1e-9)
     assert np.all(stored > 0.0)
     for name, scheme in SCHEMES.items():
-        found = plain(add_held_energy.plain(*args, scheme, touching.work.q, Lanes(0.0)))
+        found = plain(add_held_energy(*args, scheme, touching.work.q, Lanes(0.0)))
         np.testing.assert_array_equal(found, stored if name == "implicit-euler" else 0.0)
 
 
@@ -186,7 +187,7 @@ def found(q_1: np.ndarray, q_0: np.ndarray, ahead: bool = False, robots=None, mi
     work.contact.missed[:] = 1.0 * np.asarray(missed)
     stage = Stage(work.q_hat, work.v_hat, Lanes(1e-3), Lanes(1e3), ahead)
     asked = EVERYONE if robots is None else Mask(robots)
-    return plain(without_new_crossings.plain(RODS, work, stage, rows(q_0), asked))
+    return plain(without_new_crossings(RODS, work, stage, rows(q_0), asked))
 
 
 @pytest.mark.parametrize("ahead", [False, True])
@@ -207,7 +208,7 @@ def test_limbs_are_on_their_sides_of_a_line_across_the_difference_of_their_roots
     """Of bent robots away from the origin, some with limbs that come near to each other."""
     q_0 = REST + 0.2 + 2e-3 * RNG.standard_normal((N_LANES, *REST.shape))
     q_1 = q_0 + 0.02 * RNG.standard_normal(q_0.shape)
-    seen = plain(on_their_sides.plain(RODS, rows(q_1), rows(q_0), 1, 2))
+    seen = plain(on_their_sides(RODS, rows(q_1), rows(q_0), 1, 2))
     for lane in range(N_LANES):
         a, b = (root / np.linalg.norm(root) for root in q_0[lane, [4, 7]] - q_0[lane, 0])
         across = b - a + rotated(a + b, 0.5 * np.pi)
@@ -221,7 +222,7 @@ def test_edges_cross_where_the_lines_through_them_meet_within_both():
     q = RNG.standard_normal((40, N_LANES, ROBOT.n_nodes, 2))
     q[0, :, [1, 2, 5, 6]] = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0], [0.5, 0.0]])[:, None]
     for each in q:
-        seen = plain(edges_cross.plain(RODS, rows(each), 1, 5))
+        seen = plain(edges_cross(RODS, rows(each), 1, 5))
         for lane in range(N_LANES):
             (i, k), (j, m) = each[lane, [1, 2]], each[lane, [5, 6]]
             shares = np.linalg.solve(np.stack([k - i, j - m], axis=1), j - i)
@@ -234,10 +235,10 @@ def test_edges_cross_where_the_lines_through_them_meet_within_both():
 def steps(touching, robots=EVERYONE):
     """(the star's step, the coupled one, their decrements) [m], [J]."""
     rods, work = touching.rods, touching.work
-    _, alone, _ = factorise.plain(rods, work, touching.stage, None)
+    _, alone, _ = factorise(rods, work, touching.stage, None)
     star = np.zeros_like(work.q)
-    substitute_star.plain(rods, work, star)
-    together = solve_coupled.plain(rods, work, robots, alone)
+    substitute_star(rods, work, star)
+    together = solve_coupled(rods, work, robots, alone)
     return star, work.contact.x.copy(), plain(alone), plain(together)
 
 
@@ -247,29 +248,29 @@ def test_the_step_solves_the_star_and_contact_together_and_derivatives_do_to_rou
     touching = touching_limbs(discretisation=discretisation)
     rods, work = touching.rods, touching.work
     star, x, _, _ = steps(touching)
-    iterations, derivatives = plain(solver_iterations.plain(work)), star.copy()
-    solve_again_coupled.plain(rods, work, derivatives)
+    iterations, derivatives = plain(solver_iterations(work)), star.copy()
+    solve_again_coupled(rods, work, derivatives)
     assert np.abs(x - star).max() > 1e-2 * np.abs(star).max()
     for found, close in ((x, 1e-5), (derivatives, 1e-9)):
         taken, moved = np.zeros_like(x), np.zeros_like(x)
-        add_contact_product.plain(rods, work, found, -1.0, taken)
-        solve_again.plain(rods, work, taken, moved)
+        add_contact_product(rods, work, found, -1.0, taken)
+        solve_again(rods, work, taken, moved)
         np.testing.assert_allclose(found - star, moved, rtol=0.0, atol=close * np.abs(moved).max())
     assert not work.contact.missed.any()
-    np.testing.assert_array_equal(plain(solver_iterations.plain(work)), iterations)
+    np.testing.assert_array_equal(plain(solver_iterations(work)), iterations)
 
 
 def test_whoever_does_not_arrive_in_200_iterations_is_missed(monkeypatch):
     touching, iterations = touching_limbs(), []
     rods, work = touching.rods, touching.work
-    _, alone, _ = factorise.plain(rods, work, touching.stage, None)
+    _, alone, _ = factorise(rods, work, touching.stage, None)
 
     def never_less(rods, a, b):
         if a is work.contact.r:
             iterations.append(1.0)
         return Lanes(1.0)
 
-    monkeypatch.setitem(solve_coupled.plain.__globals__, "dot", never_less)
-    solve_coupled.plain(rods, work, EVERYONE, alone)
+    monkeypatch.setattr(coupled, "dot", never_less)
+    solve_coupled(rods, work, EVERYONE, alone)
     assert work.contact.missed.all() and len(iterations) == 1 + 200
-    assert np.all(plain(solver_iterations.plain(work)) == 200.0)
+    assert np.all(plain(solver_iterations(work)) == 200.0)

@@ -10,7 +10,7 @@ PLACES = np.random.default_rng(0).uniform(-0.4, 0.4, (2, 80))
 
 
 def current_at(current: Current, places: np.ndarray) -> np.ndarray:
-    return np.array(plain(current_velocity.plain(current, *map(Lanes, places))))
+    return np.array(plain(current_velocity(current, *map(Lanes, places))))
 
 
 def grid(function, n_x: int = 9, n_y: int = 7, spacing: float = 0.125) -> Current:

@@ -15,7 +15,7 @@ OTHERS = RNG.standard_normal((2, 50))
 def geometry(e: np.ndarray):
     """Of an edge from (0.3, -0.2) on."""
     q = np.array([0.3 + 0.0 * e[0], -0.2 + 0.0 * e[1], 0.3 + e[0], -0.2 + e[1]])
-    return edge_geometry.plain(q, 0, 1)
+    return edge_geometry(q, 0, 1)
 
 
 def angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -43,7 +43,7 @@ def test_u_turned_is_the_gradient_of_the_direction_and_the_documented_hessian_it
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_half_angle_is_the_tangent_of_half_the_angle_from_the_first_edge_or_its_reverse(side):
-    t = plain(half_angle.plain(geometry(EDGES), geometry(OTHERS), side))
+    t = plain(half_angle(geometry(EDGES), geometry(OTHERS), side))
     np.testing.assert_allclose(np.arctan(t), 0.5 * angle(side * EDGES, OTHERS), rtol=0.0, atol=1e-12)
 
 
@@ -51,7 +51,7 @@ def test_half_angle_is_the_tangent_of_half_the_angle_from_the_first_edge_or_its_
 
 
 def tangents(x: np.ndarray) -> np.ndarray:
-    return plain(tangent.plain(Lanes(x)))
+    return plain(tangent(Lanes(x)))
 
 
 def test_tangent_is_that_of_numpy_to_a_few_units_in_the_last_place():
@@ -73,6 +73,6 @@ def test_tangent_is_that_of_an_angle_a_few_units_in_the_last_place_away_up_to_th
 
 @pytest.mark.parametrize("turns", [0.0, 1e-9, 0.3, 3.1, 3.2, -7.0, 100.0, -1e4])
 def test_rotations_are_those_of_any_angle(turns):
-    c, s = plain(rotation.plain(Lanes(np.array([turns]))))
+    c, s = plain(rotation(Lanes(np.array([turns]))))
     assert c[0] == pytest.approx(np.cos(turns), abs=1e-12) and s[0] == pytest.approx(np.sin(turns), abs=1e-12)
     assert c[0] ** 2 + s[0] ** 2 == pytest.approx(1.0, abs=1e-15)

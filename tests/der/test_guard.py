@@ -78,7 +78,7 @@ def test_allowed_energy_is_that_of_the_robot_standing_still_while_its_actuators_
     begin, end = np.random.default_rng(1).uniform(-0.4, 0.4, (2, N_LANES, 5))
     tableau, actuation = SCHEMES[scheme], Actuation(begin.T.copy(), end.T.copy())
     args = rods, make_work(rods, tableau.n_stages), tableau, actuation, Lanes(0.25), Lanes(0.75), rows(q), rows(v)
-    found = plain(allowed_energy.plain(*args, SEEN_FROM))
+    found = plain(allowed_energy(*args, SEEN_FROM))
     for lane in range(N_LANES):
         first, last = (begin[lane] + share * (end[lane] - begin[lane]) for share in (0.25, 0.75))
         at_start, at_end = (oracle.elastic_energy(star, q[lane], one) for one in (first, last))
@@ -93,9 +93,9 @@ def test_work_of_currents_and_loads_is_force_times_way_as_the_frame_sees_it():
     h, (q, v), (begin, _) = 0.01, moving_robots(), moving_robots(seed=2)
     work = make_work(STREAM_RODS, 1)
     work.q[:], work.step[:] = rows(begin), rows(begin)
-    freeze_fluid.plain(STREAM_RODS, work)
+    freeze_fluid(STREAM_RODS, work)
     of_current, of_loads = (
-        plain(add.plain(STREAM_RODS, work, rows(state), Lanes(h), SEEN_FROM, Lanes(0.0)))
+        plain(add(STREAM_RODS, work, rows(state), Lanes(h), SEEN_FROM, Lanes(0.0)))
         for add, state in ((add_work_of_current, v), (add_work_of_loads, q))
     )
     for lane in range(N_LANES):
@@ -117,7 +117,7 @@ def held(share: float, largest_cut: float = LARGEST_CUT, robots: Mask = EVERYONE
     state, work = (rows(q), rows(v)), make_work(rods, 1)
     turn_limbs(rods, work, np.zeros(5))
     work.q[:] = state[0]
-    freeze_fluid.plain(rods, work)
+    freeze_fluid(rods, work)
 
     def kinetic_energies(velocities: np.ndarray) -> np.ndarray:
         seen = velocities - FRAME.T[:, None]
@@ -125,11 +125,11 @@ def held(share: float, largest_cut: float = LARGEST_CUT, robots: Mask = EVERYONE
             [0.5 * np.einsum("nd,ndme,me", one, inertia(star, at), one) for at, one in zip(q, seen, strict=True)]
         )
 
-    rigid, kinetic = plain(rigid_motion.plain(rods, work, *state, SEEN_FROM)[5]), kinetic_energies(v)
+    rigid, kinetic = plain(rigid_motion(rods, work, *state, SEEN_FROM)[5]), kinetic_energies(v)
     potential = np.array([oracle.elastic_energy(STAR, one, np.zeros(5)) for one in q])
     allowed = rigid + share * (kinetic - rigid)
     args = rods, work, SCHEMES["implicit-midpoint"], *state, Lanes(0.01), SEEN_FROM, robots, Lanes(potential + allowed)
-    refused, cut = plain(hold_to_energy.plain(*args, Lanes(largest_cut)))
+    refused, cut = plain(hold_to_energy(*args, Lanes(largest_cut)))
     np.testing.assert_array_equal(nodes(state[0]), q)
     after = nodes(state[1])
     return SimpleNamespace(
@@ -226,10 +226,10 @@ def test_a_hinge_that_turned_through_its_pole_is_seen_and_the_robot_put_back(hub
     v = np.ones((N_LANES, STAR.n_nodes, 2))
     q_rows, v_rows, asked = rows(q), rows(v), np.arange(N_LANES) < N_LANES - 1
     work = make_work(rods, tableau.n_stages)
-    save.plain(rods, work, tableau, q_rows, v_rows)
+    save(rods, work, tableau, q_rows, v_rows)
     q_rows[:], v_rows[:] = rows(q_1), 0.0
-    found = through_poles.plain(rods, work, q_rows, Mask(asked))
-    restore.plain(rods, work, tableau, q_rows, v_rows, found)
+    found = through_poles(rods, work, q_rows, Mask(asked))
+    restore(rods, work, tableau, q_rows, v_rows, found)
     np.testing.assert_array_equal(plain(found), asked & through)
     back = (asked & through)[:, None, None]
     np.testing.assert_array_equal(nodes(q_rows), np.where(back, q, q_1))
@@ -247,9 +247,9 @@ Q, V = ROBOT.nodes() + 1e-3 * RNG.standard_normal((ROBOT.n_nodes, 2)), RNG.stand
 
 def test_a_robot_is_judged_as_its_water_sees_it_and_in_vacuum_as_its_own_centre_of_mass_does():
     stream = make_rods(Scene(ROBOT, Water(current=UniformCurrent(0.3, -0.2))))
-    found = plain(frame_velocity.plain(stream, rows(Q), rows(V)))
+    found = plain(frame_velocity(stream, rows(Q), rows(V)))
     np.testing.assert_allclose([found[0][0], found[1][0]], [0.3, -0.2])
-    alone = plain(frame_velocity.plain(IN_VACUUM, rows(Q), rows(V)))
+    alone = plain(frame_velocity(IN_VACUUM, rows(Q), rows(V)))
     np.testing.assert_allclose([alone[0][0], alone[1][0]], IN_VACUUM.mass @ V / IN_VACUUM.mass.sum(), rtol=1e-12)
 
 
@@ -260,7 +260,7 @@ def test_growth_is_seen_from_the_share_of_the_kinetic_energy_on_that_is_rounding
     turn_limbs(IN_VACUUM, work, np.zeros(5))
     allowed = Lanes(oracle.kinetic_energy(STAR_IN_VACUUM, V) * (1.0 - growth * 1e-12))
     args = IN_VACUUM, work, SCHEMES["implicit-euler"], q, v, Lanes(10.0), (Lanes(0.0), Lanes(0.0)), EVERYONE, allowed
-    assert np.all(plain(hold_to_energy.plain(*args, Lanes(1.0))[1]) == seen)
+    assert np.all(plain(hold_to_energy(*args, Lanes(1.0))[1]) == seen)
 
 
 def test_noise_is_that_of_positions_that_are_all_rounded_the_same_way():
@@ -271,9 +271,7 @@ def test_noise_is_that_of_positions_that_are_all_rounded_the_same_way():
     h, far, v = 1e-3, ROBOT.nodes() + 1e3, np.ones((ROBOT.n_nodes, 2))
     before, after = (oracle.kinetic_energy(STAR_IN_VACUUM, each) for each in (v, v + np.spacing(far) / h))
     both = IN_VACUUM, make_rods(Scene(ROBOT, None, held_nodes=(0, 3)))
-    noise, of_held = (
-        plain(energy_noise.plain(rods, None, rows(far), Lanes(h), Lanes(0.0), Lanes(before))) for rods in both
-    )
+    noise, of_held = (plain(energy_noise(rods, None, rows(far), Lanes(h), Lanes(0.0), Lanes(before))) for rods in both)
     assert np.all((0.05 * noise < after - before) & (after - before < 0.5 * noise))
     assert np.all((of_held > 0.5 * noise) & (of_held < noise))
 
@@ -297,9 +295,9 @@ def test_a_step_may_gain_energy_where_what_newton_knows_does_not_rule_it_out(loa
     stage = Stage(rows(Q), rows(v_0), Lanes(h), Lanes(1.0 / h), False)
     above = np.arange(N_LANES) % 2 == 0
     phi = Lanes(least + np.where(above, 1e-9, -1e-9) * abs(least))
-    found = plain(may_gain.plain(rods, work, stage, phi, EVERYONE))
+    found = plain(may_gain(rods, work, stage, phi, EVERYONE))
     np.testing.assert_array_equal(found, above)
-    assert not plain(may_gain.plain(rods, work, stage, phi, ~EVERYONE)).any()
+    assert not plain(may_gain(rods, work, stage, phi, ~EVERYONE)).any()
     for named in ("current", "added_mass", "body"):  # of which it knows nothing: any step may
         others = NO_RODS._replace(**{named: object()})
-        assert may_gain.plain(others, work, stage, phi, EVERYONE) is EVERYONE
+        assert may_gain(others, work, stage, phi, EVERYONE) is EVERYONE

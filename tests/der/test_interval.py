@@ -8,6 +8,7 @@ import pytest
 
 from seastar_gym import Scene, Seastar
 from seastar_gym.der.rods import make_work
+from seastar_gym.der.stepping import interval, steps
 from seastar_gym.der.stepping.interval import cover_interval
 from seastar_gym.der.stepping.report import (
     COVERED,
@@ -76,16 +77,16 @@ class Script:
 
 def cover(monkeypatch, outcomes, adaptive=False, last_size=0.0, iterations=0.0, alive=EVERYONE):
     script = Script(outcomes, iterations)
-    monkeypatch.setitem(cover_interval.plain.__globals__, "try_step", script)
+    monkeypatch.setattr(interval, "try_step", script)
     limits = Limits(np.array([1e-9]), 20, MOST, adaptive, np.array([LIMIT]))
     report = np.zeros((len(REPORT_ROWS), N_LANES))
     a = np.zeros((2 * ROBOT.n_nodes + 3, N_LANES))
-    a[memory_row.plain(RODS, MIDPOINT, SIZE)] = last_size
+    a[memory_row(RODS, MIDPOINT, SIZE)] = last_size
     args = RODS, make_work(RODS, 1), MIDPOINT, EULER, None, rows(ROBOT.nodes()), None, a, DURATION
-    arrived = lanes(cover_interval.plain(*args, Mask(alive), limits, report))
+    arrived = lanes(cover_interval(*args, Mask(alive), limits, report))
     return SimpleNamespace(
         tried=script.tried, accepted=script.accepted, arrived=arrived, report=report,
-        size=a[memory_row.plain(RODS, MIDPOINT, SIZE)],
+        size=a[memory_row(RODS, MIDPOINT, SIZE)],
     )  # fmt: skip
 
 
@@ -157,15 +158,14 @@ def test_the_guard_is_milder_after_eight_halvings_and_after_twelve(monkeypatch, 
         asked.update(turnable=robots.robots)
         return Mask(NOBODY)
 
-    space = end_guarded_step.plain.__globals__
     for name, fake in {"hold_to_energy": hold, "through_poles": poles, "end_step": lambda *_: None}.items():
-        monkeypatch.setitem(space, name, fake)
+        monkeypatch.setattr(steps, name, fake)
     q, v = rows(ROBOT.nodes()), np.zeros((2 * ROBOT.n_nodes, N_LANES))
     work, report = make_work(RODS, 1), np.zeros((len(REPORT_ROWS), N_LANES))
     still, limits = Actuation(*np.zeros((2, 5, N_LANES))), Limits(np.array([1e-9]), 20, MOST, False, np.array([LIMIT]))
     step = Step(Lanes(0.0), Lanes(1.0), Lanes(0.01), Lanes(20.0 * (1 + halvings)), Mask(NOBODY))
     masks = Mask(EVERYONE), Mask(FIRST)
-    end_guarded_step.plain(
+    end_guarded_step(
         RODS, work, MIDPOINT, still, q, v, np.zeros((2 * ROBOT.n_nodes + 3, N_LANES)), step, None, *masks,
         limits, report,
     )  # fmt: skip

@@ -17,13 +17,17 @@ import pytest
 from numba.core.errors import TypingError
 
 from seastar_gym.simd import lanes, numpy_lanes
-from seastar_gym.simd.compilation import entry_point, kernel
-from seastar_gym.simd.lanes import N_LANES, any_lane, borrow, load, load_number, splat, store
+from seastar_gym.simd.compilation import STRICT, entry_point, kernel
+from seastar_gym.simd.lanes import N_LANES, NARROW, PLAIN, any_lane, borrow, load, load_number, splat, store
+from seastar_gym.simd.pipeline import compiler_of
 
 ONLY_COMPILED = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="numba alone looks at the types of arrays")
 ROUNDS_TWICE = sys.version_info < (3, 13)  # the plain twin, before math.fma
 ROOT = Path(__file__).resolve().parents[2]
 SPECIAL = [0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 5e-324, -2.2e-308, 1.8e308, 1e-160, 1e200, 1.0 + 2**-52]
+
+
+compiled = numba.njit(**STRICT)
 
 
 def rows_of(values) -> np.ndarray:
@@ -67,7 +71,7 @@ def by_numpy(line: str, operands) -> np.ndarray:
         return eval(line, {"sqrt": np.sqrt, "absolute": np.abs, "select": np.where}, vars(operands))
 
 
-def kernel_of(twin: str, template: str, body: str, lines: list[str]):
+def kernel_of(twin: str, template: str, body: str, lines: list[str], form=PLAIN):
     """A function made of one line of `template` for every line: `store` its value in a row of its own."""
     stores = "".join(
         f"        store(out, {len(lines)} * r + {k}, {template.format(line)})\n" for k, line in enumerate(lines)
@@ -75,7 +79,8 @@ def kernel_of(twin: str, template: str, body: str, lines: list[str]):
     source = f"def function(a_rows, b_rows, c_rows, out_rows):\n{body}{stores}"
     namespace = dict(vars(numpy_lanes if twin == "plain" else lanes))
     exec(source, namespace)
-    return namespace["function"] if twin == "plain" else numba.njit(error_model="numpy")(namespace["function"])
+    function, options = namespace["function"], {**STRICT, "pipeline_class": compiler_of(form)}
+    return function if twin == "plain" else numba.njit(**options)(function)
 
 
 LOOP = """\
@@ -181,7 +186,7 @@ def test_comparisons_and_masks_are_those_of_numpy_and_nan_compares_false(run_all
 
 
 def test_any_looks_at_every_lane():
-    @numba.njit
+    @compiled
     def function(rows):
         condition = load(borrow(rows), 0) > 0.0
         return any_lane(condition), any_lane(~condition)
@@ -202,7 +207,7 @@ class Bundle(NamedTuple):
 
 
 def test_load_reads_per_robot_and_shared_rows_and_store_writes_lanes_or_one_number():
-    @numba.njit
+    @compiled
     def function(bundle, rows):
         fields, out = borrow(bundle), borrow(rows)
         store(out, 0, load(fields.per_robot, 1))
@@ -232,6 +237,15 @@ def test_rows_need_no_alignment(operands):
     kernel_of("compiled", "{}", LOOP, ["a + b"])(*shifted[:3], out)
     with np.errstate(all="ignore"):
         assert_same_bits(out, operands.a + operands.b)
+
+
+@ONLY_COMPILED
+def test_narrow_lanes_compute_for_the_first_robots_of_a_row_to_the_same_bits_and_touch_no_other(operands):
+    wide, narrow = (np.full((len(ARITHMETIC) * len(operands.a), N_LANES), 0.5) for _ in range(2))
+    for form, out in ((PLAIN, wide), (NARROW, narrow)):
+        kernel_of("compiled", "{}", LOOP, ARITHMETIC, form)(operands.a, operands.b, operands.c, out)
+    assert_same_bits(narrow[:, : NARROW.width], wide[:, : NARROW.width])
+    np.testing.assert_array_equal(narrow[:, NARROW.width :], 0.5)
 
 
 # Refusals
@@ -271,11 +285,11 @@ def test_what_lanes_cannot_do_is_a_typing_error_at_compilation_and_a_type_error_
     ids=["float32", "int64", "transposed", "strided", "three axes", "plain tuple", "string"],
 )
 def test_only_contiguous_float64_rows_and_named_tuples_of_them_can_be_borrowed_and_shared_ones_not_written(array):
-    @numba.njit
+    @compiled
     def function(rows):
         return any_lane(load(borrow(rows), 0) > 0.0)
 
-    @numba.njit
+    @compiled
     def write(rows):
         store(borrow(rows), 0, 1.0)
 
@@ -283,6 +297,21 @@ def test_only_contiguous_float64_rows_and_named_tuples_of_them_can_be_borrowed_a
         function(array)
     with pytest.raises(TypingError):
         write(np.zeros(3))  # shared
+
+
+@kernel
+def as_lanes(number):
+    return splat(number)
+
+
+@ONLY_COMPILED
+def test_a_kernel_whose_arguments_tell_no_form_has_no_lanes_of_its_own():
+    @compiled
+    def function(out):
+        store(borrow(out), 0, as_lanes(1.0))
+
+    with pytest.raises(TypingError, match="splat needs lanes, rows or a bundle of rows among the arguments"):
+        function(np.ones((1, N_LANES)))
 
 
 # The width

@@ -42,7 +42,7 @@ def test_moves_of_the_chosen_robots_are_newtons_and_exact_in_vacuum_and_bend_no_
     rods, stages = of(hub, fluid, speed=0.05)
     work, stage = stages.begin(rods)
     for _ in range(times):
-        move_as_a_whole.plain(rods, work, EULER, 0, stage, Mask(CHOSEN))
+        move_as_a_whole(rods, work, EULER, 0, stage, Mask(CHOSEN))
     q = nodes(work.q)
     before, after = (unbalanced(stages.star, places, stages) for places in (stages.q, q))
     assert np.all(after[CHOSEN] < left * before[CHOSEN])
@@ -56,7 +56,7 @@ def test_momentum_is_corrected_in_vacuum_and_in_a_fluid_where_digits_are_lost(fl
     """steps: Over those at which that begins in a fluid."""
     rods, stages = of("rigid", fluid, steps * GAMMA / np.sqrt(lost_at(GAMMA)), bend=0.05)
     work, stage = stages.begin(rods)
-    correct_momentum.plain(
+    correct_momentum(
         rods, work, EULER, 0, stage, work.q_hat, work.v_hat, Lanes(stages.gamma), Mask(CHOSEN)
     )  # fmt: skip
     before, after = (unbalanced(stages.star, places, stages) for places in (stages.q, nodes(work.q)))
@@ -71,6 +71,6 @@ def test_what_contact_pushed_when_it_was_last_asked_moves_no_robot_as_a_whole():
     for force in (0.0, 1.0):
         limbs = touching_limbs()
         limbs.work.contact.force[:] = force * np.random.default_rng(1).standard_normal(limbs.work.q.shape)
-        move_as_a_whole.plain(limbs.rods, limbs.work, EULER, 0, limbs.stage, EVERYONE)
+        move_as_a_whole(limbs.rods, limbs.work, EULER, 0, limbs.stage, EVERYONE)
         found.append(limbs.work.q.copy())
     np.testing.assert_array_equal(*found)

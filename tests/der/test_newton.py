@@ -29,7 +29,7 @@ def minimised(active=EVERYONE, tolerance=1e-13, limit=500.0, rods: Rods = RODS, 
     stages = RandomStages(star, **size)
     stages.frozen = stages.q
     work, stage = stages.begin(rods)
-    found = minimise.plain(rods, work, stage, active, Lanes(tolerance), Lanes(limit))
+    found = minimise(rods, work, stage, active, Lanes(tolerance), Lanes(limit))
     converged, phi, iterations, regularised, backtracks = plain(found)
     return SimpleNamespace(
         stages=stages, q=nodes(work.q), converged=converged, phi=phi, iterations=iterations,
@@ -70,7 +70,7 @@ def test_a_robot_whose_state_is_not_a_number_does_not_converge_and_stops_nobody(
     stages = RandomStages(STAR, **MILD)
     work, stage = stages.begin(RODS)
     work.q[5, lane] = np.nan
-    converged = plain(minimise.plain(RODS, work, stage, EVERYONE, Lanes(1e-10), Lanes(60.0))[0])
+    converged = plain(minimise(RODS, work, stage, EVERYONE, Lanes(1e-10), Lanes(60.0))[0])
     np.testing.assert_array_equal(converged, np.arange(N_LANES) != lane)
 
 

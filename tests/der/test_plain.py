@@ -1,4 +1,4 @@
-"""Kernels in plain Python: beside the compiled ones, in place of them, and never by accident."""
+"""Kernels in plain Python: one by one where Python calls them, and all of them in place of the compiled ones."""
 
 import os
 import subprocess
@@ -23,14 +23,11 @@ from seastar_gym import (
     Water,
 )
 from seastar_gym.der import motion
-from seastar_gym.der.terms import drag
-from seastar_gym.der.terms.drag import drag_slopes
 from seastar_gym.envs.observation import body_axis
 from seastar_gym.envs.stations import stations
 from seastar_gym.simd import lanes, numpy_lanes
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from seastar_gym.simd.plain import PlainKernels
 from slopes import NO_WORK, plain
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -119,24 +116,14 @@ def test_strokes_in_plain_python_stay_within_their_rows_and_are_those_of_the_mac
 # One kernel
 
 
-@COMPILED
-def test_a_compiled_kernel_called_from_python_says_so_in_one_sentence():
-    with pytest.raises(TypeError, match=r"drag_slopes is a kernel.*@entry_point.*drag_slopes\.plain.*\.$") as caught:
-        drag_slopes(0.3, 1.0, 2.0)
-    assert "\n" not in str(caught.value)
-
-
-def test_a_kernel_runs_in_plain_python_beside_itself_and_leaves_every_module_as_it_was():
-    before = dict(sys.modules), dict(vars(drag)), dict(vars(sys.modules["seastar_gym.der"]))
-    loaded = []
-    kernels = PlainKernels(load=lambda rows, row: loaded.append(row) or numpy_lanes.load(rows, row))
-    assert kernels(drag_slopes) is not drag_slopes
-    kernels(motion.relative)(NO_WORK._replace(current=np.zeros((4, 1))), 1, Lanes(1.0), Lanes(2.0))
+def test_a_kernel_that_python_calls_runs_step_by_step_with_all_that_it_calls(monkeypatch):
+    loaded, load = [], numpy_lanes.load
+    monkeypatch.setattr(numpy_lanes, "load", lambda rows, row: loaded.append(row) or load(rows, row))
+    motion.relative(NO_WORK._replace(current=np.zeros((4, 1))), 1, Lanes(1.0), Lanes(2.0))
     assert loaded == [2, 3]
-    assert (sys.modules, vars(drag), vars(sys.modules["seastar_gym.der"])) == before
     square = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0])[:, None]
     turned = np.array([0.0, 0.0, 0.0, 1.0, -1.0, 0.0])[:, None]
-    np.testing.assert_allclose(plain(body_axis.plain(square, turned, stations(2), 2)), [[0.0], [1.0]], atol=1e-15)
+    np.testing.assert_allclose(plain(body_axis(square, turned, stations(2), 2)), [[0.0], [1.0]], atol=1e-15)
 
 
 # The twin
@@ -151,7 +138,7 @@ def test_the_twin_has_every_function_of_lanes():
         for block in file.read_text(encoding="utf-8").split("seastar_gym.simd.lanes import ")[1:]
         for name in block.lstrip("(").split(")" if block.startswith("(") else "\n")[0].replace(",", " ").split()
     }
-    assert used <= {*numpy_lanes.FUNCTIONS, "N_LANES", "WIDTH"}
+    assert used <= {*numpy_lanes.FUNCTIONS, "N_LANES", "Form", "PLAIN", "NARROW", "registers"}
 
 
 def test_lanes_are_values_and_refuse_what_would_not_compile():

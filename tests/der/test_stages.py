@@ -34,10 +34,10 @@ def test_every_scheme_is_exact_for_nodes_that_fall(scheme):
     q, v, n = q_0.copy(), v_0.copy(), tableau.n_stages
     a = np.concatenate([np.tile(a_0, (n, 1)), np.ones((n + 2, N_LANES))])
     for k in range(n):
-        stage = begin_stage.plain(RODS, work, tableau, k, q, v, a, Lanes(H))
+        stage = begin_stage(RODS, work, tableau, k, q, v, a, Lanes(H))
         if k < n - 1:
-            end_stage.plain(RODS, work, tableau, k, stage, a, EVERYONE)
-    end_step.plain(RODS, work, tableau, stage, q, v, a, Lanes(H), EVERYONE)
+            end_stage(RODS, work, tableau, k, stage, a, EVERYONE)
+    end_step(RODS, work, tableau, stage, q, v, a, Lanes(H), EVERYONE)
     np.testing.assert_allclose(v, v_0 + H * a_0, rtol=1e-12, atol=1e-12)
     exact = q_0 + H * v_0 + H**2 * a_0 * (1.0 if scheme == "implicit-euler" else 0.5)
     np.testing.assert_allclose(q, exact, rtol=1e-12, atol=1e-12)

@@ -27,7 +27,6 @@ from seastar_gym.der.terms.inertia import kinetic_energy
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from seastar_gym.simd.plain import plain_kernels
 from slopes import gradient, plain, rows
 from stages import RandomStages, robot_and_star, rods_of
 from unlike import DIFFERENT
@@ -141,13 +140,13 @@ def test_other_right_hand_sides_are_solved_with_the_oracles_matrix(name):
     """As sensitivities are, and contact; the solution found last is the one that is written."""
     rods, stages = make_rods(TERMS[name].scene), RandomStages(TERMS[name].star, 1e-3, bend=0.05)
     work, stage = stages.begin(rods, again=True)
-    factorise.plain(rods, work, stage, None)
+    factorise(rods, work, stage, None)
     r, (x, written) = np.random.default_rng(0).standard_normal(work.q.shape), np.zeros((2, *work.q.shape))
-    solve_again.plain(rods, work, r, x)
+    solve_again(rods, work, r, x)
     for lane in range(N_LANES):
         expected = np.linalg.solve(stages.hessian(lane), r[:, lane])
         np.testing.assert_allclose(x[:, lane], expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
-    substitute_star.plain(rods, work, written)
+    substitute_star(rods, work, written)
     np.testing.assert_array_equal(written, x)
 
 
@@ -157,13 +156,15 @@ def test_energies_of_a_state_are_those_of_the_oracle_at_the_rotations_of_its_lim
     rods, stages = make_rods(scene), RandomStages(star, 1.0, bend=0.3)
     v, (elastic, kinetic) = np.random.default_rng(1).standard_normal(stages.q.shape), np.zeros((2, 1, N_LANES))
     actuation = Actuation(np.zeros((star.n_limbs, N_LANES)), stages.delta_psi.T.copy())
-    plain_kernels()(energies)(rods, make_work(rods, 1), actuation, rows(stages.q), rows(v), elastic, kinetic)
+    getattr(energies, "py_func", energies)(
+        rods, make_work(rods, 1), actuation, rows(stages.q), rows(v), elastic, kinetic
+    )
     for lane in range(N_LANES):
         expected = oracle.elastic_energy(stages.star_of(lane)[0], stages.q[lane], stages.star_of(lane)[1])
         assert elastic[0, lane] == pytest.approx(expected, rel=1e-10)
         assert kinetic[0, lane] == pytest.approx(oracle.kinetic_energy(star, v[lane]), rel=1e-12)
     frame = (0.3, -0.7)
-    seen = plain(kinetic_energy.plain(rods, rows(v), frame))
+    seen = plain(kinetic_energy(rods, rows(v), frame))
     np.testing.assert_allclose(seen, [oracle.kinetic_energy(star, one - frame) for one in v], rtol=1e-12)
 
 
@@ -220,7 +221,7 @@ def test_a_matrix_that_is_not_a_number_does_not_pass_for_positive_definite():
 
 
 def test_a_hub_without_any_preference_has_an_orientation():
-    assert [float(plain(one)) for one in orientation.plain(Lanes(0.0), Lanes(0.0))] == [1.0, 0.0]
+    assert [float(plain(one)) for one in orientation(Lanes(0.0), Lanes(0.0))] == [1.0, 0.0]
 
 
 # Actuators
@@ -246,15 +247,15 @@ def test_the_moment_that_resists_an_actuator_is_the_slope_of_the_energy_in_its_r
     q = rows(robot.nodes() + 2e-3 * rng.standard_normal((robot.n_nodes, 2)))
     if robot.has_body:
         q = np.vstack([q, np.full((1, N_LANES), 2e-3), np.zeros((1 + 2 * robot.n_limbs, N_LANES))])
-        place_roots.plain(rods, q)
+        place_roots(rods, q)
     work, turns, moments = make_work(rods, 1), rng.uniform(-0.2, 0.2, robot.n_limbs), np.zeros((robot.n_limbs, N_LANES))
 
     def actuation(turns):
         return Actuation(*(np.tile(turns[:, None], N_LANES) for _ in range(2)))
 
     def energy(turns):
-        set_natural_hub_angles.plain(rods, work, actuation(turns), Lanes(0.0))
-        return plain(elastic_energy.plain(rods, work, q))[0]
+        set_natural_hub_angles(rods, work, actuation(turns), Lanes(0.0))
+        return plain(elastic_energy(rods, work, q))[0]
 
-    fill_moments.plain(rods, work, actuation(turns), q, moments)
+    fill_moments(rods, work, actuation(turns), q, moments)
     np.testing.assert_allclose(moments[:, 0], gradient(energy, turns, 1e-3), rtol=1e-6)

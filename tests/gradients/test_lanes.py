@@ -5,12 +5,14 @@ from functools import cache
 import numba
 import numpy as np
 import pytest
+from numba.core.errors import TypingError
 
-from seastar_gym.gradients.implicit import correct_slopes
-from seastar_gym.gradients.kernels import DualKernels
-from seastar_gym.gradients.on_tape import TapeKernels, replay_steps
-from seastar_gym.simd import dual_lanes, tape_lanes
-from seastar_gym.simd.compilation import STRICT, Kernel
+from seastar_gym.gradients.implicit import DUAL
+from seastar_gym.gradients.on_tape import TAPED
+from seastar_gym.simd import dual_lanes, lanes, tape_lanes
+from seastar_gym.simd.compilation import STRICT
+from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.pipeline import compiler_of
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="these lanes have compiled code alone")
 
@@ -51,7 +53,7 @@ OF_TAPES = {
 
 
 @cache
-def compiled(lanes, lines, before="", behind=""):
+def compiled(form, lines, before="", behind=""):
     """function(arguments, table, results, entries) that stores every line in a row of its own."""
     stores = "".join(f"    store(out, {k}, {line})\n" for k, line in enumerate(lines))
     source = f"""\
@@ -59,17 +61,17 @@ def function(arguments, table, results, entries):
     rows, shared, out = borrow(arguments), borrow(table), borrow(results)
 {before}    x, y, z = load(rows, 1), load(rows, 2), load(rows, 3)
 {stores}{behind}"""
-    namespace = dict(vars(lanes))
+    namespace = {**vars(lanes), **vars(dual_lanes), **vars(tape_lanes)}
     exec(source, namespace)
-    return numba.njit(**STRICT)(namespace["function"])
+    return numba.njit(**{**STRICT, "pipeline_class": compiler_of(form)})(namespace["function"])
 
 
 def test_duals_have_the_slopes_of_calculus():
     expected = {line: (value, np.dot(slopes, DIRECTION)) for line, (value, *slopes) in EXPECTED.items()} | OF_DUALS
-    n, row = dual_lanes.N_LANES, dual_lanes.ROW
+    n, row = N_LANES, dual_lanes.ROW
     arguments, results = np.zeros((BEYOND, row)), np.full((len(expected), row), np.nan)
     arguments[1:, :n], arguments[1:, n:] = np.transpose([POINT]), np.transpose([DIRECTION])
-    compiled(dual_lanes, tuple(expected))(arguments, TABLE, results, None)
+    compiled(DUAL, tuple(expected))(arguments, TABLE, results, None)
     for found, (line, (value, slope)) in zip(results, expected.items(), strict=True):
         np.testing.assert_allclose(found[:n], value, rtol=1e-15, err_msg=line)
         np.testing.assert_allclose(found[n:], slope, rtol=1e-14, err_msg=line)
@@ -80,13 +82,13 @@ def on_tape(lines, capacity=100, x=(X,), seed=1.0):
 
     x: Of the robots, in turn. seed: Factor of the arguments.
     """
-    n, entries = tape_lanes.N_LANES, np.zeros((capacity, tape_lanes.ENTRY))
+    n, entries = N_LANES, np.zeros((capacity, tape_lanes.ENTRY))
     arguments, results = np.zeros((BEYOND, tape_lanes.ROW)), np.full((len(lines), tape_lanes.ROW), np.nan)
     arguments[1:, :n], arguments[1:, n : 2 * n] = np.transpose([POINT]), seed
     arguments[1, :n] = np.resize(x, n)
     arguments.view(np.int64)[1:, tape_lanes.PLACE] = range(1, BEYOND)
     behind = "    return end_of_tape(), tape_is_full()\n"
-    function = compiled(tape_lanes, tuple(lines), f"    begin_tape(entries, {BEYOND})\n", behind)
+    function = compiled(TAPED, tuple(lines), f"    begin_tape(entries, {BEYOND})\n", behind)
     end, full = function(arguments, TABLE, results, entries.ravel())
     places, factors = results.view(np.int64)[:, tape_lanes.PLACE], results[:, n : 2 * n]
     swept_back = [swept(entries, *each, end) for each in zip(places, factors, strict=True)] if not full else None
@@ -125,16 +127,14 @@ def test_every_robot_has_the_derivatives_of_its_choice():
         np.testing.assert_allclose(slopes[0], np.resize(of_x, len(slopes[0])), rtol=1e-14, err_msg=line)
 
 
-@pytest.mark.parametrize(
-    ("kind", "lanes", "outside"),
-    [(TapeKernels, tape_lanes, replay_steps), (DualKernels, dual_lanes, correct_slopes)],
-)
-def test_kernels_call_kernels_on_their_own_lanes_alone(kind, lanes, outside):
-    """Others would write to rows of another width, into memory that is not theirs."""
-    kernels = kind()
-    kernels(outside)
-    values = [value for module in kernels._modules.values() for value in vars(module).values()]
-    called = [value.py_func for value in values if isinstance(value, Kernel)]
-    wrong = [each.__qualname__ for each in called if each.__globals__.get("load", lanes.load) is not lanes.load]
-    assert len(called) > 100
-    assert not wrong
+@pytest.mark.parametrize("form", [DUAL, TAPED], ids=str)
+def test_lanes_of_different_forms_do_not_meet(form):
+    """Rows of another width would be written to, in memory that is not theirs."""
+    other = lanes.borrow.at(form)
+
+    @numba.njit(**STRICT)
+    def function(rows):
+        lanes.store(other(rows), 0, lanes.load(lanes.borrow(rows), 0))
+
+    with pytest.raises(TypingError):
+        function(np.zeros((1, 3 * N_LANES)))

@@ -44,6 +44,7 @@ from seastar_gym import (
 )
 from seastar_gym.scene.per_robot import side_by_side
 from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simulator import batch
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
 from simulator.test_conservation import CURLED
 from strokes import finished
@@ -277,6 +278,22 @@ def test_a_robot_has_its_bits(name, way):
 
 
 # Another width of lanes
+
+
+FEW = {name: ROWS[name] for name in ("default strokes", "body", "adaptive", "nasty, every term, implicit-midpoint")}
+FEW["held, along limbs"] = Row(
+    Scene(replace(TEN, along=AlongLimb(0.7), stiffening=Stiffening(2.0)), numerics=MIDPOINT, held_nodes=(9,))
+)
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_few_robots_on_narrow_lanes_have_their_bits(monkeypatch, name):
+    whole = swim(FEW[name])
+    monkeypatch.setattr(batch, "FEW", N_LANES // 2)
+    for robots in (np.array([0]), np.arange(1, 1 + N_LANES // 2)):
+        for one, wanted in zip(swim(FEW[name], robots), whole, strict=True):
+            for field in one:
+                np.testing.assert_array_equal(one[field], wanted[field][robots], err_msg=field)
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,6 @@ from seastar_gym.envs.vector import Buffers
 from seastar_gym.simd import cuda
 from seastar_gym.simd.compilation import kept_code
 from seastar_gym.simd.device import Program
-from seastar_gym.simulator import device_batch
 from seastar_gym.simulator.device_batch import DEVICES, DeviceBatch, program_of
 from seastar_gym.sweep.command import main as sweep_command
 from strokes import assert_same, finished
@@ -169,7 +168,6 @@ def test_states_and_observations_stay_on_the_device_where_torch_takes_them(devic
 
 def test_first_strokes_in_two_threads_do_not_meet(device, monkeypatch):
     monkeypatch.setattr(DEVICES[device], "_LOADED", {})
-    device_batch._kernels.__wrapped__.cache_clear()
     (commands,), whole = commands_of(1), Simulator(SMALL, N_ROBOTS, effort=True)
     whole.stroke(commands)
     others = [Simulator(SMALL, N_ROBOTS, effort=True, device=device) for _ in range(2)]

@@ -45,7 +45,6 @@ from seastar_gym.der.star import corner_place, tail_node
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import (
     N_LANES,
-    WIDTH,
     add_product,
     any_lane,
     load,
@@ -196,18 +195,18 @@ def moduli_at_nodes(mesh: Mesh, modulus: float | None, layer: float | None) -> n
     return OF_CYLINDERS * mesh.modulus_at_nodes
 
 
-def memory(contact: Contact | None, n_limbs: int, edges: int, n_points: int) -> ContactWork | None:
-    """Zeroed memory for the contact of one lane group, whose robots list the pairs they have in common once."""
+def memory(contact: Contact | None, n_limbs: int, edges: int, n_points: int, width: int) -> ContactWork | None:
+    """Zeroed memory for the contact of one lane group, of which `width` robots at a time list their pairs together."""
     if contact is None:
         return None
     short = edges <= SHORT_CHAIN
     near_edges = edges if short else MOST_NEAR_EDGES
     share = 2 * contact.n_pairs * edges * near_edges
-    capacity = 2 * contact.n_pairs * edges * min(edges, near_edges * WIDTH)
+    capacity = 2 * contact.n_pairs * edges * min(edges, near_edges * width)
     at_body = (2 * edges - 1) * n_limbs * contact.n_corners
     near_body = at_body if short else n_limbs * (NEAR_SIDES * edges + MOST_NEAR_EDGES * contact.n_corners)
     share_at_body = min(at_body, near_body)
-    capacity += min(at_body, share_at_body * WIDTH)
+    capacity += min(at_body, share_at_body * width)
 
     def rows(count: int = 2 * n_points) -> np.ndarray:
         return aligned_rows(count, N_LANES)

@@ -75,8 +75,8 @@ def cover_intervals(
 
 
 @kernel
-def rows_of(shape, group):
-    """The shape's rows of a lane group, or of all."""
+def rows_of(shape, group, like):
+    """The shape's rows of a lane group, or of all, of the form of other rows."""
     if shape.ndim == 1:
         return borrow(shape)
     return borrow(shape[group])
@@ -108,7 +108,7 @@ def advance(
     for group in range(q.shape[0]):
         cover_intervals(
             rods_rows, memory, tableau, fallback_tableau, rotation, borrow(q[group]), borrow(v[group]),
-            borrow(a[group]), borrow(peaks[group]), borrow(times), times.shape[0] - 1, rows_of(shape, group),
+            borrow(a[group]), borrow(peaks[group]), borrow(times), times.shape[0] - 1, rows_of(shape, group, rotation),
             n_turning, borrow(failed[group]), borrow(report[group]), bounds, borrow(effort[group]),
             effort.shape[1] > 0,
         )  # fmt: skip
