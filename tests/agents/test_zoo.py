@@ -11,7 +11,6 @@ import yaml
 
 import seastar_gym
 from agents.hyperparameters import Hyperparameters
-from seastar_gym import TASKS, TIMED
 
 FILE = Path(__file__).parents[2] / "agents" / "rl_zoo3" / "ppo.yml"
 SETTINGS = yaml.safe_load(FILE.read_text(encoding="utf-8"))
@@ -22,11 +21,13 @@ def ours(id):
     """Hyperparameters of the project for an id."""
     from agents.tasks.learning import OWN
 
-    if id in TASKS:
-        challenge, _, period, *_ = TASKS[id]
-        return Hyperparameters(**{"decision_period": period, **OWN[challenge]})
-    if id in TIMED:  # the trainings of docs/training.md
-        return Hyperparameters(decision_period=TIMED[id], discount=0.9, rollout=32, num_envs=64, gae_lambda=0.95)
+    row = seastar_gym.IDS[id]
+    if row.task is not None:
+        return Hyperparameters(**{"decision_period": row.decision_period, **OWN[row.task]})
+    if row.decision_period < 1.0:  # the trainings of docs/training.md
+        return Hyperparameters(
+            decision_period=row.decision_period, discount=0.9, rollout=32, num_envs=64, gae_lambda=0.95
+        )
     return Hyperparameters()
 
 

@@ -15,9 +15,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from seastar_gym.envs.robots import Floats
 
 TWICE = 2.0
 """Rounds of the second circle in one of the first."""

@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.envs.robots import Floats
 from seastar_gym.interrupts import held_back
-
-Floats = NDArray[np.float64]
 
 BOX = np.array([[-0.2, -0.4], [0.8, 0.4]])
 """Corners of the grid [m]: lower left, upper right."""

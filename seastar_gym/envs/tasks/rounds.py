@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from seastar_gym.envs.robots import Floats
 
 
 class _Sets(NamedTuple):

@@ -140,13 +140,13 @@ def _in_units(names: tuple[str, ...], columns: Floats) -> Floats:
     from seastar_gym.scene.csv_rows import UNITS, unit_of
 
     found: dict[str, Floats] = {}
-    for default, name, column in zip(("time", "angle"), names or ("", ""), columns, strict=True):
+    for default, name, numbers in zip(("time", "angle"), names or ("", ""), columns, strict=True):
         unit, known = unit_of(name), ("time", "angle")
         words = next((what for what in known if what in name.lower()), default)
         what = next((what for what in known if unit in UNITS[what]), words)
         if unit is not None and unit not in UNITS[what]:
             raise ValueError(f"{name} must be in {', '.join(UNITS['time'])} or {', '.join(UNITS['angle'])}.")
-        found[what] = column * UNITS[what].get(unit or "", 1.0)
+        found[what] = numbers * UNITS[what].get(unit or "", 1.0)
     if len(found) == 1:
         raise ValueError(f"one column must be a time and one an angle, not {' and '.join(names)}.")
     return np.array([found["time"], found["angle"]])
