@@ -30,9 +30,9 @@ its share to the others."""
 LARGEST_PART = 64
 """Lane groups in a part at most. An interrupt waits for the parts under way."""
 FEW = 0
-"""Robots at most in a batch that is advanced on NARROW lanes, to the same bits; N_LANES // 2 would fit. It is off. Few
-robots would be 1.4 times as fast, but who has small and large batches would wait for the compiler twice, some 10 s for
-each kind of scene, until machine code comes with the package."""
+"""Robots at most in a batch that is advanced on NARROW lanes, to the same bits; N_LANES // 2 would fit. It is off: with
+eight lanes few robots would be 1.4 times as fast, with four hardly, but who has small and large batches would wait for
+the compiler twice, some 10 s for each kind of scene, until machine code comes with the package."""
 ROWS = ("q", "v", "status")
 """Arrays of shape (n_groups, k, N_LANES) that an interval changes and the next one does not make anew."""
 MOVED = (*ROWS, "last_hub")
