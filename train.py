@@ -34,20 +34,32 @@ try:
 
     from agents.learner_file import resume
     from agents.ppo import make_model, make_training_env, require_device
-    from agents.training import efficiency
+    from agents.training import run as efficiency
     from agents.training.camera import policy_for_camera
-    from agents.training.filming import filmed_beside
-    from agents.training.folder import export, held, is_unbegun, recorded, resume_command, write_config
     from agents.training.options import Options, config_of, read_options, require_consent
     from agents.training.publishing import publish
-    from agents.training.robot import Robot, asked_for, keep, physics, robot_of
-    from agents.training.watch import Interruption, Watch
+    from agents.training.run import (
+        Interruption,
+        Robot,
+        Watch,
+        asked_for,
+        export,
+        filmed_beside,
+        held,
+        is_unbegun,
+        keep,
+        physics,
+        recorded,
+        resume_command,
+        robot_of,
+        write_config,
+    )
     from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
     from seastar_gym.command import ended_by_disk
     from seastar_gym.controllers.contract import Policy, actions_of, require_fit
     from seastar_gym.controllers.learned import load as load_policy
+    from seastar_gym.controllers.open_loop import scripted
     from seastar_gym.controllers.registry import load_agents
-    from seastar_gym.controllers.scripted import scripted
     from seastar_gym.envs.commands import MOST_LIMBS
     from seastar_gym.evaluation.comparison import evaluate
     from seastar_gym.evaluation.report.charts import Curve, read_progress

@@ -18,8 +18,7 @@ import tyro
 from seastar_gym.command import answered, run_command
 from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, load
 from seastar_gym.envs.options import make_scene
-from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
-from seastar_gym.evaluation.swim import TIME_LIMIT, Swim
+from seastar_gym.evaluation.swim import HELD_OUT_SEED, TIME_LIMIT, Swim, swim_many
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity

@@ -23,8 +23,7 @@ import safetensors.torch
 import torch
 from stable_baselines3 import PPO
 
-from agents.hyperparameters import Hyperparameters
-from agents.ppo import actor, describe, make_model, policy_of, require_device
+from agents.ppo import Hyperparameters, actor, describe, make_model, policy_of, require_device
 from seastar_gym import RewardWeights
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.checkpoint import DESCRIPTION, LEARNER, one_sentence, opened

@@ -4,7 +4,7 @@
     seastar evaluate --agents policy.safetensors pentagon --fidelity fast
 
 The batch writes observations, rewards and flags straight into the learner's memory (`out=Buffers(...)`). Defaults are
-the project's hyperparameters, `agents/hyperparameters.py` has the measurements behind them.
+the project's hyperparameters, `agents/ppo.py` has the measurements behind them.
 """
 
 import time

@@ -12,14 +12,14 @@ from seastar_gym.lazy import lazily
 
 if TYPE_CHECKING:
     from seastar_gym.accuracy.certificate import Certificate as Certificate
-    from seastar_gym.accuracy.chapter import scene_for as scene_for
+    from seastar_gym.accuracy.chapters import scene_for as scene_for
     from seastar_gym.accuracy.measure import certify as certify
-    from seastar_gym.envs.headings import HeadingTargets as HeadingTargets
+    from seastar_gym.envs.options import HeadingTargets as HeadingTargets
+    from seastar_gym.envs.options import RewardWeights as RewardWeights
     from seastar_gym.envs.randomization import DomainRandomization as DomainRandomization
     from seastar_gym.envs.randomization import LogUniform as LogUniform
     from seastar_gym.envs.randomization import Normal as Normal
     from seastar_gym.envs.randomization import Uniform as Uniform
-    from seastar_gym.envs.reward import RewardWeights as RewardWeights
     from seastar_gym.envs.sight import Sight as Sight
     from seastar_gym.envs.symmetry import SymmetryReduction as SymmetryReduction
     from seastar_gym.envs.symmetry import VectorSymmetryReduction as VectorSymmetryReduction
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from seastar_gym.envs.tasks.prizes import Prizes as Prizes
     from seastar_gym.envs.tasks.sim_to_real import SimToReal as SimToReal
     from seastar_gym.envs.tasks.station import Station as Station
-    from seastar_gym.model.schemes import register_scheme as register_scheme
     from seastar_gym.scene import AlongLimb as AlongLimb
     from seastar_gym.scene import Attachment as Attachment
     from seastar_gym.scene import Body as Body
@@ -58,6 +57,7 @@ if TYPE_CHECKING:
     from seastar_gym.scene import relaxation_time as relaxation_time
     from seastar_gym.scene.serial import register_part as register_part
     from seastar_gym.scene.terms import register_term as register_term
+    from seastar_gym.schemes import register_scheme as register_scheme
     from seastar_gym.simulator import Simulator as Simulator
     from seastar_gym.simulator import SolverStatus as SolverStatus
     from seastar_gym.simulator import State as State

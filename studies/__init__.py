@@ -6,7 +6,7 @@ They need the extra `studies`, those of `learning` also the extra `train`.
 import os
 import sys
 
-from seastar_gym.extras import is_command, require_extra
+from seastar_gym.files import is_command, require_extra
 
 require_extra("The studies", "studies", "matplotlib", "rich", "tqdm", "tyro")
 

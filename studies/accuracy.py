@@ -4,7 +4,7 @@
 infinitely many nodes per limb and infinitely short steps. The error of space is that of N nodes with short steps
 against the continuum, that of time is that of the setting against short steps with the same nodes. Their sum is what
 can be promised, because where they cancel it is by luck. An error is the hub's largest distance from the other path, at
-ends of strokes, as a fraction of that path's length. `--store` writes the tables of `seastar_gym.accuracy.chapter`.
+ends of strokes, as a fraction of that path's length. `--store` writes the tables of `seastar_gym.accuracy.chapters`.
 
 With 0.5, 0.2 and 0.1 s between decisions, robots have `SmaWires` and swim ten seconds, half of them by random commands,
 half by a random second that is repeated; their paths are seen at whole seconds. `--fresh` swims sequences that no table
@@ -22,13 +22,23 @@ from typing import Any, Literal
 
 import numpy as np
 
-from seastar_gym.accuracy import Certificate, Setting, chapter, chapters_certificate, timed_certificate
+from seastar_gym.accuracy import Certificate, Setting, chapters_certificate, timed_certificate
+from seastar_gym.accuracy import chapters as chapter
 from seastar_gym.accuracy import measure as measuring
-from seastar_gym.accuracy.certificate import CLASSES_VERSION
+from seastar_gym.accuracy.certificate import CLASSES_VERSION, at, physics
 from seastar_gym.accuracy.command import progress_bar
-from seastar_gym.accuracy.commands import CLASSES, draw_classes
-from seastar_gym.accuracy.measure import Errors, Progress, errors, machine, measure, path_lengths, rounded_up, swim_all
-from seastar_gym.accuracy.setting import at, physics
+from seastar_gym.accuracy.measure import (
+    CLASSES,
+    Errors,
+    Progress,
+    draw_classes,
+    errors,
+    machine,
+    measure,
+    path_lengths,
+    rounded_up,
+    swim_all,
+)
 from seastar_gym.gaits import PAIRS, STRAIGHT, pentagon_gait
 from seastar_gym.scene import Numerics, Scene, SmaWires
 from seastar_gym.scene.numerics import DAMPING, PRESETS, Fidelity, Resolution, SchemeName

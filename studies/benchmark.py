@@ -27,15 +27,15 @@ from unittest.mock import patch
 import gymnasium as gym
 import numpy as np
 
-from seastar_gym.der.stepping import stroke
 from seastar_gym.envs import observation
 from seastar_gym.files import save_figure
 from seastar_gym.gaits import STRAIGHT
+from seastar_gym.lanes.compile import entry_point
+from seastar_gym.lanes.dispatch import code_for
+from seastar_gym.lanes.registers import N_LANES, add_product, borrow, load, store
+from seastar_gym.rods import interval as stroke
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.simd.compilation import entry_point
-from seastar_gym.simd.dispatch import code_for
-from seastar_gym.simd.lanes import N_LANES, add_product, borrow, load, store
 from seastar_gym.simulator import Simulator, StrokeReport, batch
 from studies.frame import Results, Study, require_known, rounded
 from studies.gpu import EVERYTHING, scenes

@@ -17,8 +17,7 @@ from typing import Any
 
 import tyro
 
-from seastar_gym.extras import require_extra
-from seastar_gym.files import write_atomically
+from seastar_gym.files import require_extra, write_atomically
 from studies.frame import Results, Study, require_known
 from studies.pages import show, stale
 from studies.provenance import provenance

@@ -10,7 +10,7 @@ import numpy as np
 
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import bundled_file, load
-from seastar_gym.controllers.scripted import scripted
+from seastar_gym.controllers.open_loop import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.films import Picture, shrunk, write_gif
 from seastar_gym.evaluation.rollout import Info, rollout

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from seastar_gym import DomainRandomization, HeadingTargets, Sight, Uniform
 from seastar_gym.envs.vector import Buffers
 from seastar_gym.files import save_figure
+from seastar_gym.lanes import cuda
 from seastar_gym.scene import (
     AlongLimb,
     Attachment,
@@ -38,10 +39,8 @@ from seastar_gym.scene import (
     ThermalSma,
     relaxation_time,
 )
-from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
-from seastar_gym.scene.fluid import Water
 from seastar_gym.scene.numerics import Fidelity, SchemeName
-from seastar_gym.simd import cuda
+from seastar_gym.scene.water import GridCurrent, ShearCurrent, UniformCurrent, Vortex, Water
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study, require_known, rounded
 from studies.operations import count_operations, numbers_moved

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
 
-from seastar_gym.simd.compilation import kernel_sources
+from seastar_gym.lanes.compile import kernel_sources
 from studies.frame import Results, Study
 
 PACKAGE = "seastar_gym"

@@ -1,6 +1,6 @@
 """Number of floating-point operations of the kernels, counted by running their source on lanes that count.
 
-Kernels that Python calls run in Python, see seastar_gym/simd/numpy_lanes.py, so the count is that of the code that
+Kernels that Python calls run in Python, see seastar_gym/lanes/plain.py, so the count is that of the code that
 runs, for one robot of any scene. It does not depend on the machine, and tests bound it.
 """
 
@@ -10,17 +10,16 @@ from unittest.mock import patch
 
 import numpy as np
 
-from seastar_gym.der.potential import assemble_hub, solve_hub, sweep_limb
-from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.newton import take_step
-from seastar_gym.der.stepping.schemes import scheme_of
-from seastar_gym.der.stepping.stages import begin_stage, end_step
-from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
-from seastar_gym.model.rods import make_rods
+from seastar_gym.lanes import plain as numpy_lanes
+from seastar_gym.lanes.plain import Lanes, Mask
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.model import make_rods
+from seastar_gym.rods.bundles import make_work
+from seastar_gym.rods.newton import take_step
+from seastar_gym.rods.potential import assemble_hub, solve_hub, sweep_limb
+from seastar_gym.rods.step import begin_stage, end_step, scheme_of
+from seastar_gym.rods.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.scene import Scene
-from seastar_gym.simd import numpy_lanes
-from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simd.numpy_lanes import Lanes, Mask
 from seastar_gym.simulator import Simulator
 
 FLOPS = {"add": 1, "multiply": 1, "fused": 2, "divide": 1, "root": 1}

@@ -29,8 +29,8 @@ from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simulator import Simulator, State, StrokeReport
-from seastar_gym.simulator.pauses import completed
-from seastar_gym.simulator.schedule import step_times
+from seastar_gym.simulator.drive import step_times
+from seastar_gym.simulator.simulator import completed
 from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
 from studies.frame import Floats, Results, Study
 from studies.pages import markdown

@@ -10,16 +10,13 @@ from numpy.typing import NDArray
 from seastar_gym import TASKS
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.greedy import Searcher, displacement_map, waypoints_of
+from seastar_gym.envs.options import RewardWeights
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
-from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.tasks.discs import rims
-from seastar_gym.envs.tasks.obst_trap import ObstTrap
+from seastar_gym.envs.tasks.obst_trap import ObstTrap, rims
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.station import Station
-from seastar_gym.evaluation.measures import measure_of_task
-from seastar_gym.evaluation.rollout import Batch, rollout
-from seastar_gym.evaluation.tasks import RECORDED, make_batch
+from seastar_gym.evaluation.rollout import RECORDED, Batch, make_batch, measure_of_task, rollout
 from seastar_gym.scene.numerics import Fidelity
 from studies.frame import Floats, Results, Study, require_known
 from studies.pages import markdown, show

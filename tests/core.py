@@ -55,7 +55,7 @@ KINDS = {
 
 def wanted_by(code: str) -> set[str]:
     """Kinds of machine code that Python code asks for, in this process."""
-    from seastar_gym.simd.compilation import _DigestCache
+    from seastar_gym.lanes.compile import _DigestCache
 
     found, load = set(), _DigestCache.load_overload
 
@@ -71,7 +71,7 @@ def wanted_by(code: str) -> set[str]:
 
 def core_kinds() -> set[str]:
     """Kinds of machine code of the core, compiled by processes side by side where it is not yet on the disk."""
-    from seastar_gym.simd.compilation import PACKAGE, kept_code
+    from seastar_gym.lanes.compile import PACKAGE, kept_code
 
     def run(code: str) -> str:
         program = f"import json, core; print(json.dumps(sorted(core.wanted_by({code!r}))))"
@@ -114,7 +114,8 @@ class Core:
             self.leave("takes long")
 
     def _watch(self, patch: pytest.MonkeyPatch) -> None:
-        from seastar_gym.simd import compilation, cuda, scalar
+        from seastar_gym.lanes import compile as compilation
+        from seastar_gym.lanes import cuda, scalar
 
         start, load = subprocess.Popen.__init__, compilation._DigestCache.load_overload
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from seastar_gym import Simulator
-from seastar_gym.der.rods import Rods
-from seastar_gym.simulator.body_frame import root_places
+from seastar_gym.rods.bundles import Rods
+from seastar_gym.simulator.state import root_places
 
 
 def momenta(rods: Rods, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from seastar_gym.der.rods import Rods, Work
-from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simd.numpy_lanes import Lanes, Mask
+from seastar_gym.lanes.plain import Lanes, Mask
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.rods.bundles import Rods, Work
 
 NO_RODS, NO_WORK = (bundle(*[None] * len(bundle._fields)) for bundle in (Rods, Work))
 """Bundles of scenes that name nothing."""

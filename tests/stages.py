@@ -11,19 +11,19 @@ from continuum_oracle import Continuum
 from hubs import robot_with
 from oracle import Star
 from seastar_gym import Scene, Seastar, SmaPulse, Water
-from seastar_gym.der.body.body import freeze_body, move_roots, place_roots
-from seastar_gym.der.contact.broad_phase import freeze_contact
-from seastar_gym.der.contact.coupled import solve_coupled
-from seastar_gym.der.potential import factorise
-from seastar_gym.der.rods import Rods, Work, make_work
-from seastar_gym.der.stepping.newton import move_along
-from seastar_gym.der.stepping.stages import Stage
-from seastar_gym.der.terms.damping import freeze_strains
-from seastar_gym.der.terms.fluid import freeze_fluid
-from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
-from seastar_gym.model.rods import make_rods
-from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simd.numpy_lanes import Lanes, Mask
+from seastar_gym.lanes.plain import Lanes, Mask
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.model import make_rods
+from seastar_gym.rods.body import freeze_body, move_roots, place_roots
+from seastar_gym.rods.bundles import Rods, Work, make_work
+from seastar_gym.rods.contact.coupled import solve_coupled
+from seastar_gym.rods.contact.pairs import freeze_contact
+from seastar_gym.rods.newton import move_along
+from seastar_gym.rods.potential import factorise
+from seastar_gym.rods.step import Stage
+from seastar_gym.rods.terms.damping import freeze_strains
+from seastar_gym.rods.terms.fluid import freeze_fluid
+from seastar_gym.rods.terms.hub import Actuation, set_natural_hub_angles
 from slopes import nodes, plain, rows
 
 EVERYONE = Mask(np.ones(N_LANES, bool))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from seastar_gym import Simulator, State, StrokeReport
-from seastar_gym.simulator.pauses import completed
+from seastar_gym.simulator.simulator import completed
 
 
 def finished(stroke: Iterator[float], seen: Callable[[float], Any] = lambda time: time) -> tuple[list, StrokeReport]:

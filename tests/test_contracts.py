@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parent.parent
 LINT = "import sys; from importlinter.cli import lint_imports; sys.exit(lint_imports(no_cache=True))"
 PLANTED = [
     None,
-    ("seastar_gym/simulator/clock.py", "seastar_gym.envs.reward"),
+    ("seastar_gym/simulator/state.py", "seastar_gym.envs.options"),
     ("agents/ppo.py", "studies"),
     ("seastar_gym/scene/limb.py", "numba"),
 ]

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from seastar_gym.command import run_command
-from seastar_gym.extras import MissingExtra
+from seastar_gym.files import MissingExtra
 
 ROOT = Path(__file__).resolve().parent.parent
 OF_STUDIES = ("matplotlib", "rich", "tqdm", "tyro")

@@ -23,7 +23,7 @@ from seastar_gym.evaluation.scores import Scores
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import beside, is_left_behind, part_name, read_json, write_atomically, write_json
 from seastar_gym.identify.measurement import Measurement
-from seastar_gym.plant.logs import Logs
+from seastar_gym.plant.swim import Logs
 from seastar_gym.scene.csv_rows import read_rows
 from seastar_gym.scene.scene_file import load_scene
 

@@ -11,7 +11,7 @@ from fuzz import odd
 from odd_values import ODD, REFUSED, outcome, taken
 from refusals import assert_refused
 from seastar_gym import AlongLimb, Body, Limb, MeasuredCurve, Scene, Seastar, Strip
-from seastar_gym.controllers.scripted import OpenLoopPolicy
+from seastar_gym.controllers.open_loop import OpenLoopPolicy
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.paths import make_path
 from seastar_gym.identify import Measurement

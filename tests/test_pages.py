@@ -14,9 +14,10 @@ import pytest
 
 import seastar_gym
 from seastar_gym import Numerics, Scene
-from seastar_gym.accuracy import endurance, measure
+from seastar_gym.accuracy import measure
+from seastar_gym.accuracy import measure as endurance
 from seastar_gym.envs import paths
-from seastar_gym.evaluation import many
+from seastar_gym.evaluation import swim as many
 from seastar_gym.scene import numerics
 
 ROOT = Path(__file__).parents[1]
@@ -146,6 +147,6 @@ def test_pages_and_files_that_code_and_pages_name_are_there():
     assert len(named) > 10
     assert [(file, page) for file, page in named if not (ROOT / "docs" / page).is_file()] == []
     extending = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
-    code = re.findall(r"`((?:seastar_gym|tests|der|model)/[\w/]+\.py)`", extending)
+    code = re.findall(r"`((?:seastar_gym|tests|rods)/[\w/]+\.py)`", extending)
     assert len(code) > 8
     assert [name for name in code if not any((base / name).is_file() for base in (ROOT, ROOT / "seastar_gym"))] == []

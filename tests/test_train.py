@@ -22,10 +22,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from agents.training import efficiency, filming
-from agents.training.efficiency import Efficiency
+from agents.training import run as efficiency
+from agents.training import run as filming
 from agents.training.options import Options, read_options, saved_options
-from agents.training.robot import robot_of
+from agents.training.run import Efficiency, robot_of
 from evaluation.made_up import made_up_swim
 from later import Later
 from refusals import assert_told
@@ -37,7 +37,7 @@ from seastar_gym.files import part_name
 
 train = Later("train")
 publishing = Later("agents.training.publishing")
-run_folder = Later("agents.training.folder")
+run_folder = Later("agents.training.run")
 
 REPOSITORY = Path(__file__).parents[1]
 TINY = shlex.split(
@@ -512,7 +512,7 @@ def lost_process(command, **options):
 def test_the_script_is_filmed_beside_the_training_and_else_afterwards(tmp_path, monkeypatch):
     """The film has the same bytes wherever it is made: beside, here on one processor, and where a process is lost."""
     monkeypatch.setattr("agents.training.options.TIME_LIMIT", 3.0)
-    monkeypatch.setattr("agents.training.filming.processors", lambda: 2)
+    monkeypatch.setattr("agents.training.run.processors", lambda: 2)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     there, made = {}, train.compare
 
@@ -526,14 +526,14 @@ def test_the_script_is_filmed_beside_the_training_and_else_afterwards(tmp_path, 
     for name, popen in {"none": no_process, "lost": lost_process}.items():
         monkeypatch.setattr(filming, "subprocess", SimpleNamespace(DEVNULL=subprocess.DEVNULL, Popen=popen))
         assert filmed(tmp_path / name, "--decision-period", "0.5") == beside
-    monkeypatch.setattr("agents.training.filming.processors", lambda: 1)
+    monkeypatch.setattr("agents.training.run.processors", lambda: 1)
     assert filmed(tmp_path / "alone", "--decision-period", "0.5") == beside
     assert [there[tmp_path / name] for name in ("none", "lost", "alone")] == [None] * 3
     assert not list(tmp_path.glob("seastar-film-*"))
 
 
 def test_a_training_that_is_stopped_ends_the_process_that_films(tmp_path, monkeypatch):
-    monkeypatch.setattr("agents.training.filming.processors", lambda: 2)
+    monkeypatch.setattr("agents.training.run.processors", lambda: 2)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     begun, begin = [], filming._begun
     monkeypatch.setattr(filming, "_begun", lambda words: begun.append(begin(words)) or begun[-1])

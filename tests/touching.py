@@ -6,14 +6,14 @@ import numpy as np
 
 from oracle import Star
 from seastar_gym import Contact, Scene, Seastar, SmaPulse
-from seastar_gym.der.contact.broad_phase import freeze_contact
-from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.stages import Stage
-from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
-from seastar_gym.model.rods import make_rods
+from seastar_gym.lanes.plain import Lanes
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.model import make_rods
+from seastar_gym.rods.bundles import make_work
+from seastar_gym.rods.contact.pairs import freeze_contact
+from seastar_gym.rods.step import Stage
+from seastar_gym.rods.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.scene.robot import Discretisation
-from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simd.numpy_lanes import Lanes
 from slopes import rotated, rows
 
 GAMMA = 2e-4

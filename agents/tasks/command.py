@@ -23,15 +23,14 @@ from agents.cards import training_facts
 from agents.distillation import ENOUGH
 from agents.ppo import policy_of
 from agents.tasks.learning import LEARNERS, imitate, train
-from agents.training.folder import versions_and_machine
+from agents.training.run import versions_and_machine
 from seastar_gym import TASKS, SmaPulse
 from seastar_gym.command import answered
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.learned import LearnedPolicy, load, save
-from seastar_gym.evaluation.many import HELD_OUT_SEED
-from seastar_gym.evaluation.measures import measure_of
-from seastar_gym.evaluation.statistics import mean_with_interval
-from seastar_gym.evaluation.tasks import env_of, swim_episodes
+from seastar_gym.evaluation.results import mean_with_interval
+from seastar_gym.evaluation.rollout import env_of, measure_of, swim_episodes
+from seastar_gym.evaluation.swim import HELD_OUT_SEED
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity

@@ -8,16 +8,14 @@ import torch
 from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 
-from agents.coasting import with_coasting
 from agents.distillation import PAST, distil
-from agents.hyperparameters import Hyperparameters
-from agents.ppo import make_model
+from agents.ppo import Hyperparameters, make_model, with_coasting
 from seastar_gym import TASKS
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.learned import LearnedPolicy, bundled_file, load
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
 from seastar_gym.envs.tasks.obst_trap import ObstTrap
-from seastar_gym.evaluation.tasks import make_batch
+from seastar_gym.evaluation.rollout import make_batch
 from seastar_gym.scene.numerics import Fidelity
 
 Batch = gym.vector.VectorEnv[Any, Any, Any]
@@ -46,7 +44,7 @@ class Learner(NamedTuple):
     told_the_way: bool = False
     """Whether its reward measures the way around all discs of `ObstTrap`; it swims the task as it is."""
     coasting: bool = False
-    """Whether its reward measures progress by where the hub would come to rest, see `agents.coasting`."""
+    """Whether its reward measures progress by where the hub would come to rest, see `agents.ppo`."""
 
     def wrap(self, batch: Batch) -> Batch:
         """The batch as the learner sees it."""

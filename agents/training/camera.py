@@ -8,11 +8,9 @@ import torch
 from tqdm import tqdm
 
 from agents.distillation import ENOUGH, PAST, distil
-from agents.hyperparameters import Hyperparameters
-from agents.ppo import make_training_batch
-from agents.training.folder import held, resume_command, versions_and_machine
+from agents.ppo import Hyperparameters, make_training_batch
 from agents.training.options import Options, config_of
-from agents.training.robot import robot_of
+from agents.training.run import held, resume_command, robot_of, versions_and_machine
 from seastar_gym.controllers.learned import LearnedPolicy, load, save
 from seastar_gym.envs.sight import Camera, read_camera, told
 from seastar_gym.envs.symmetry import VectorFrameStack

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 import tyro
 
-from agents.hyperparameters import Hyperparameters
+from agents.ppo import Hyperparameters
 from seastar_gym import RewardWeights
 from seastar_gym.controllers.learned import reason_of
 from seastar_gym.envs.commands import decisions_in

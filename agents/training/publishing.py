@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from agents.cards import HELD_OUT_PATHS, write_card
-from agents.training.folder import resume_command
 from agents.training.options import Options
+from agents.training.run import resume_command
 from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, bundled_file
 from seastar_gym.controllers.learned import load as load_policy
 from seastar_gym.controllers.learned import save as save_policy
 from seastar_gym.envs.options import make_scene
-from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
+from seastar_gym.evaluation.swim import HELD_OUT_SEED, swim_many
 
 
 def publish(options: Options, folder: Path) -> int:

@@ -4,8 +4,7 @@
 chapter's robot come with the package (chapter.py).
 """
 
-from seastar_gym.accuracy.certificate import Certificate, as_certificate
-from seastar_gym.accuracy.chapter import chapters_certificate, scene_for, timed_certificate
-from seastar_gym.accuracy.setting import Setting
+from seastar_gym.accuracy.certificate import Certificate, Setting, as_certificate
+from seastar_gym.accuracy.chapters import chapters_certificate, scene_for, timed_certificate
 
 __all__ = ["Certificate", "Setting", "as_certificate", "chapters_certificate", "scene_for", "timed_certificate"]

@@ -2,7 +2,7 @@
 
 The scene is a Python file that defines `scene`, a JSON file as `Scene.to_dict` writes it, or none for the chapter's. A
 file of Python is executed. Errors are those of the hub's path in space, in time and in sum, over classes of commands
-that are listed in seastar_gym/accuracy/commands.py, against swims with 37 nodes per limb and steps of 0.25 ms:
+that are listed in seastar_gym/accuracy/measure.py, against swims with 37 nodes per limb and steps of 0.25 ms:
 the largest of a class, and the typical one, which is the median.
 
 Writes a certificate (JSON), and a picture of error over speed where matplotlib is installed. `Certificate.load(file)`
@@ -18,8 +18,7 @@ from pathlib import Path
 from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.accuracy.measure import SAMPLES, Progress, certify
 from seastar_gym.command import DEFAULT, answered, command_parser
-from seastar_gym.extras import require_extra
-from seastar_gym.files import save_figure, write_json
+from seastar_gym.files import require_extra, save_figure, write_json
 from seastar_gym.scene.checks import require_error
 from seastar_gym.scene.scene_file import load_scene
 

@@ -6,33 +6,206 @@ of space is that of few nodes with short steps against many nodes; that of time 
 with the same nodes; both are largest distances of the hub at ends of strokes, as fractions of the length of the hub's
 path through the water. The sum of the two bounds the whole error, also where they cancel. Long swims tell which
 settings gather energy (endurance.py).
+
+Classes of command sequences that errors are measured over.
+
+Every class is drawn anew from a seed, as many sequences as are asked for, ten strokes each:
+
+random ternary          -1, 0 or 1 for every limb and stroke
+random continuous       from [-1, 1] for every limb and stroke
+repeated ternary        one such command, repeated
+repeated continuous
+alternating ternary     two such commands in turn
+alternating continuous
+opposed neighbours      two neighbours turned towards or from each other, by 1, another pair in every stroke
+small                   random continuous, a tenth of the amplitude
+
+Whether a setting gathers energy over long swims.
+
+Errors are measured over ten strokes. The implicit midpoint rule damps nothing, and on some meshes it resonates with
+some steps: the robot gathers energy for a hundred strokes, and only then swims differently. Kinetic energies at the
+ends of strokes tell, without a swim of short steps to compare with. They are relative to the water, which may carry the
+robot off.
+
+A robot as the water sees it: its start and its way relative to the current.
+
+A uniform current is a translation: what swims in it has the errors of still water, though it is carried off. Where the
+water differs from place to place, the current is that at the hub.
 """
 
 import os
 import platform
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.accuracy.certificate import CLASSES_VERSION, MOST_SAMPLES, Certificate
-from seastar_gym.accuracy.commands import ACTIONS, CLASSES, PROMISED, STROKES, draw_classes
-from seastar_gym.accuracy.endurance import energy_growth
-from seastar_gym.accuracy.setting import Setting, at, physics
-from seastar_gym.accuracy.water import carried, velocity, with_the_water
+from seastar_gym.accuracy.certificate import CLASSES_VERSION, MOST_SAMPLES, Certificate, Setting, at, physics
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.model import velocities_at
 from seastar_gym.processors import processors
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.checks import require_count, require_seed, shown
 from seastar_gym.scene.numerics import DAMPING, Resolution
 from seastar_gym.scene.robot import Discretisation
-from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import Simulator
+from seastar_gym.simulator.watches import ENOUGH, WINDOW
 from seastar_gym.version import __version__
 
 Floats = NDArray[np.float64]
+Draw = Callable[[np.random.Generator, int, int], Floats]
+"""Commands of n sequences for a number of limbs, from a generator, shape (STROKES, n, n_limbs)."""
+
+STROKES = 10
+SMALL = 0.1
+"""Share of the amplitude of small commands."""
+
+
+def _ternary(rng: np.random.Generator, *shape: int) -> Floats:
+    """Commands of -1, 0 and 1 that are not all zero for any robot."""
+    found = rng.integers(-1, 2, shape).astype(float)
+    still = ~found.any(axis=-1)
+    found[still, rng.integers(0, shape[-1], int(still.sum()))] = 1.0
+    return found
+
+
+def _continuous(rng: np.random.Generator, *shape: int) -> Floats:
+    return rng.uniform(-1.0, 1.0, shape)
+
+
+def _each(draw: Callable[..., Floats], different: int) -> Draw:
+    """Sequences of so many different commands in turn."""
+
+    def sequences(rng: np.random.Generator, n: int, n_limbs: int) -> Floats:
+        return np.tile(draw(rng, different, n, n_limbs), (STROKES // different, 1, 1))
+
+    return sequences
+
+
+def _opposed(rng: np.random.Generator, n: int, n_limbs: int) -> Floats:
+    commands = np.zeros((STROKES, n, n_limbs))
+    first, sign = rng.integers(0, n_limbs, (STROKES, n)), rng.choice([-1.0, 1.0], (STROKES, n))
+    np.put_along_axis(commands, first[..., None], sign[..., None], axis=-1)
+    if n_limbs > 1:
+        np.put_along_axis(commands, ((first + 1) % n_limbs)[..., None], -sign[..., None], axis=-1)
+    return commands
+
+
+def _small(rng: np.random.Generator, n: int, n_limbs: int) -> Floats:
+    return SMALL * _continuous(rng, STROKES, n, n_limbs)
+
+
+CLASSES: dict[str, Draw] = {
+    "random ternary": _each(_ternary, STROKES),
+    "random continuous": _each(_continuous, STROKES),
+    "repeated ternary": _each(_ternary, 1),
+    "repeated continuous": _each(_continuous, 1),
+    "alternating ternary": _each(_ternary, 2),
+    "alternating continuous": _each(_continuous, 2),
+    "opposed neighbours": _opposed,
+    "small": _small,
+}
+"""Classes by name."""
+PROMISED = tuple(name for name in CLASSES if name != "small")
+"""Classes of full amplitude. Paths of small commands are so short that errors are large shares of them."""
+ACTIONS = ("random ternary", "repeated ternary", "alternating ternary", "opposed neighbours")
+"""Classes that an environment's actions can make."""
+
+
+def draw_classes(n: int, n_limbs: int, seed: int) -> Floats:
+    """n sequences of every class, one class after another, shape (STROKES, len(CLASSES) n, n_limbs)."""
+    rng = np.random.default_rng(seed)
+    return np.concatenate([draw(rng, n, n_limbs) for draw in CLASSES.values()], axis=1)
+
+
+def velocity(scene: Scene, places: Floats) -> Floats:
+    """Velocity of the water [m/s] at places [m], shape (..., 2), as `velocities_at`; zero without a current."""
+    current = _current(scene)
+    return np.zeros_like(places) if current is None else velocities_at(current, places)
+
+
+def with_the_water(scene: Scene, n_robots: int, threads: int | None = None, error_bars: bool = False) -> Simulator:
+    """Robots at rest in the water: with the hub at the origin, and with the velocity of the water there."""
+    simulator = Simulator(scene, n_robots, threads, error_bars)
+    if _current(scene) is not None:
+        state = simulator.get_state()
+        simulator.set_state(state._replace(velocities=state.velocities + velocity(scene, np.zeros(2))))
+    return simulator
+
+
+def carried(scene: Scene, hub: Floats) -> Floats:
+    """How far the water carries a hub in every stroke [m]: by its velocity where the stroke begins and where it ends.
+
+    hub: At the ends of strokes from the origin [m], shape (strokes, n, 2), as is the result.
+    """
+    at_ends = velocity(scene, np.concatenate([np.zeros((1, *hub.shape[1:])), hub]))
+    return scene.actuator.period * 0.5 * (at_ends[:-1] + at_ends[1:])
+
+
+def _current(scene: Scene) -> Any:
+    return None if scene.fluid is None else scene.fluid.current
+
+
+LONG = 200
+"""Strokes of a long swim."""
+NOISE = 1e-6
+"""Share of the largest early energy of all swims, below which an energy is noise. Equal limbs that all turn alike end
+their strokes at rest, with 1e-20 to 1e-28 of it, which is rounding; other swims of 2 to 6 equal limbs have at least
+0.1."""
+
+
+def energy_growth(scene: Scene, samples: int = 8, seed: int = 0) -> float:
+    """Largest kinetic energy of late strokes over that of early ones, the worst of some long swims; inf for a failure.
+
+    Robots repeat one command, or two in turn, `samples` of each, and swim the alternation of mirrored pairs. A setting
+    that gathers no energy has about 1, one that resonates ten and more; at `ENOUGH` the swims end.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "The kinetic energy", RuntimeWarning)  # it is told by the result
+        return float(_energy_growths(scene, long_swims(scene.robot.n_limbs, samples, seed)).max())
+
+
+def _energy_growths(scene: Scene, commands: Floats) -> Floats:
+    """Growth of the energy of each long swim, shape (1 + 2 samples,)."""
+    n = commands.shape[1]
+    simulator, energies, failed = with_the_water(scene, n), np.empty((LONG, n)), np.zeros(n, bool)
+    for stroke in range(LONG):
+        failed |= simulator.stroke(commands[stroke % STROKES]).status > 0
+        energies[stroke] = simulator.kinetic_energy(relative_to_water=True)
+        growth = _growth(energies[:WINDOW], energies[stroke : stroke + 1]) if stroke >= WINDOW else np.zeros(n)
+        growth[failed] = np.inf
+        if growth.max() >= ENOUGH:
+            return growth
+    return np.where(failed, np.inf, _growth(energies[:WINDOW], energies[-WINDOW:]))
+
+
+def _growth(early: Floats, late: Floats) -> Floats:
+    """Largest late energy over the largest early one of the same swim; both of shape (strokes, n)."""
+    first = early.max(axis=0)
+    least = max(NOISE * first.max(), np.finfo(float).tiny)
+    return np.asarray(late.max(axis=0) / np.maximum(first, least))
+
+
+def long_swims(n_limbs: int, samples: int, seed: int) -> Floats:
+    """Commands that are repeated in long swims, shape (STROKES, 1 + 2 samples, n_limbs)."""
+    rng = np.random.default_rng(seed)
+    drawn = [CLASSES[name](rng, samples, n_limbs) for name in ("repeated ternary", "alternating ternary")]
+    return np.concatenate([mirrored_pairs(n_limbs)[:, None], *drawn], axis=1)
+
+
+def mirrored_pairs(n_limbs: int) -> Floats:
+    """Limbs 2 and n opposed, then 3 and n - 1, in turn: a fast straight gait, shape (STROKES, n_limbs)."""
+    commands = np.zeros((STROKES, n_limbs))
+    for stroke in range(STROKES):
+        limb = 1 + stroke % max(1, (n_limbs - 1) // 2)
+        commands[stroke, limb % n_limbs], commands[stroke, -limb] = 1.0, -1.0
+    return commands
+
+
 Progress = Callable[[float], None]
 """Called with the share of the work that is done, from 0 to 1."""
 

@@ -15,11 +15,11 @@ import gymnasium as gym
 import numpy as np
 
 from seastar_gym.command import answered, command_parser
-from seastar_gym.der.energy import energies
-from seastar_gym.evaluation.tasks import make_task
+from seastar_gym.evaluation.rollout import make_task
+from seastar_gym.rods.potential import energies
 from seastar_gym.scene import Scene
+from seastar_gym.scene.number import numbers_of, with_numbers
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.per_robot import numbers_of, with_numbers
 from seastar_gym.scene.scene_file import load_scene
 from seastar_gym.simulator import Simulator
 

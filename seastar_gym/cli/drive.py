@@ -28,16 +28,13 @@ from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import make_scene, scene_at
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.sight import FOR_CAMERA, Sight, told
-from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.pictures import draw_traces
-from seastar_gym.evaluation.swim import Swim, swim
-from seastar_gym.evaluation.tasks import require_seen
-from seastar_gym.extras import require_extra
-from seastar_gym.files import write_atomically
+from seastar_gym.evaluation.rollout import require_seen
+from seastar_gym.evaluation.swim import PATH_HELP, Swim, load_path, swim
+from seastar_gym.files import require_extra, write_atomically
 from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.lines import LinePlant, open_serial
-from seastar_gym.plant.plant import Plant, PlantError
-from seastar_gym.plant.simulated import SimulatedPlant, with_wires
+from seastar_gym.plant.plant import Plant, PlantError, SimulatedPlant, with_wires
 from seastar_gym.plant.swim import PlantSwim
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number

@@ -29,13 +29,12 @@ from seastar_gym.envs.options import scene_at
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.evaluation import scores
 from seastar_gym.evaluation.comparison import evaluate
-from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.results import Row, write_csv
+from seastar_gym.evaluation.rollout import require_task, task_ids
 from seastar_gym.evaluation.scores import Scores, measured, policies_of
-from seastar_gym.evaluation.swim import TIME_LIMIT
-from seastar_gym.evaluation.tasks import require_task, task_ids
+from seastar_gym.evaluation.swim import PATH_HELP, TIME_LIMIT, load_path
 from seastar_gym.evaluation.trials import SETS, as_text, trials
-from seastar_gym.extras import require_extra
+from seastar_gym.files import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_number, require_period
 from seastar_gym.scene.numerics import Fidelity

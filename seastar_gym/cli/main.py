@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from seastar_gym.command import command_parser, run_command
-from seastar_gym.extras import MissingExtra
+from seastar_gym.files import MissingExtra
 from seastar_gym.version import __version__
 
 

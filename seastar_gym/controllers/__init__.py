@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from seastar_gym.controllers.learned import LearnedPolicy as LearnedPolicy
     from seastar_gym.controllers.learned import load as load
     from seastar_gym.controllers.learned import pretrained as pretrained
+    from seastar_gym.controllers.open_loop import scripted as scripted
     from seastar_gym.controllers.planner import Planner as Planner
     from seastar_gym.controllers.registry import load_agent as load_agent
     from seastar_gym.controllers.registry import load_agents as load_agents
-    from seastar_gym.controllers.scripted import scripted as scripted
 else:
     __all__, __getattr__, __dir__ = lazily(__name__)

@@ -10,14 +10,14 @@ from typing import Any, NamedTuple, cast, get_args
 
 from seastar_gym.envs import TASKS
 from seastar_gym.envs.commands import Actions, Discrete, checked_decision_period, choices
-from seastar_gym.envs.layout import N_STATIONS, OBSERVATION_LAYOUT, Entry, Layout, memory_size
+from seastar_gym.envs.observation import N_STATIONS, OBSERVATION_LAYOUT, Entry, Layout, memory_size
 from seastar_gym.envs.randomization import Distribution
 from seastar_gym.envs.sight import Drawn, Sight, require_action_delay
 from seastar_gym.envs.symmetry import FrameStack, Symmetry, memory_mirror, symmetry_of
 from seastar_gym.envs.symmetry.symmetry import MOST_PAST
 from seastar_gym.files import parse_json
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import Mirror
+from seastar_gym.scene.actuators.base import Mirror
 from seastar_gym.scene.checks import as_float, is_whole_number, require_count, require_kind, shown
 from seastar_gym.scene.serial import read, to_dict
 from seastar_gym.version import __version__

@@ -19,10 +19,10 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import JUMP, Actuator, ActuatorBase, complete
+from seastar_gym.scene.actuators.base import JUMP, Actuator, ActuatorBase, complete
 from seastar_gym.scene.checks import require_choice, require_unmasked
+from seastar_gym.scene.number import batch_size
 from seastar_gym.scene.numerics import require_duration
-from seastar_gym.scene.per_robot import batch_size
 
 Discrete: TypeAlias = Literal["limbs", "joint", "pairs"]
 """Action modes with a finite number of actions."""

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.robots import Robots
 from seastar_gym.envs.scenery import NOTHING, Scenery
-from seastar_gym.scene.currents import AnyCurrent
-from seastar_gym.scene.per_robot import chosen
+from seastar_gym.scene.number import chosen
+from seastar_gym.scene.water import AnyCurrent
 from seastar_gym.simulator import Simulator
 
 FloatArray = NDArray[np.float64]

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_finite, require_number, shown
-from seastar_gym.scene.number import make_floats
-from seastar_gym.scene.per_robot import numbers_of, with_numbers
+from seastar_gym.scene.number import make_floats, numbers_of, with_numbers
 from seastar_gym.scene.serial import register_part
 
 LIMB_STRENGTHS = "limb_strengths"

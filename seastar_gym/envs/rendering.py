@@ -18,7 +18,7 @@ from seastar_gym.envs.frame import Frame, frames_of
 from seastar_gym.envs.robots import Robots
 from seastar_gym.envs.scenery import NOTHING, Flow, Scenery, flow_of
 from seastar_gym.scene import Seastar
-from seastar_gym.scene.currents import AnyCurrent
+from seastar_gym.scene.water import AnyCurrent
 
 FloatArray = NDArray[np.float64]
 

@@ -17,24 +17,31 @@ from typing import Any, Literal, NamedTuple, Protocol, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.accuracy.info import errors_in_info, read_certificate
+from seastar_gym.accuracy.chapters import errors_in_info, read_certificate
 from seastar_gym.envs.commands import action_masks, can_be_masked, masked_limbs
 from seastar_gym.envs.delays import Lag, Piece, Tracker
-from seastar_gym.envs.layout import N_STATIONS, Entry, Layout
-from seastar_gym.envs.observation import axes_of, lengths_of, observed_rows, rows_on_device, to_float32
-from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.observation import (
+    N_STATIONS,
+    Entry,
+    Layout,
+    axes_of,
+    lengths_of,
+    observed_rows,
+    rows_on_device,
+    to_float32,
+)
+from seastar_gym.envs.options import SwimOptions, pulses_of
 from seastar_gym.envs.randomization import ACTION_DELAY, LIMB_STRENGTHS, DomainRandomization, drawn_scene
-from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.sight import Lateness, Sees, Sight, bounds_of, entries_of, stations_seen
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import Mirror, complete
+from seastar_gym.scene.actuators.base import Mirror, complete
 from seastar_gym.scene.checks import as_array, require_choice, shown
 from seastar_gym.scene.number import check_numbers
 from seastar_gym.simulator import Simulator, StrokeReport
-from seastar_gym.simulator.growth import is_watched
-from seastar_gym.simulator.pauses import completed, pausing
 from seastar_gym.simulator.report import report_of_pieces
+from seastar_gym.simulator.simulator import completed, pausing
+from seastar_gym.simulator.watches import is_watched
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.model.currents import velocities_at
-from seastar_gym.scene.currents import AnyCurrent
+from seastar_gym.model import velocities_at
+from seastar_gym.scene.water import AnyCurrent
 
 Floats = NDArray[np.float64]
 

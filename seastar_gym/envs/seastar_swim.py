@@ -15,11 +15,9 @@ from seastar_gym.envs import IDS
 from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
 from seastar_gym.envs.commands import Actions, sampling_mask
 from seastar_gym.envs.frame import Frame
-from seastar_gym.envs.headings import HeadingTargets
-from seastar_gym.envs.options import Plain, SwimOptions
+from seastar_gym.envs.options import HeadingTargets, Plain, RewardWeights, SwimOptions
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.robots import Robots, Split, Task
 from seastar_gym.envs.sight import Drawn, Sight
 from seastar_gym.envs.tasks import chosen_task
@@ -235,7 +233,7 @@ class SeastarSwimEnv(OneRobotEnv):
     | cosine, sine of the turn to the next waypoint's heading     | 1    | -1..1 |
 
     So an observation has 196 numbers in the timed environments, 200 with headings. It is Markov unless decisions are
-    shorter than heating pulses. `seastar_gym.envs.layout.Layout` names all these places.
+    shorter than heating pulses. `seastar_gym.envs.observation.Layout` names all these places.
 
     ## Sight and delays
     A camera sees less, and late. With `sight`, a `Sight`, an observation is computed from the last two pictures that

@@ -14,15 +14,13 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from seastar_gym.accuracy.certificate import Certificate
-from seastar_gym.accuracy.info import warn_uncertified
+from seastar_gym.accuracy.chapters import warn_uncertified
 from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
 from seastar_gym.envs.commands import Actions, as_array, sampling_mask, to_commands
-from seastar_gym.envs.headings import HeadingTargets
-from seastar_gym.envs.options import Plain, SwimOptions
+from seastar_gym.envs.options import HeadingTargets, Plain, RewardWeights, SwimOptions
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.rendering import BatchPictures, Picture
-from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.robots import Robots, Split, Task
 from seastar_gym.envs.sight import Drawn, Sight
 from seastar_gym.envs.tasks import chosen_task
@@ -38,8 +36,7 @@ from seastar_gym.scene.checks import (
     shown,
 )
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.simulator.pauses import completed
-from seastar_gym.simulator.simulator import MAX_ROBOTS
+from seastar_gym.simulator.simulator import MAX_ROBOTS, completed
 
 
 class Buffers(NamedTuple):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from seastar_gym.envs.scenery import Flow, flow_of
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import save_figure
-from seastar_gym.scene.currents import AnyCurrent
+from seastar_gym.scene.water import AnyCurrent
 
 Floats = NDArray[np.float64]
 

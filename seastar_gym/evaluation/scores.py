@@ -5,11 +5,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from seastar_gym.controllers.registry import load_agent
-from seastar_gym.evaluation.many import HELD_OUT_SEED
-from seastar_gym.evaluation.measures import measure_of
-from seastar_gym.evaluation.results import number, text_table, write_csv
-from seastar_gym.evaluation.statistics import Estimate, mean_with_interval
-from seastar_gym.evaluation.tasks import env_of, held_out, swim_episodes
+from seastar_gym.evaluation.results import Estimate, mean_with_interval, number, text_table, write_csv
+from seastar_gym.evaluation.rollout import env_of, held_out, measure_of, swim_episodes
+from seastar_gym.evaluation.swim import HELD_OUT_SEED
 from seastar_gym.files import write_json
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__

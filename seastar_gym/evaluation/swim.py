@@ -1,4 +1,14 @@
-"""One agent swims one episode: `swim`, and what can be measured on it afterwards."""
+"""One agent swims one episode: `swim`, and what can be measured on it afterwards.
+
+Many swims side by side, nominal or disturbed.
+
+Paths that command lines ask for, by name or by the file of their waypoints.
+
+Disturbances of the swims of a batch: a current, a weak limb, noise on observations, lost strokes.
+
+A uniform current is a change of frame: the robots swim in still water, towards waypoints that drift the other way, and
+observations and positions are carried back. So every robot of a batch has a current in a direction of its own.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +16,29 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.contract import Policy, require_fit, require_policy
-from seastar_gym.envs.paths import cross_track_error, path_length
+from seastar_gym.controllers.contract import Policy, actions_of, require_fit, require_policy
+from seastar_gym.controllers.greedy import turned
+from seastar_gym.envs.commands import decisions_in
+from seastar_gym.envs.observation import VELOCITY_SCALE, heading_of
+from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.paths import MOST_WAYPOINTS, PATHS, WAYPOINT_RADIUS, cross_track_error, make_path, path_length
+from seastar_gym.envs.robots import Flags, Outcome, Robots
 from seastar_gym.envs.seastar_swim import OneRobotEnv
+from seastar_gym.envs.sight import Drawn, Sight
+from seastar_gym.envs.vector import ManyRobotsEnv
+from seastar_gym.envs.waypoints import AlongPath
+from seastar_gym.envs.waypoints import Path as SwimPath
 from seastar_gym.evaluation.rollout import MOST_DECISIONS, Episodes, Info, rollout
-from seastar_gym.scene.checks import require_callable, require_count, require_kind
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_callable, require_count, require_kind, require_number
+from seastar_gym.scene.csv_rows import read_numbers
+from seastar_gym.scene.number import column
 from seastar_gym.simulator import SolverStatus
 
 Floats = NDArray[np.float64]
@@ -179,3 +202,170 @@ def _swim_of(agent: str, found: Episodes, robot: int) -> Swim:
         energy=of["energy"][1:],
         solver_message=None if status is SolverStatus.CONVERGED else status.sentence,
     )
+
+
+PATH_HELP = f"Name of a path ({', '.join(PATHS)}), or a text file with x and y [m] of one waypoint per line."
+
+
+def load_path(name: str) -> Any:
+    """Name of a path, or waypoints [m], shape (n, 2), of a text file."""
+    if name in PATHS or not Path(name).is_file():
+        make_path(name, np.random.default_rng(0))
+        return name
+    waypoints = read_numbers(name, "x and y [m] of a waypoint", 2, MOST_WAYPOINTS)
+    try:
+        return make_path(waypoints, np.random.default_rng(0))
+    except ValueError as bad:
+        raise ValueError(f"{name}: {bad}") from bad
+
+
+CURRENT_DIRECTIONS = 8
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """Strengths of the disturbances of a batch; zeros disturb nothing.
+
+    current: Speed of the current [m/s], which has the direction of i/8 of a full turn for robot i.
+    weakness: Share of its strength that limb i mod n of robot i lacks.
+    noise: Standard deviation of the observed position of the hub and of every station [m].
+    lost: Probability that a stroke fails.
+    """
+
+    current: float = 0.0
+    weakness: float = 0.0
+    noise: float = 0.0
+    lost: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, unit in (("current", "m/s"), ("weakness", "1"), ("noise", "m"), ("lost", "1")):
+            require_number(f"Disturbance.{name}", getattr(self, name), unit, zero_allowed=True)
+        if max(self.weakness, self.lost) > 1.0:
+            raise ValueError("weakness and lost must be at most 1.")
+
+
+DISTURBANCES = {
+    "none": Disturbance(),
+    "current of 0.5 mm/s": Disturbance(current=0.5e-3),
+    "current of 1.5 mm/s": Disturbance(current=1.5e-3),
+    "a limb at half strength": Disturbance(weakness=0.5),
+    "1 mm of noise": Disturbance(noise=1e-3),
+    "every tenth stroke lost": Disturbance(lost=0.1),
+}
+
+
+class DisturbedRobots(Robots):
+    """Robots that are disturbed; positions are those in the world, where the waypoints stand still.
+
+    rng: Draws noise and lost strokes. task, options, n_robots, threads: See `Robots`.
+    """
+
+    task: AlongPath
+
+    def __init__(
+        self,
+        disturbance: Disturbance,
+        rng: np.random.Generator,
+        task: AlongPath,
+        options: SwimOptions,
+        n_robots: int,
+        threads: int | None,
+    ):
+        super().__init__(task, options, n_robots, threads)
+        self.disturbance, self._rng = disturbance, rng
+        robots, n_limbs = np.arange(self.n_robots), self.scene.robot.n_limbs
+        angles = 2.0 * np.pi / CURRENT_DIRECTIONS * robots
+        self._current = disturbance.current * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        left = np.where(robots[:, None] % n_limbs == np.arange(n_limbs), 1.0 - disturbance.weakness, 1.0)
+        self.simulator.set_limb_strengths(self.simulator.limb_strengths * left)
+        self._carried = np.zeros((self.n_robots, 2))
+
+    def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
+        """Begin an episode of the robots in a mask, at rest in the world where it is that of all."""
+        super().reset(robots, generators, asked)
+        if robots.all():  # a state is put into all robots
+            state = self.simulator.get_state()
+            self.simulator.set_state(state._replace(velocities=state.velocities - self._current[:, None]))
+        self._carried[robots] = 0.0
+
+    def facts(self, hub: Floats | None = None) -> dict[str, NDArray[Any]]:
+        """What is known of every robot now, with its place in the world."""
+        facts = super().facts(hub)
+        return facts | {"hub_position": facts["hub_position"] + self._carried}
+
+    def observe(self) -> NDArray[np.float32]:
+        """Observations of the disturbed robots, shape (n_robots, size)."""
+        seen, at = super().observe(), self.layout
+        if self.disturbance.current > 0.0:
+            axes = heading_of(self.simulator)
+            seen[:, at.hub_velocity] += turned(self._current, -axes) / VELOCITY_SCALE
+        if self.disturbance.noise > 0.0:
+            n_places = 1 + seen[:, at.positions].shape[1] // 2
+            error = self._rng.normal(0.0, self.disturbance.noise, (len(seen), n_places, 2))
+            error /= column(self.scene.robot.limb_length, 2)
+            seen[:, at.positions] += (error[:, 1:] - error[:, :1]).reshape(len(seen), -1)
+            seen[:, at.waypoints] -= np.tile(error[:, 0], 2)
+        return seen
+
+    def step(self, commands: Floats) -> Outcome:
+        """One decision of every robot; returns its outcome, with the commands that were followed and not lost.
+
+        Robots whose solver gave up stay where they are: their swims are as long as those of others who do not arrive.
+        """
+        lost = self._rng.random(len(commands)) < self.disturbance.lost
+        drift = self._current * self.decision_period
+        self.task.move_waypoints(self, -drift)
+        self._carried += drift
+        outcome = super().step(np.where(lost[:, None], 0.0, commands))
+        return outcome._replace(terminated=outcome.info["is_success"])
+
+
+HELD_OUT_SEED = 1_000
+"""Seed of the paths that policies are measured on; trainings draw theirs from small seeds."""
+MOST_SWIMS, LARGEST_SEED = 1_000_000, 2**63
+"""Most swims side by side, and the largest seed of their paths."""
+
+
+def swim_many(
+    agent: str,
+    policy: Policy,
+    path: SwimPath,
+    n_swims: int,
+    scene: Scene,
+    disturbance: Disturbance = Disturbance(),
+    *,
+    max_strokes: int | None = None,
+    waypoint_radius: float = WAYPOINT_RADIUS,
+    seed: int = 0,
+    threads: int | None = None,
+    decision_period: float | None = None,
+    sight: Sight | None = None,
+    action_delay: Drawn = 0.0,
+) -> list[Swim]:
+    """Swims of `n_swims` robots side by side, each to its last waypoint or for `max_strokes` strokes, or decisions.
+
+    The path "random" has random headings. max_strokes: None means the decisions of 400 s. waypoint_radius:
+    Radius of the waypoints [m]. decision_period: Time between decisions [s]. None means a stroke. sight,
+    action_delay: As of the environments.
+    """
+    require_kind("agent", agent, str, "a text")
+    require_policy(policy)
+    require_kind("scene", scene, Scene, "a Scene")
+    require_kind("disturbance", disturbance, Disturbance, "a Disturbance")
+    require_count("n_swims", n_swims, 1, MOST_SWIMS)
+    if max_strokes is not None:
+        require_count("max_strokes", max_strokes, 1, MOST_DECISIONS)
+    require_count("seed", seed, 0, LARGEST_SEED)
+    actions = actions_of(policy, scene.robot.n_limbs)
+    with_heading = isinstance(path, str) and path == "random"
+    task = AlongPath(path, waypoint_radius=waypoint_radius, random_heading=with_heading)
+    options = SwimOptions(
+        actions, scene=scene, decision_period=decision_period, sight=sight, action_delay=action_delay
+    )  # fmt: skip
+    robots = DisturbedRobots(disturbance, np.random.default_rng([seed, n_swims]), task, options, n_swims, threads)
+    require_fit(policy, scene, actions, decision_period, robots.layout.size, sight=sight)
+    batch, limit = ManyRobotsEnv(robots), max_strokes or decisions_in(TIME_LIMIT, decision_period, scene)
+    batch.np_random = tuple(np.random.default_rng([seed, swim]) for swim in range(n_swims))
+    swims = swims_of(agent, rollout(batch, policy, until=limit, record=RECORDED))
+    batch.close()
+    return swims

@@ -5,13 +5,13 @@
     found = differentiate(Scene(), commands, by=["fluid.drag_coefficient", "commands"])
     found.swim.hub, found.by["commands"].hub
 
-Forward differentiation, exact to rounding: the kernels are compiled on lanes that carry slopes (simd/dual_lanes.py).
+Forward differentiation, exact to rounding: the kernels are compiled on lanes that carry slopes (lanes/dual.py).
 
     found = gradient(Scene(), commands, lambda swim: (swim.hub[-1, 0], {"hub": slopes}), by=["commands"])
     found.by["commands"]
 
 Reverse differentiation, whose cost does not depend on the number of unknowns: they write down what they do
-(simd/tape_lanes.py). docs/gradients.md says how far derivatives of swims can be trusted.
+(lanes/tape.py). docs/gradients.md says how far derivatives of swims can be trusted.
 """
 
 from seastar_gym.gradients.adjoint import Gradient as Gradient

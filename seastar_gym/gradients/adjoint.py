@@ -9,42 +9,35 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.report import MOMENTS, REPORT_ROWS, SMALLEST_HUB_T, WORK
-from seastar_gym.der.stepping.schemes import SCHEMES
-from seastar_gym.der.stepping.stroke import advance
-from seastar_gym.der.terms.hub import Actuation
-from seastar_gym.gradients.history import (
-    CAPACITY,
-    COUNTERS,
-    INTERVAL,
-    KEPT,
-    N_STEPS,
-    OF_STEP,
-    Kept,
-    n_numbers,
-)
-from seastar_gym.gradients.memory import WorkOfGradient, as_rows_of_tape, with_places, works
+from seastar_gym.gradients.history import CAPACITY, COUNTERS, INTERVAL, KEPT, N_STEPS, OF_STEP, Kept, n_numbers
 from seastar_gym.gradients.replay import Rows, Slopes, Tape, pull_back
 from seastar_gym.gradients.replay import Scene as SceneOnTape
-from seastar_gym.gradients.stencils import arrays_of
 from seastar_gym.gradients.swim import (
     COUNTS,
     Motion,
+    WorkOfGradient,
+    as_rows_of_tape,
     checked_swim,
     require_names,
     sentence_of,
     slopes_of_heading,
     turned_from,
+    with_places,
+    works,
 )
+from seastar_gym.gradients.tape import arrays_of
 from seastar_gym.gradients.unknowns import OF_START, Rotations, Start, Unknown, slope_in_number, start_of, unknowns_of
-from seastar_gym.model.rods import make_limits, make_rods
-from seastar_gym.model.schemes import scheme_for
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.lanes.rows import aligned_rows, side_by_side
+from seastar_gym.lanes.tape import ENTRY, ROW
+from seastar_gym.model import make_limits, make_rods
+from seastar_gym.rods.bundles import make_work
+from seastar_gym.rods.interval import advance
+from seastar_gym.rods.step import MOMENTS, REPORT_ROWS, SCHEMES, SMALLEST_HUB_T, WORK
+from seastar_gym.rods.terms.hub import Actuation
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_floats, require_callable, shown
-from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simd.rows import aligned_rows, side_by_side
-from seastar_gym.simd.tape_lanes import ENTRY, ROW
+from seastar_gym.schemes import scheme_for
 from seastar_gym.simulator.state import State
 
 Floats = NDArray[np.float64]

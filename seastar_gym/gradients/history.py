@@ -1,6 +1,6 @@
 """What a swim leaves of each time step for `replay.py`, which differentiates it: where it began, and its solutions.
 
-`advance` of der/stepping/stroke.py at the form `KEPT` leaves it, to the same bits and on the lanes of `Simulator`.
+`advance` of rods/interval.py at the form `KEPT` leaves it, to the same bits and on the lanes of `Simulator`.
 """
 
 from typing import NamedTuple
@@ -8,12 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.der.stepping.interval import FALLBACK_AFTER, cover_interval
-from seastar_gym.der.stepping.momentum import correct_momentum
-from seastar_gym.der.stepping.newton import minimise
-from seastar_gym.der.stepping.steps import try_step
-from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import (
+from seastar_gym.lanes.compile import kernel
+from seastar_gym.lanes.registers import (
     N_LANES,
     Form,
     any_lane,
@@ -25,6 +21,10 @@ from seastar_gym.simd.lanes import (
     store,
     store_number,
 )
+from seastar_gym.rods.guard import correct_momentum
+from seastar_gym.rods.interval import FALLBACK_AFTER, cover_interval
+from seastar_gym.rods.newton import minimise
+from seastar_gym.rods.step import try_step
 
 INTERVAL, START, SIZE, LIMIT, RETRYING, FALLBACK, OF_STEP = range(7)
 """Numbers of a step: that of its interval between two times, its beginning and its length as shares of that, its

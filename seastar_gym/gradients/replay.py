@@ -1,6 +1,6 @@
 """Reverse differentiation of a swim: its time steps once more, from the last to the first, on a tape.
 
-Steps are replayed from what history.py has kept of them, side by side on the lanes of simd/tape_lanes.py, as if each
+Steps are replayed from what history.py has kept of them, side by side on the lanes of lanes/tape.py, as if each
 were of another robot. Newton's solution of a stage is read instead of found, and is differentiated as solved exactly,
 as in implicit.py: q becomes q - H^-1 g, q and H constant. The tape has g alone. It ends there, and goes on from q as
 from what has no parents. Where it is read, slopes s in q become slopes -H^-1 s in g, as H is symmetric; H is made and
@@ -13,20 +13,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.der.body.body import move_roots
-from seastar_gym.der.contact.coupled import solve_again_coupled
-from seastar_gym.der.energy import fill_moments
-from seastar_gym.der.linear.star_solution import solve_again
-from seastar_gym.der.potential import factorise
-from seastar_gym.der.rods import Rods, Work
-from seastar_gym.der.stepping.schemes import Scheme
-from seastar_gym.der.stepping.stages import Stage
-from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.gradients.history import FALLBACK, INTERVAL, OF_STEP, SIZE
-from seastar_gym.gradients.on_tape import TAPED, replay_steps
-from seastar_gym.simd.compilation import entry_point, kernel
-from seastar_gym.simd.lanes import N_LANES, PLAIN, borrow, load, load_number, store
-from seastar_gym.simd.tape_lanes import ENTRY, FACTOR, PLACE, begin_tape, end_of_tape, tape_is_full
+from seastar_gym.gradients.tape import TAPED, replay_steps
+from seastar_gym.lanes.compile import entry_point, kernel
+from seastar_gym.lanes.registers import N_LANES, PLAIN, borrow, load, load_number, store
+from seastar_gym.lanes.tape import ENTRY, FACTOR, PLACE, begin_tape, end_of_tape, tape_is_full
+from seastar_gym.rods.body import move_roots
+from seastar_gym.rods.bundles import Rods, Work
+from seastar_gym.rods.contact.coupled import solve_again_coupled
+from seastar_gym.rods.linear import solve_again
+from seastar_gym.rods.potential import factorise, fill_moments
+from seastar_gym.rods.step import Scheme, Stage
+from seastar_gym.rods.terms.hub import Actuation
 
 on_lanes, on_tape = borrow.at(PLAIN), borrow.at(TAPED)
 """Arrays as rows of `Simulator`, and as rows on a tape."""

@@ -1,33 +1,98 @@
-"""`differentiate`: a swim of one robot, and its derivatives in numbers of the scene, commands and the start."""
+"""`differentiate`: a swim of one robot, and its derivatives in numbers of the scene, commands and the start.
+
+Memory of a tape: bundles of coefficients and of work whose rows of robots stand on it.
+"""
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.report import MOMENTS, REPORT_ROWS, SMALLEST_HUB_T, WORK
-from seastar_gym.der.stepping.schemes import SCHEMES
-from seastar_gym.der.terms.hub import Actuation
-from seastar_gym.gradients.implicit import advance_slopes
-from seastar_gym.gradients.memory import widened
-from seastar_gym.gradients.stencils import arrays_of
+from seastar_gym.gradients.history import OF_STAGE, OF_STEP
+from seastar_gym.gradients.tape import Replayed, advance_slopes, arrays_of
 from seastar_gym.gradients.unknowns import Rotations, Start, slopes_of_start, strengths_of, unknowns_of
-from seastar_gym.model.rods import make_limits, make_rods
-from seastar_gym.model.schemes import scheme_for
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.lanes.rows import aligned_rows, side_by_side
+from seastar_gym.lanes.tape import FACTOR, PLACE, ROW
+from seastar_gym.model import make_limits, make_rods
+from seastar_gym.rods.bundles import Work, make_work
+from seastar_gym.rods.step import MOMENTS, REPORT_ROWS, SCHEMES, SMALLEST_HUB_T, WORK
+from seastar_gym.rods.terms.hub import Actuation
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_finite, require_kind, require_texts
 from seastar_gym.scene.numerics import require_duration
-from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simd.rows import aligned_rows, side_by_side
+from seastar_gym.schemes import scheme_for
 from seastar_gym.simulator.drive import checked_commands
 from seastar_gym.simulator.report import SolverStatus
 from seastar_gym.simulator.state import State
 
 Floats = NDArray[np.float64]
+
+WorkOfGradient = namedtuple("WorkOfGradient", (*Work._fields, "kept", "replayed"))  # type: ignore[misc]
+"""`Work` with a history, see history.py, or with a step that is replayed, see replay.py."""
+
+
+def as_rows_of_tape(bundle: Any) -> Any:
+    """A bundle whose rows of robots are rows of a tape: values, and factors and place, which are 0."""
+    return widened(bundle, ROW)
+
+
+def widened(bundle: Any, width: int) -> Any:
+    """A bundle whose rows of robots, shape (n, N_LANES), have zeros behind them, shape (n, width)."""
+    if isinstance(bundle, np.ndarray) and bundle.ndim == 2:
+        rows = aligned_rows(len(bundle), width)
+        rows[:, :N_LANES] = bundle
+        return rows
+    if hasattr(bundle, "_fields"):
+        return bundle._replace(**{name: widened(getattr(bundle, name), width) for name in bundle._fields})
+    return bundle
+
+
+def works(own: Work, residual: Floats, n_stages: int, n_points: int) -> tuple[Any, Work]:
+    """Memory on a tape, and on the lanes of `Simulator`; its rows stand one behind the other in both, see Replayed."""
+    n_lists, n_rows = (sum(len(part) for part in arrays_of(own) if part.ndim == n) for n in (1, 2))
+    memory, lists = np.zeros((n_rows, ROW)), np.zeros(n_lists)
+    slots = 1 if n_stages == 1 else n_stages + 1
+    of_stages, of_lists = aligned_rows(slots, n_rows, N_LANES), np.zeros((slots, n_lists))
+    replayed = Replayed(
+        np.zeros((OF_STEP + 1, ROW)), np.zeros((n_stages * (OF_STAGE + 2 * n_points), ROW)), np.zeros(1),
+        np.zeros(n_stages), residual, memory.ravel(), lists, of_stages.ravel(), of_lists.ravel(), n_rows, n_lists,
+    )  # fmt: skip
+    on_tape = WorkOfGradient(*_in_memory(own, memory, lists), None, replayed)  # type: ignore[call-arg]
+    return on_tape, _in_memory(own, of_stages[-1], of_lists[-1])
+
+
+def _in_memory(bundle: Any, rows: Floats, lists: Floats) -> Any:
+    """A bundle whose arrays stand in these, one behind the other: rows of robots, and what robots share."""
+    taken = [0, 0]
+
+    def placed(part: Any) -> Any:
+        if isinstance(part, np.ndarray):
+            begin = taken[part.ndim - 1]
+            taken[part.ndim - 1] += len(part)
+            return (lists, rows)[part.ndim - 1][begin : begin + len(part)]
+        if hasattr(part, "_fields"):
+            return part._replace(**{name: placed(getattr(part, name)) for name in part._fields})
+        return part
+
+    return placed(bundle)
+
+
+def with_places(bundle: Any, moved: Sequence[NDArray[np.bool_]]) -> int:
+    """Give those rows of a tape that are moved their places, from 1 on, in the order of `arrays_of`; how many."""
+    n = 0
+    for rows, some in zip(arrays_of(bundle), moved, strict=True):
+        if rows.ndim == 2:
+            count = int(some.sum())
+            rows.view(np.int64)[some, PLACE] = np.arange(n + 1, n + 1 + count)
+            rows[some, FACTOR:PLACE] = 1.0
+            n += count
+    return n
+
 
 COUNTS = ("halvings", "rejections", "energy_cuts", "solver_iterations")
 """Rows of a report that tell whether a swim is one of several branches."""

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.gradients.stencils import CENTRAL, OF_COMMANDS, arrays_of, of_command, step_of
-from seastar_gym.model.rods import make_rods
+from seastar_gym.gradients.tape import CENTRAL, OF_COMMANDS, arrays_of, of_command, step_of
+from seastar_gym.model import make_rods
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number, shown
-from seastar_gym.scene.per_robot import at, with_numbers
+from seastar_gym.scene.number import at, with_numbers
 from seastar_gym.simulator.drive import Drive
 from seastar_gym.simulator.simulator import Simulator
 from seastar_gym.simulator.state import State, checked_state

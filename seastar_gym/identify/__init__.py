@@ -1,8 +1,7 @@
 """Fits numbers of a scene to measured trajectories: `seastar identify --help`."""
 
 from seastar_gym.identify.fit import Estimate, identify
-from seastar_gym.identify.measurement import Measurement
-from seastar_gym.identify.parameters import get_parameter, with_parameters
+from seastar_gym.identify.measurement import Measurement, get_parameter, with_parameters
 from seastar_gym.identify.trajectories import synthetic, trajectory
 
 __all__ = [

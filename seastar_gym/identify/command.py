@@ -23,8 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from seastar_gym.command import answered, command_parser
-from seastar_gym.extras import require_extra
-from seastar_gym.files import save_figure, write_json
+from seastar_gym.files import require_extra, save_figure, write_json
 from seastar_gym.identify.fit import DOUBT, Estimate, identify
 from seastar_gym.identify.measurement import ARM, ORIENTATION, Measurement
 from seastar_gym.scene import Numerics

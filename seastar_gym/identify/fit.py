@@ -26,9 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.identify.covariance import uncertainty_of
-from seastar_gym.identify.measurement import ORIENTATION, Measurement
-from seastar_gym.identify.parameters import get_parameter, with_parameters
+from seastar_gym.identify.measurement import ORIENTATION, Measurement, get_parameter, uncertainty_of, with_parameters
 from seastar_gym.identify.search import (
     SUSPICIOUS,
     Found,

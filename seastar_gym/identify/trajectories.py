@@ -11,8 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from seastar_gym.identify.measurement import ORIENTATION, Measurement, pointer, require_command_times
-from seastar_gym.identify.parameters import get_parameter, with_parameters
+from seastar_gym.identify.measurement import (
+    ORIENTATION,
+    Measurement,
+    get_parameter,
+    pointer,
+    require_command_times,
+    with_parameters,
+)
 from seastar_gym.processors import processors
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import (
@@ -23,8 +29,8 @@ from seastar_gym.scene.checks import (
     require_seed,
     require_within,
 )
+from seastar_gym.scene.number import frame_of, side_by_side
 from seastar_gym.scene.numerics import SHORTEST
-from seastar_gym.scene.per_robot import frame_of, side_by_side
 from seastar_gym.simulator import Simulator
 
 Floats = NDArray[np.float64]

@@ -19,7 +19,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from seastar_gym.extras import require_extra
+from seastar_gym.files import require_extra
 from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
 from seastar_gym.scene.checks import MOST_LIMBS, require_kind, shown

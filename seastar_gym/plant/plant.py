@@ -1,12 +1,26 @@
-"""`Plant`: what can be asked of a robot in a tank."""
+"""`Plant`: what can be asked of a robot in a tank.
+
+`SimulatedPlant`: a simulated robot in the place of one in a tank, seen as cameras see.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from seastar_gym.envs.delays import POSE, Tracker
+from seastar_gym.envs.sight import Lateness, Sight
+from seastar_gym.scene import Scene
+from seastar_gym.scene.actuators.base import WirePair
+from seastar_gym.scene.actuators.curves import SmaPulse
+from seastar_gym.scene.actuators.wires import SmaWires
+from seastar_gym.scene.checks import require_flag, require_kind, require_seed
+from seastar_gym.simulator import Simulator
 
 
 class PlantError(RuntimeError):
@@ -51,3 +65,105 @@ class Plant(Protocol):
 
     def stop(self) -> None:
         """Heat no wire any more."""
+
+
+ROUNDING = 1e-9
+
+
+def with_wires(scene: Scene) -> Scene:
+    """The scene with the wires of which an `SmaPulse` is the strokes from rest; others as they are."""
+    actuator = scene.actuator
+    return replace(scene, actuator=SmaWires(**asdict(actuator))) if isinstance(actuator, SmaPulse) else scene
+
+
+class SimulatedPlant:
+    """Plant that is a simulator of one robot with wires, which moves on by its time steps as time goes by.
+
+    simulator: Of one robot whose wires, such as `SmaWires`, can be heated for as long as pulses are.
+    sight: How the robot is seen: rate, delays and errors. "nodes" it cannot be.
+    seed: Of what is drawn. paced: Whether its clock is that of the wall, as for a robot in a tank. Otherwise its time
+    goes by while somebody waits, as fast as it can be simulated.
+    """
+
+    def __init__(self, simulator: Simulator, sight: Sight | None = None, seed: int = 0, paced: bool = False):
+        require_kind("simulator", simulator, Simulator, "a Simulator")
+        sight = Sight() if sight is None else sight
+        require_kind("sight", sight, Sight, "a Sight")
+        require_seed(seed)
+        require_flag("paced", paced)
+        if simulator.n_robots != 1 or not isinstance(simulator.scene.actuator, WirePair):
+            raise ValueError("A SimulatedPlant is one robot with wires, such as SmaWires.")
+        if sight.sees == "nodes":
+            raise ValueError('A tracker sees no nodes: use sees="pose", or markers.')
+        self.simulator, self.n_limbs = simulator, simulator.scene.robot.n_limbs
+        self._clock: Callable[[], float] | None = time.monotonic if paced else None
+        self._begun = self._clock() if self._clock else 0.0
+        rng, lateness = np.random.default_rng(seed), Lateness(sight.numbers, 1)
+        lateness.draw(0, rng)
+        self._tracker = Tracker(sight.rate, sight.sees, self.n_limbs, lateness.values)
+        self._tracker.begin(np.ones(1, bool), [rng], simulator)
+        self._steps, self._unpaced = 0, 0.0
+        self._commands = np.zeros((1, self.n_limbs))
+
+    def now(self) -> float:
+        """Time on the plant's clock [s]; of a paced one that of `time.monotonic`."""
+        return self._unpaced if self._clock is None else self._clock()
+
+    def wait(self, seconds: float) -> None:
+        """Return after so many seconds."""
+        if self._clock is None:
+            self._unpaced += seconds
+        else:
+            time.sleep(seconds)
+        self.move_on()
+
+    def move_on(self) -> None:
+        """Simulate until now."""
+        step = self.simulator.scene.numerics.step
+        due = int((self.now() - self._begun) / step + ROUNDING) - self._steps
+        if due <= 0:
+            return
+        for _ in self.simulator.advance_in_parts(due * step, self._commands, due):
+            self._tracker.take(self.simulator)
+        self._steps += due
+        self._commands = np.zeros((1, self.n_limbs))
+
+    def sight(self) -> Sighting:
+        """The newest sighting."""
+        self.move_on()
+        tracker, elapsed = self._tracker, self.simulator.time
+        tracker.look(elapsed)
+        row, taken_at = tracker.now.rows[0], float(tracker.now.taken_at[0])
+        (x, y), (c, s) = row[:2], row[2:POSE]
+        markers = None
+        if len(row) > POSE:
+            places = row[POSE:].reshape(self.n_limbs, -1, 2) * self.simulator.scene.robot.limb_length
+            markers = places @ np.array([[c, s], [-s, c]]) + [x, y]
+        heading = float(np.arctan2(s, c))
+        return Sighting(self._begun + taken_at, self.now(), (float(x), float(y), heading), markers)
+
+    def heat(self, limbs: Sequence[int], seconds: float) -> None:
+        """Heat wires, see `Plant`; from the next time step on. ValueError: for longer than the wires can be."""
+        self.move_on()
+        actuator = self.simulator.scene.actuator
+        assert isinstance(actuator, WirePair)
+        longest = float(actuator.heating_time)
+        if not 0.0 <= seconds <= longest * (1.0 + ROUNDING):
+            raise ValueError(f"These wires can be heated for 0 to {longest:g} s at a time, not {seconds:.3g} s.")
+        signs = np.asarray(limbs, np.float64)
+        self._commands[0] = np.where(signs != 0.0, signs * min(seconds / longest, 1.0), self._commands[0])
+
+    def stop(self) -> None:
+        """Heat no wire any more."""
+        self.move_on()
+        if not self.heated().any():
+            return
+        self._commands = np.zeros((1, self.n_limbs))
+        state, actuators = self.simulator.get_state(), self.simulator.actuators
+        actuators[..., -2:] = 0.0
+        self.simulator.set_state(state._replace(actuators=actuators))
+
+    def heated(self) -> NDArray[np.bool_]:
+        """Wires that are heated now, for + and -, shape (n_limbs, 2)."""
+        waiting = np.stack([self._commands[0] > 0.0, self._commands[0] < 0.0], axis=-1)
+        return np.asarray((self.simulator.actuators[0, :, -2:] > 0.0) | waiting)

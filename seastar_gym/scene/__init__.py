@@ -5,22 +5,16 @@ All parts are frozen dataclasses in SI units. Their annotations declare units an
 scenes to plain data.
 """
 
-from seastar_gym.scene.actuators.limited import Limited
-from seastar_gym.scene.actuators.measured import MeasuredCurve
-from seastar_gym.scene.actuators.pulse import SmaPulse
+from seastar_gym.scene.actuators.curves import Limited, MeasuredCurve, SmaPulse
 from seastar_gym.scene.actuators.sma_limb import SmaLimb
-from seastar_gym.scene.actuators.thermal import ThermalSma
-from seastar_gym.scene.actuators.wires import SmaWires
-from seastar_gym.scene.along import AlongLimb, Stiffening
+from seastar_gym.scene.actuators.wires import SmaWires, ThermalSma
 from seastar_gym.scene.body import Attachment, Body
-from seastar_gym.scene.contact import Contact
-from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
-from seastar_gym.scene.fluid import Water
-from seastar_gym.scene.limb import Limb
+from seastar_gym.scene.limb import AlongLimb, Limb, Stiffening
 from seastar_gym.scene.numerics import Numerics
 from seastar_gym.scene.robot import Seastar, relaxation_time
-from seastar_gym.scene.scene import Scene
+from seastar_gym.scene.scene import Contact, Scene
 from seastar_gym.scene.section import Disc, Section, Strip, Tube
+from seastar_gym.scene.water import GridCurrent, ShearCurrent, UniformCurrent, Vortex, Water
 
 __all__ = [
     "AlongLimb",

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.limb import LimbShape
-from seastar_gym.scene.outline import Outline
-from seastar_gym.scene.shape import lines_cross, rest_positions
+from seastar_gym.scene.body import Outline
+from seastar_gym.scene.limb import LimbShape, lines_cross, rest_positions
 
 Floats = NDArray[np.float64]
 

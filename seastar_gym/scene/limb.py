@@ -1,16 +1,34 @@
-"""`Limb`: a limb that differs from the robot's others, with profiles along its length."""
+"""`Limb`: a limb that differs from the robot's others, with profiles along its length.
+
+`AlongLimb` and `Stiffening`: actuators that act on limbs along their length, on natural curvature and stiffness.
+
+Geometry of a robot at rest: node positions, natural angles of hinges, and limbs that may touch.
+"""
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.checks import is_finite_number, shown
-from seastar_gym.scene.number import Numbers, Profile, as_tuple, check_numbers, finite, make_floats, positive
+from seastar_gym.scene.checks import is_finite_number, require_numbers, shown
+from seastar_gym.scene.number import (
+    Numbers,
+    Profile,
+    as_tuple,
+    check_numbers,
+    finite,
+    make_floats,
+    not_negative,
+    positive,
+    profile_at,
+    within,
+)
 from seastar_gym.scene.section import AnySection, Cut, cuts
 from seastar_gym.scene.serial import register_part
 
@@ -96,3 +114,153 @@ class LimbShape(NamedTuple):
             for cut in self.corners(density)
             for E in (min(self.youngs_modulus), max(self.youngs_modulus))
         ]
+
+
+@register_part
+@dataclass(frozen=True)
+class AlongLimb:
+    """How the rotation that actuators make is spread between the hub and the length of a limb.
+
+    An actuator's rotation delta_psi is then the angle by which the whole limb bends, from hub to tip: a uniform wire
+    changes the natural curvature of a limb of length L by delta_psi/L, so a curvature has the peak angle curvature * L.
+
+    share: Share of the rotation that bends the limb along its length, from 0 to 1. The rest turns the limb at the hub.
+    profile: Change of natural curvature along the limb, in any unit: one number if it is uniform, or numbers at equally
+        spaced points from hub to tip, linear in between. Only their ratios count.
+    """
+
+    share: Annotated[Numbers, within(0.0, 1.0)] = 1.0
+    profile: Profile = 1.0
+
+    def __post_init__(self) -> None:
+        check_numbers(self)
+        require_numbers("A profile along a limb", as_tuple(self.profile), "1")
+        points = tuple(map(float, as_tuple(self.profile)))
+        bend = sum(points) - 0.5 * (points[0] + points[-1]) * (len(points) > 1) if points else 0.0
+        if not bend > 1e-6 * max(map(abs, points), default=0.0):
+            raise ValueError(
+                f"A profile along a limb must bend it to one side on the whole, not {shown(self.profile)}."
+            )
+
+    def hinge_shares(self, nodes_per_limb: int) -> Floats:
+        """Turn of every hinge of a limb per rotation by the actuator, shape (nodes_per_limb - 1,), the clamp's first.
+
+        Edges are chords of the bent limb: a hinge turns by the integral of curvature times its hat function.
+        """
+        points = as_tuple(self.profile)
+        n_edges = nodes_per_limb - 1
+        s = np.union1d(np.linspace(0.0, 1.0, nodes_per_limb), np.linspace(0.0, 1.0, max(len(points), 2)))
+        p, length = np.array(profile_at(points, s)), np.diff(s)
+        edge = np.minimum((0.5 * (s[1:] + s[:-1]) * n_edges).astype(int), n_edges - 1)
+        outer = np.stack([s[:-1], s[1:]]) * n_edges - edge
+        ends = np.stack([p[:-1], p[1:]])
+        turns = np.zeros(nodes_per_limb)
+        for node, hat in ((edge, 1.0 - outer), (edge + 1, outer)):
+            middle = ends.sum(axis=0) * hat.sum(axis=0)  # Simpson's rule: four times the product in the middle
+            turns += np.bincount(node, length * ((ends * hat).sum(axis=0) + middle) / 6.0, nodes_per_limb)
+        shares = self.share * turns[:-1] / turns.sum()
+        shares[0] += 1.0 - self.share
+        return np.asarray(shares)
+
+
+@register_part
+@dataclass(frozen=True)
+class Stiffening:
+    """How much stiffer a limb is whose actuator is hot: alloy that has recovered its shape has a larger modulus.
+
+    The bending stiffness EI of a limb is multiplied by 1 + (ratio - 1) S(a), with the activation a = |delta_psi|/peak
+    angle from 0 to 1 and a logistic S from S(0) = 0 to S(1) = 1. Two wires that pull against each other have the
+    activation of their difference.
+
+    ratio: EI at full activation over EI at rest. The default is that of a limb of nickel-titanium wires in an elastomer
+        in the repository `softmachineslab/horton_der_2d`.
+    middle: Activation at which S rises most.
+    width: Width of the rise, in activation: S is about 1/(1 + exp(-(a - middle)/width)).
+    """
+
+    ratio: Annotated[Numbers, positive("1")] = 2.68
+    middle: Annotated[float, not_negative("1")] = 0.5
+    width: Annotated[float, positive("1")] = 0.15
+
+    def __post_init__(self) -> None:
+        check_numbers(self)
+        if not (np.min(self.ratio) >= 1e-3 and np.max(self.ratio) <= 1e3):
+            raise ValueError(f"The ratio of bending stiffnesses must be from 0.001 to 1000, not {shown(self.ratio)}.")
+        if self.middle > 1.0 or not 0.02 <= self.width <= 100.0:
+            raise ValueError(
+                f"The middle must be from 0 to 1 and the width from 0.02 to 100, not {self.middle} and {self.width}."
+            )
+
+
+def rest_positions(limbs: Sequence[LimbShape], nodes_per_limb: int, tangent: bool) -> Floats:
+    """Node positions of the undeformed robot [m], shape (n_nodes, 2): hub at the origin, limb after limb.
+
+    Edges of a limb have equal lengths and turn by its natural curvature times that length, so its nodes lie on an arc.
+
+    tangent: Whether a limb's direction is that of the arc at the hub, rather than that of its root edge.
+    """
+    i = np.arange(1, nodes_per_limb)
+    nodes = [np.zeros((1, 2))]
+    for limb in limbs:
+        half_turn = 0.5 * turn_per_hinge(limb, nodes_per_limb)
+        # Length of the sum of i unit vectors, each turned from the last by twice half_turn, over i.
+        chord = np.sin(i * half_turn) / (i * np.sin(half_turn)) if half_turn else 1.0
+        distance = limb.length * i / (nodes_per_limb - 1) * chord
+        angle = limb.direction + (i if tangent else i - 1) * half_turn
+        x, y = limb.root
+        nodes.append(np.stack([x + distance * np.cos(angle), y + distance * np.sin(angle)], axis=1))
+    return np.concatenate(nodes)
+
+
+def turn_per_hinge(limb: LimbShape, nodes_per_limb: int) -> float:
+    """Natural angle of the hinges within a limb [rad]."""
+    return limb.natural_curvature * limb.length / (nodes_per_limb - 1)
+
+
+def natural_hub_angle(gap: float, hub_hinge: str) -> float:
+    """Natural angle of an unactuated hub hinge [rad], from -pi to pi.
+
+    gap: Angle between the two limbs [rad]. hub_hinge: Measure of the hinge, see `Seastar`.
+    """
+    if hub_hinge == "turning":
+        return gap - np.pi
+    return gap if gap <= np.pi else gap - 2.0 * np.pi
+
+
+def n_hub_hinges(n_limbs: int) -> int:
+    """Number of hub hinges: one between neighbouring limbs, and one in all for two limbs."""
+    return n_limbs if n_limbs > 2 else n_limbs - 1
+
+
+def limbs_that_may_touch(gaps: Sequence[float], alike: bool) -> list[tuple[int, int]]:
+    """Pairs of limbs (right, left) less than half a turn apart: neighbours, or all such pairs if lengths differ.
+
+    gaps: Angle from every limb to the next [rad]. alike: Whether limbs have equal lengths, so that none can reach over
+        another.
+    """
+    n_limbs = len(gaps)
+    turns = {
+        (first, (first + steps) % n_limbs): sum(gaps[(first + k) % n_limbs] for k in range(steps))
+        for first, steps in itertools.product(range(n_limbs), range(1, 2 if alike else n_limbs))
+    }
+    return [pair for pair, turn in turns.items() if pair[0] != pair[1] and turn < np.pi * (1.0 - 1e-9)]
+
+
+def cross_at_rest(nodes: NDArray[np.float64], n_limbs: int, pairs: Sequence[tuple[int, int]]) -> bool:
+    """Whether limbs of any of the pairs cross. nodes: Node positions [m], shape (n_nodes, 2)."""
+    limbs = [np.concatenate([nodes[:1], limb]) for limb in nodes[1:].reshape(n_limbs, -1, 2)]
+    return any(lines_cross(limbs[right], limbs[left]) for right, left in pairs)
+
+
+def lines_cross(line: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Whether two lines of edges cross, each with its corners, shape (n, 2)."""
+
+    def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+        return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+    f, tails = np.diff(other, axis=0), other[:-1]
+    for tail, e in zip(line[:-1], np.diff(line, axis=0), strict=True):
+        of_e, of_f = cross(e, f) * cross(tails - tail, f), cross(e, f) * cross(tails - tail, e)
+        if ((of_e > 0.0) & (of_f > 0.0) & (np.maximum(of_e, of_f) < cross(e, f) ** 2)).any():
+            return True
+    return False

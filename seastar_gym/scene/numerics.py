@@ -41,12 +41,12 @@ class Numerics:
         limb length. If quadratic convergence foretells that the next update would be, it is skipped.
     max_iterations: Limit of Newton iterations per stage. Beyond it, the step is halved, down to 1/4096. A stroke has a
         limit of its own, 200,000 iterations and 100 more per time step; a robot beyond it fails with
-        SolverStatus.ITERATION_LIMIT. Where limbs touch, those of the linear solver (der/contact/coupled.py) count, too.
+        SolverStatus.ITERATION_LIMIT. Where limbs touch, those of the linear solver (contact/coupled.py) count, too.
     path_tolerance: Error of the hub's path as a fraction of its length, from 0.001 to 0.02, by which steps are adapted
         (up to `step`). Only for the scheme "implicit-midpoint". None means steps of equal length.
     damping: Numerical damping of the scheme "implicit-midpoint", from 0 to 0.5. Without any, oscillations that are too
         fast for the steps never decay, and on fine meshes they may gather energy. Their amplitude falls by a fraction
-        of twice the damping in every step, slow oscillations are hardly damped, see der/stepping/schemes.py.
+        of twice the damping in every step, slow oscillations are hardly damped, see rods/step.py.
     named: Whether these numerics were chosen. False only for those of a `Scene` that was given none, which a fidelity
         may replace. It does not count in comparisons.
     """

@@ -13,25 +13,32 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.body import Body
 from seastar_gym.scene.checks import MOST_LIMBS, require_choice, require_number, shown
-from seastar_gym.scene.limb import Limb, LimbShape
+from seastar_gym.scene.limb import (
+    AlongLimb,
+    Limb,
+    LimbShape,
+    Stiffening,
+    limbs_that_may_touch,
+    rest_positions,
+    turn_per_hinge,
+)
 from seastar_gym.scene.number import (
     Numbers,
     UnnamedChoice,
     UnnamedCount,
     as_tuple,
+    batch_size,
     check_numbers,
+    chosen,
     is_named,
     not_negative,
     positive,
     whole,
 )
-from seastar_gym.scene.per_robot import batch_size, chosen
 from seastar_gym.scene.section import Disc
 from seastar_gym.scene.serial import register_part
-from seastar_gym.scene.shape import limbs_that_may_touch, rest_positions, turn_per_hinge
 from seastar_gym.scene.symmetry import PointGroup, point_group
 
 HubHinge = Literal["opening", "turning"]
@@ -57,7 +64,7 @@ class Seastar:
         the angle psi between the limbs, from 0 to pi; for a gap wider than pi it is the gap less a full turn. "turning"
         is the interior turning angle pi - psi, as in the published codes of the chapter's authors.
     limbs: Overrides, one `Limb` for each limb, or () for none.
-    relaxation_time: Relaxation time of Kelvin-Voigt damping [s], see der/terms/damping.py and `relaxation_time`. None
+    relaxation_time: Relaxation time of Kelvin-Voigt damping [s], see rods/terms/damping.py and `relaxation_time`. None
         means no damping, as in the chapter.
     discretisation: "continuum" clamps limbs into a rigid hub that turns freely, with consistent masses, Simpson's rule
         for drag and Gregory's weights for bending. With ten nodes, the chapter's robot is within a per cent of

@@ -18,14 +18,14 @@ def register_term(kind: type[Term]) -> type[Term]:
     The class is a frozen dataclass, as for `register_part`, and has
 
     coefficients(self, mesh): One number per node, shape (n_nodes,), or a tuple of such. `mesh.dl` is the length of
-        every node [m], `mesh.per_node(mesh.at_nodes.width)` its diameter [m]; see seastar_gym/der/mesh.py.
+        every node [m], `mesh.per_node(mesh.at_nodes.width)` its diameter [m]; see seastar_gym/rods/star.py.
     dissipation(c, wx, wy): Static; a convex dissipation potential D [W] of a node's velocity relative to the water
         [m/s], least at rest. The force is -grad D.
     energy(c, x, y): Static; the energy U [J] of a node at (x, y) [m]. The force is -grad U.
 
     One of the two is enough. Each returns (value, (slope in the first, in the second number), (second slopes xx, xy,
     yy)) of c, a node's coefficients as `coefficients` gives them, with the operators and functions of
-    seastar_gym/simd/lanes.py alone; other functions that it calls are kernels (seastar_gym/simd/compilation.py).
+    seastar_gym/lanes/registers.py alone; other functions that it calls are kernels (seastar_gym/lanes/compile.py).
     isotropic = True in the class tells wrappers of symmetry that turns and mirrors do not change it.
     """
     has = [name for name in FUNCTIONS if callable(getattr(kind, name, None))] if isinstance(kind, type) else []

@@ -1,26 +1,94 @@
-"""`Batch`: the numbers of all robots in memory, one robot per SIMD lane, and the kernels that advance them."""
+"""`Batch`: the numbers of all robots in memory, one robot per SIMD lane, and the kernels that advance them.
 
-from collections.abc import Callable
+`Workers`: threads that share the parts of a batch.
+"""
+
+import os
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.der.energy import energies, energies_in_water
-from seastar_gym.der.rods import Work, make_work
-from seastar_gym.der.stepping.report import COVERED, MOMENTS, PEAK_MOMENT, REPORT_ROWS, SMALLEST_HUB_T, WORK
-from seastar_gym.der.stepping.schemes import SCHEMES
-from seastar_gym.der.stepping.stroke import advance
-from seastar_gym.der.terms.hub import Actuation
-from seastar_gym.model.coefficients import Coefficients
-from seastar_gym.model.schemes import scheme_for
+from seastar_gym.lanes.dispatch import KnownCode
+from seastar_gym.lanes.registers import N_LANES, NARROW, PLAIN
+from seastar_gym.lanes.rows import aligned_rows, from_rows, to_rows, write_rows
+from seastar_gym.model import Coefficients
+from seastar_gym.rods.bundles import Work, make_work
+from seastar_gym.rods.interval import advance
+from seastar_gym.rods.potential import energies, energies_in_water
+from seastar_gym.rods.step import COVERED, MOMENTS, PEAK_MOMENT, REPORT_ROWS, SCHEMES, SMALLEST_HUB_T, WORK
+from seastar_gym.rods.terms.hub import Actuation
 from seastar_gym.scene import Scene
-from seastar_gym.simd.dispatch import KnownCode
-from seastar_gym.simd.lanes import N_LANES, NARROW, PLAIN
-from seastar_gym.simd.rows import aligned_rows, from_rows, to_rows, write_rows
+from seastar_gym.schemes import scheme_for
 from seastar_gym.simulator.report import SolverStatus
-from seastar_gym.simulator.workers import Workers
+
+
+class Workers:
+    """Threads that share the parts of a batch. They start with the first run, and again after `close`.
+
+    n: Number of threads. If it is 1, the caller's own thread does the work.
+    """
+
+    def __init__(self, n: int):
+        self.n = n
+        self._pool: ThreadPoolExecutor | None = None
+        self._at_work: list[threading.Lock] = []
+        self._process = os.getpid()
+
+    def run(self, work: Callable[[int, slice], None], parts: Iterable[slice]) -> None:
+        """Call work(thread, part) for all parts. A thread that has finished one takes the next.
+
+        If a part fails or the caller is interrupted, all threads have stopped before the exception is raised.
+        """
+        if self.n == 1:
+            for part in parts:
+                work(0, part)
+            return
+        waiting = iter(list(parts))
+        pool, at_work = self._get_pool(), self._at_work
+
+        def take_parts(thread: int) -> None:
+            with at_work[thread]:
+                for part in waiting:
+                    work(thread, part)
+
+        try:
+            list(pool.map(take_parts, range(self.n)))
+        except BaseException:
+            _stop(waiting, at_work)
+            raise
+
+    def _get_pool(self) -> ThreadPoolExecutor:
+        """Pool of this process. A fork inherits its parent's pool, but not the threads in it."""
+        if self._pool is None or self._process != os.getpid():
+            self._process = os.getpid()
+            self._at_work = [threading.Lock() for _ in range(self.n)]
+            self._pool = ThreadPoolExecutor(self.n)
+        return self._pool
+
+    def close(self) -> None:
+        """End the threads."""
+        pool, self._pool = self._pool, None
+        if pool is not None and self._process == os.getpid():
+            pool.shutdown()
+
+
+def _stop(waiting: Iterator[slice], at_work: Iterable[threading.Lock]) -> None:
+    """Take all waiting parts away and wait for the threads. A thread that is late finds no part."""
+    try:
+        for _ in waiting:
+            pass
+        for busy in at_work:
+            with busy:
+                pass
+    except BaseException:  # interrupted once more: the threads are waited for all the same
+        _stop(waiting, at_work)
+        raise
+
 
 Floats = NDArray[np.float64]
 
@@ -45,9 +113,9 @@ class Batch:
     Most arrays have the shape (n_groups, k, N_LANES): a group of robots after the other, one robot per lane.
 
     coefficients: The scene's coefficients for the kernels.
-    memory: Working memory of every thread, (Work, Actuation) of `der`.
+    memory: Working memory of every thread, (Work, Actuation) of `rods`.
     q, v: Node positions [m] and velocities [m/s], k = 2 n_nodes = n_node_rows. With a body, its angle and the roots of
-        its limbs follow, see der/star.py.
+        its limbs follow, see rods/star.py.
     a: Accelerations at the stages of a step.
     peaks: Factors by which limbs follow `shape`, k = n_limbs.
     times: Ends of the time steps of the present interval [s], shape (n_times,).

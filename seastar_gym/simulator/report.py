@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.contact import LARGEST_OVERLAP
+from seastar_gym.scene.scene import LARGEST_OVERLAP
 
 Floats = NDArray[np.float64]
 
@@ -59,13 +59,13 @@ class StrokeReport(NamedTuple):
     halvings: Time steps that did not converge or created energy. They are halved or, at the shortest, tried again.
     rejections: Time steps that were halved because their error was too large (Numerics.path_tolerance).
     energy_cuts: Steps after which velocities were reduced because the energy had grown a little, see
-        der/stepping/guard.py.
+        rods/guard.py.
     covered: Time covered [s].
     smallest_opening_angle: Smallest angle between neighbouring limbs at the hub [rad]. Below zero, limbs crossed. With
         a body it is pi.
     largest_overlap: Largest depth to which limbs pressed each other or a body at the ends of time steps, over the
         distance at which they touch: 1 where centre lines meet. 0 where surfaces are apart at the ends of all steps,
-        also if contact pushed them apart within a step. See scene/contact.py.
+        also if contact pushed them apart within a step. See scene/scene.py.
     error_estimate: Estimate of the hub's error, of space and time [m]: a bound that holds in about 95 % of strokes, see
         error_bars.py. NaN without `error_bars`.
     heating_time: Time for which wires were heated, summed over limbs [s]; NaN if the actuator does not say it.

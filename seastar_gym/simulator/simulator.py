@@ -1,39 +1,70 @@
-"""`Simulator`: a batch of robots of one scene, advanced by intervals of time, such as strokes."""
+"""`Simulator`: a batch of robots of one scene, advanced by intervals of time, such as strokes.
+
+Intervals that pause: what is looked at meanwhile, and what they return in the end.
+"""
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.der.rods import Work
-from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.interrupts import held_back
-from seastar_gym.model.coefficients import Coefficients
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.model import Coefficients
 from seastar_gym.processors import processors
+from seastar_gym.rods.bundles import Work
+from seastar_gym.rods.terms.hub import Actuation
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_array, as_finite, as_floats, require_choice, require_count, require_flag, shown
-from seastar_gym.scene.contact import LARGEST_OVERLAP
 from seastar_gym.scene.numerics import MAX_STEPS, require_duration
-from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.scene.scene import LARGEST_OVERLAP
 from seastar_gym.simulator.batch import Batch
-from seastar_gym.simulator.body_frame import best_fit_heading, root_places
-from seastar_gym.simulator.clock import Clock
-from seastar_gym.simulator.device_batch import DEVICES, DeviceBatch
-from seastar_gym.simulator.drive import Drive, checked_commands
-from seastar_gym.simulator.error_bars import ErrorBars, twin_scene
-from seastar_gym.simulator.growth import EnergyGrowth, is_watched
+from seastar_gym.simulator.device import DEVICES, DeviceBatch
+from seastar_gym.simulator.drive import Drive, checked_commands, ends_at, ends_of_parts
 from seastar_gym.simulator.lock import BROKEN_OFF, StrokeLock
-from seastar_gym.simulator.pauses import completed
 from seastar_gym.simulator.report import StrokeReport, make_report, warn_of_overlap
-from seastar_gym.simulator.schedule import ends_at, ends_of_parts
-from seastar_gym.simulator.state import State, checked_state
-from seastar_gym.simulator.watch import Watch
+from seastar_gym.simulator.state import Clock, State, best_fit_heading, checked_state, root_places
+from seastar_gym.simulator.watches import EnergyGrowth, ErrorBars, Watch, is_watched, twin_scene
+
+Result = TypeVar("Result")
+
+
+def pausing(
+    steps: Generator[float, None, Result], look: Callable[[float], float | None]
+) -> Generator[float, None, Result]:
+    """Yields what `look` makes of the time [s] at every pause of an interval, but for None; returns what it returns.
+
+    Closing or dropping it closes the interval, as an exception in `look` does.
+    """
+    with contextlib.closing(steps):
+        while True:
+            try:
+                time = next(steps)
+            except StopIteration as over:
+                return over.value
+            if (pause := look(time)) is not None:
+                yield pause
+
+
+def completed(steps: Generator[float, None, Result], look: Callable[[float], object] = lambda _: None) -> Result:
+    """What an interval returns in the end. look: Called with the time [s] at every pause."""
+
+    def unseen(time: float) -> None:
+        look(time)
+
+    try:
+        next(pausing(steps, unseen))
+    except StopIteration as over:
+        return over.value
+    raise AssertionError("It has no pauses of its own.")
+
 
 Floats = NDArray[np.float64]
 
@@ -107,7 +138,7 @@ class Simulator:
 
     @property
     def memory(self) -> list[tuple[Work, Actuation]]:
-        """Working memory of every thread, (Work, Actuation) of `der`."""
+        """Working memory of every thread, (Work, Actuation) of `rods`."""
         return self._batch.memory
 
     @property
@@ -115,7 +146,7 @@ class Simulator:
         """Node positions in the kernels' memory [m], shape (n_groups, 2 n_nodes, N_LANES), not a copy.
 
         Of another device than "cpu" it is a copy that travels back with the next interval: take it anew after each.
-        With a body, rows of its orientation and of its limbs' roots follow, see der/star.py.
+        With a body, rows of its orientation and of its limbs' roots follow, see rods/star.py.
         """
         return self._batch.q
 

@@ -5,6 +5,6 @@ run(sweep.batches(), "runs/limbs", Processes(2))
 table = read_results("runs/limbs").to_pandas()
 """  # noqa: E501
 
-from seastar_gym.extras import require_extra
+from seastar_gym.files import require_extra
 
 require_extra("Sweeps", "sweep", "pyarrow", "tqdm")

@@ -26,23 +26,16 @@ from typing import Any
 from tqdm import tqdm
 
 from seastar_gym.command import DEFAULT, INTERRUPTED, answered
-from seastar_gym.evaluation.path_file import PATH_HELP, load_path
-from seastar_gym.evaluation.swim import TIME_LIMIT
-from seastar_gym.extras import require_extra
-from seastar_gym.files import within, write_json
+from seastar_gym.evaluation.swim import PATH_HELP, TIME_LIMIT, load_path
+from seastar_gym.files import require_extra, within, write_json
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, shown
 from seastar_gym.scene.scene_file import load_scene
-from seastar_gym.simulator.device_batch import DEVICES
-from seastar_gym.sweep.axes import Axis, Range
-from seastar_gym.sweep.batches import Batch
-from seastar_gym.sweep.controllers import Route
-from seastar_gym.sweep.designs import Sweep
+from seastar_gym.simulator.device import DEVICES
+from seastar_gym.sweep.designs import Axis, Batch, Range, Route, Sweep
 from seastar_gym.sweep.executors import add_options, executor_of
-from seastar_gym.sweep.result_files import ResultFiles, best_result, result_file_of
-from seastar_gym.sweep.run import Progress, run
+from seastar_gym.sweep.run import Progress, ResultFiles, axis_of, best_result, result_file_of, run
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS
-from seastar_gym.sweep.text import axis_of
 
 
 def make_parser() -> argparse.ArgumentParser:

@@ -17,11 +17,10 @@ from queue import SimpleQueue
 from typing import Any, NamedTuple
 
 from seastar_gym.command import DEFAULT, refused_by_disk
-from seastar_gym.extras import require_extra
-from seastar_gym.files import within
+from seastar_gym.files import require_extra, within
 from seastar_gym.processors import processors
 from seastar_gym.scene.checks import require_count, shown
-from seastar_gym.sweep.batches import Batch
+from seastar_gym.sweep.designs import Batch
 
 Work = Callable[[Batch], bytes]
 """What is done with a batch: a function that can be sent to another process, and that returns a file."""

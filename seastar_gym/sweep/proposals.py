@@ -19,12 +19,9 @@ import pyarrow.parquet
 
 from seastar_gym.processors import processors
 from seastar_gym.scene.checks import require_choice, require_count, require_number
-from seastar_gym.sweep.axes import Range
-from seastar_gym.sweep.batches import Batch
-from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.designs import Batch, Range, Sweep
 from seastar_gym.sweep.executors import Outcome, Work, outcomes, sentence_of
-from seastar_gym.sweep.result_files import ResultFiles, result_file_of
-from seastar_gym.sweep.run import OnProgress, Progress
+from seastar_gym.sweep.run import OnProgress, Progress, ResultFiles, result_file_of
 from seastar_gym.sweep.swimming import units_of
 
 if TYPE_CHECKING:

@@ -13,11 +13,9 @@ from seastar_gym.envs.vector import ManyRobotsEnv
 from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.scene import Scene
-from seastar_gym.scene.per_robot import with_numbers
+from seastar_gym.scene.number import with_numbers
 from seastar_gym.simulator import Simulator
-from seastar_gym.sweep.batches import Batch
-from seastar_gym.sweep.configurations import Configuration
-from seastar_gym.sweep.controllers import Controller
+from seastar_gym.sweep.designs import Batch, Configuration, Controller
 
 Floats = NDArray[np.float64]
 

@@ -15,9 +15,9 @@ from drawn import drawn
 from odd_values import taken
 from refusals import assert_refused, assert_told
 from seastar_gym import Body, Certificate, Contact, Numerics, Scene, Seastar, SmaPulse, SmaWires, scene_for
-from seastar_gym.accuracy import command, commands, measure, timed_certificate
-from seastar_gym.accuracy.certificate import _digest
-from seastar_gym.accuracy.setting import resolved
+from seastar_gym.accuracy import command, measure, timed_certificate
+from seastar_gym.accuracy import measure as commands
+from seastar_gym.accuracy.certificate import _digest, resolved
 from seastar_gym.envs.attributes import RobotsEnv
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv

@@ -8,8 +8,11 @@ import pytest
 
 from currents import CURRENTS, velocity
 from seastar_gym import Body, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires, UniformCurrent
-from seastar_gym.accuracy import commands, endurance, measure, water
-from seastar_gym.accuracy.setting import Setting, at, resolved
+from seastar_gym.accuracy import measure
+from seastar_gym.accuracy import measure as commands
+from seastar_gym.accuracy import measure as endurance
+from seastar_gym.accuracy import measure as water
+from seastar_gym.accuracy.certificate import Setting, at, resolved
 from seastar_gym.scene.numerics import Resolution
 
 SCENE = Scene(Seastar(limb_length=0.08))

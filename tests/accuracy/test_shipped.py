@@ -11,10 +11,8 @@ import pytest
 from refusals import assert_refused
 from seastar_gym import Certificate, Contact, Limb, Numerics, Scene, Seastar, SmaPulse, Strip, Water, scene_for
 from seastar_gym.accuracy import Setting, chapters_certificate, timed_certificate
-from seastar_gym.accuracy.chapter import FOLDER, file_of
-from seastar_gym.accuracy.commands import draw_classes
-from seastar_gym.accuracy.endurance import energy_growth
-from seastar_gym.accuracy.measure import Swims, errors, path_lengths, swim_all
+from seastar_gym.accuracy.chapters import FOLDER, file_of
+from seastar_gym.accuracy.measure import Swims, draw_classes, energy_growth, errors, path_lengths, swim_all
 from seastar_gym.accuracy.measure import swim as swim_commands
 from seastar_gym.scene.numerics import PRESETS, Fidelity
 from studies.accuracy import (

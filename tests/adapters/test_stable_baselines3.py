@@ -7,7 +7,7 @@ from gymnasium.vector import AutoresetMode
 
 from later import Later
 from refusals import assert_refused
-from seastar_gym.controllers.scripted import scripted
+from seastar_gym.controllers.open_loop import scripted
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from agents.hyperparameters import Hyperparameters
+from agents.ppo import Hyperparameters
 from later import Later
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar, Sight, SmaWires, Water
@@ -19,7 +19,7 @@ from seastar_gym.controllers.checkpoint import load
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, pretrained
 from seastar_gym.envs.symmetry import VectorFrameStack
-from seastar_gym.evaluation.tasks import make_batch
+from seastar_gym.evaluation.rollout import make_batch
 
 distillation = Later("agents.distillation")
 learner_file = Later("agents.learner_file")

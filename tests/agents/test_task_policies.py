@@ -15,8 +15,8 @@ from seastar_gym.controllers.learned import load, save
 from seastar_gym.controllers.registry import load_agent, task_of
 from seastar_gym.envs.symmetry import VectorFrameStack
 from seastar_gym.envs.tasks.prey import Prey
+from seastar_gym.evaluation.rollout import make_batch, require_seen, swim_episodes
 from seastar_gym.evaluation.swim import swim
-from seastar_gym.evaluation.tasks import make_batch, require_seen, swim_episodes
 
 command = Later("agents.tasks.command")
 learning = Later("agents.tasks.learning")

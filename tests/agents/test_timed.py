@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from agents.hyperparameters import Hyperparameters
+from agents.ppo import Hyperparameters
 from later import Later
 from refusals import assert_refused
 from seastar_gym import Simulator
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.controllers.open_loop import scripted
 from seastar_gym.controllers.planner import Budget, Planner
-from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 import seastar_gym
-from agents.hyperparameters import Hyperparameters
+from agents.ppo import Hyperparameters
 
 FILE = Path(__file__).parents[2] / "agents" / "rl_zoo3" / "ppo.yml"
 SETTINGS = yaml.safe_load(FILE.read_text(encoding="utf-8"))

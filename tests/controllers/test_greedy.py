@@ -6,7 +6,7 @@ import pytest
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaWires
 from seastar_gym.controllers import greedy
 from seastar_gym.controllers.greedy import Displacements, GreedyPolicy, displacement_map, measure_gaits
-from seastar_gym.controllers.scripted import to_actions
+from seastar_gym.controllers.open_loop import to_actions
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import action_table
 from seastar_gym.evaluation.swim import swim

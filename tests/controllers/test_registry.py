@@ -15,17 +15,17 @@ from gymnasium.spaces import Box, Discrete
 from later import Later
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar
-from seastar_gym.controllers import checkpoint, third_party
+from seastar_gym.controllers import checkpoint
+from seastar_gym.controllers import registry as third_party
 from seastar_gym.controllers.contract import actions_in, actions_of, observed, require_fit, require_policy, starts
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.learned import BUNDLED, bundled_file, by_name, of_task, pretrained
+from seastar_gym.controllers.open_loop import OpenLoopPolicy, RandomPolicy, scripted
 from seastar_gym.controllers.planner import TIMED_BUDGETS, Budget, Planner, budget_for
 from seastar_gym.controllers.registry import AGENTS, default_agents, files_of, load_agent, load_agents
-from seastar_gym.controllers.scripted import OpenLoopPolicy, RandomPolicy, scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.evaluation.many import swim_many
-from seastar_gym.evaluation.swim import swim
+from seastar_gym.evaluation.swim import swim, swim_many
 
 stable_baselines3 = Later("stable_baselines3")
 
@@ -178,7 +178,7 @@ def test_policies_have_names_and_files(monkeypatch):
         assert Description.from_facts(json.loads(file.with_suffix(".json").read_text())).scene == pretrained(name).scene
     assert pretrained().decision_period == 1.0
     assert load_agents(["timed-0.2s"], decision_period=0.2)["timed-0.2s"].decision_period == 0.2
-    monkeypatch.setattr("seastar_gym.controllers.third_party.is_model", lambda file: False)
+    monkeypatch.setattr("seastar_gym.controllers.registry.is_model", lambda file: False)
     monkeypatch.setattr("seastar_gym.controllers.checkpoint.load", lambda file: file)
     monkeypatch.setattr("seastar_gym.controllers.learned.load", lambda file: file)
     named = load_agents(["best.zip", "runs/last.safetensors", "runs/best.zip"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Simulator
-from seastar_gym.controllers.scripted import GAITS, RandomPolicy, scripted, to_actions
+from seastar_gym.controllers.open_loop import GAITS, RandomPolicy, scripted, to_actions
 from seastar_gym.envs.commands import action_space, to_commands
 from seastar_gym.gaits import pentagon_gait, straight_gait
 

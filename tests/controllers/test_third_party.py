@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import seastar_gym
-from seastar_gym.controllers.scripted import scripted
-from seastar_gym.controllers.third_party import RobotByRobot, call_function
-from seastar_gym.evaluation.many import swim_many
+from seastar_gym.controllers.open_loop import scripted
+from seastar_gym.controllers.registry import RobotByRobot, call_function
+from seastar_gym.evaluation.swim import swim_many
 from seastar_gym.scene import Scene
 
 MINE = """
@@ -64,7 +64,7 @@ def test_what_cannot_be_copied_is_shared_and_what_is_batched_is_not_wrapped(here
     actions, _ = policy.predict(np.ones((2, 40), np.float32), None, np.ones(2, bool))
     assert actions.tolist() == [8, 9]
     Path("mine_batched.py").write_text("def make(env):\n    from seastar_gym.gaits import pentagon_gait\n"
-                                       "    from seastar_gym.controllers.scripted import scripted\n"
+                                       "    from seastar_gym.controllers.open_loop import scripted\n"
                                        "    return scripted('pentagon')\n")  # fmt: skip
     assert type(call_function("mine_batched:make", None)) is type(scripted("pentagon"))
 

@@ -45,12 +45,12 @@ from seastar_gym import (
     VectorSymmetryReduction,
     Water,
 )
-from seastar_gym.accuracy.info import NAMES
-from seastar_gym.envs.reward import pulses_of
+from seastar_gym.accuracy.chapters import NAMES
+from seastar_gym.envs.options import pulses_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.scene.serial import to_dict
-from seastar_gym.simd.lanes import N_LANES
 
 SWIM = "SeastarSwim-v0"
 IDS = tuple(sorted(id for id in gym.registry if id.startswith("Seastar")))

@@ -30,23 +30,16 @@ from seastar_gym.envs.attributes import checked_options
 from seastar_gym.envs.commands import action_space, choices, command_table, to_commands
 from seastar_gym.envs.frame import Frame
 from seastar_gym.envs.goal import GoalForm
-from seastar_gym.envs.headings import HeadingTargets
-from seastar_gym.envs.layout import Layout
+from seastar_gym.envs.observation import Layout
+from seastar_gym.envs.options import HeadingTargets, RewardWeights
 from seastar_gym.envs.paths import FARTHEST, PATHS, make_path, register_path
 from seastar_gym.envs.randomization import LogUniform, Normal
 from seastar_gym.envs.rendering import Renderer
-from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.sight import TEMPLATE, read_camera
-from seastar_gym.envs.symmetry import (
-    Symmetry,
-    VectorFrameStack,
-    VectorSymmetryReduction,
-    memory_mirror,
-    symmetry_of,
-)
-from seastar_gym.envs.tasks.course import Pursuit, draw_course
+from seastar_gym.envs.symmetry import Symmetry, VectorFrameStack, VectorSymmetryReduction, memory_mirror, symmetry_of
 from seastar_gym.envs.tasks.obst_trap import ObstTrap, draw_discs
+from seastar_gym.envs.tasks.prey import Pursuit, draw_course
 from seastar_gym.envs.vector import SeastarSwimVectorEnv, checked_seeds
 from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.scene.numerics import MAX_STEPS, SHORTEST

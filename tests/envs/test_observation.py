@@ -1,4 +1,4 @@
-"""Every number of an observation is what the table in envs/layout.py says, whichever way the robot points."""
+"""Every number of an observation is what the table in envs/observation.py says, whichever way the robot points."""
 
 import gymnasium as gym
 import numpy as np
@@ -20,14 +20,12 @@ from seastar_gym import (
     Uniform,
 )
 from seastar_gym.envs.commands import command_table
-from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
-from seastar_gym.envs.observation import observe
+from seastar_gym.envs.observation import HEADINGS, VELOCITY_SCALE, Layout, at_stations, heading_of, observe, stations_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.stations import at_stations, heading_of, stations_of
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simd.rows import to_rows
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.lanes.rows import to_rows
 
 SCENES = [
     Scene(TEN, numerics=Numerics.preset("fast")),

@@ -12,7 +12,7 @@ from seastar_gym.envs.frame import Frame, body_of
 from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.envs.rendering import SMALLEST, Renderer
 from seastar_gym.envs.scenery import Ring, Scenery
-from seastar_gym.scene.currents import ShearCurrent, UniformCurrent, Vortex
+from seastar_gym.scene.water import ShearCurrent, UniformCurrent, Vortex
 
 pygame = pytest.importorskip("pygame")
 

@@ -9,27 +9,17 @@ import pytest
 
 import seastar_gym
 from refusals import assert_refused
-from seastar_gym import (
-    FailBlind,
-    Miswired,
-    ObstTrap,
-    Prey,
-    Prizes,
-    Sight,
-    Station,
-)
-from seastar_gym.envs.layout import Layout
+from seastar_gym import FailBlind, Miswired, ObstTrap, Prey, Prizes, Sight, Station
+from seastar_gym.envs.observation import Layout
 from seastar_gym.envs.randomization import drawn_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import limb_order, symmetry_in, transform_commands
 from seastar_gym.envs.tasks import NAMED
-from seastar_gym.envs.tasks.course import CHASE, Courses, Pursuit, draw_course
-from seastar_gym.envs.tasks.discs import rims, ways
-from seastar_gym.envs.tasks.obst_trap import FIRST, LAST, draw_discs, draw_horseshoe, draw_kind
-from seastar_gym.envs.tasks.prizes import draw_prizes
-from seastar_gym.envs.tasks.rounds import best_round, distances, greedy_round
+from seastar_gym.envs.tasks.obst_trap import FIRST, LAST, draw_discs, draw_horseshoe, draw_kind, rims, ways
+from seastar_gym.envs.tasks.prey import CHASE, Courses, Pursuit, draw_course
+from seastar_gym.envs.tasks.prizes import best_round, distances, draw_prizes, greedy_round
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.currents import UniformCurrent
+from seastar_gym.scene.water import UniformCurrent
 
 IDS = tuple(seastar_gym.TASKS)
 HIDDEN = {

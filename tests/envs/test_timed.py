@@ -16,7 +16,7 @@ from seastar_gym import (
     SymmetryReduction,
     ThermalSma,
 )
-from seastar_gym.accuracy.info import IN_TIME
+from seastar_gym.accuracy.chapters import IN_TIME
 from seastar_gym.envs.commands import action_masks, to_commands
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv

@@ -13,20 +13,17 @@ from matplotlib.colors import to_rgb
 from evaluation.made_up import made_up_swim
 from refusals import assert_refused
 from seastar_gym import TASKS, Scene, SmaPulse
-from seastar_gym.controllers.scripted import scripted
+from seastar_gym.controllers.open_loop import scripted
 from seastar_gym.envs.commands import Actions, action_space, decisions_in, to_commands
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks import NAMED
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.comparison import evaluate
-from seastar_gym.evaluation.disturbances import Disturbance
 from seastar_gym.evaluation.films import CLOSING_SECONDS
-from seastar_gym.evaluation.measures import MEASURES, SECONDS, measure_of, measure_of_task
 from seastar_gym.evaluation.pictures import COLOURS, FPS, FRAMES_PER_STROKE
 from seastar_gym.evaluation.results import results, time_series, write_csv
-from seastar_gym.evaluation.rollout import Episodes, rollout
-from seastar_gym.evaluation.swim import RECORDED, swim, swims_of
-from seastar_gym.evaluation.tasks import make_batch
+from seastar_gym.evaluation.rollout import MEASURES, SECONDS, Episodes, make_batch, measure_of, measure_of_task, rollout
+from seastar_gym.evaluation.swim import RECORDED, Disturbance, swim, swims_of
 
 SHORT = [[0.02, 0.0]]
 EASY = {"fidelity": "fast", "waypoint_radius": 2e-3, "say": lambda text: None}

@@ -11,13 +11,22 @@ from PIL import Image
 from evaluation.made_up import MARKUP, swims
 from refusals import assert_refused
 from seastar_gym import Scene, UniformCurrent, Vortex, Water
-from seastar_gym.controllers.scripted import scripted
+from seastar_gym.controllers.open_loop import scripted
 from seastar_gym.envs.frame import Frame
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation import pictures
 from seastar_gym.evaluation.comparison import evaluate
-from seastar_gym.evaluation.films import CLOSING_SECONDS, film, film_format, frequent_colours, shrunk, write_gif
-from seastar_gym.evaluation.playback import UNIT, Playback, RecordingEnv
+from seastar_gym.evaluation.films import (
+    CLOSING_SECONDS,
+    UNIT,
+    Playback,
+    RecordingEnv,
+    film,
+    film_format,
+    frequent_colours,
+    shrunk,
+    write_gif,
+)
 from seastar_gym.evaluation.report import charts, page
 from seastar_gym.evaluation.report.charts import Curve
 from seastar_gym.evaluation.report.page import Remarks, ResultsTable
@@ -393,6 +402,6 @@ def test_a_gif_is_smaller_and_a_small_flat_area_keeps_its_colour(tmp_path):
 
 def test_missing_writers_of_films_are_named(tmp_path, monkeypatch):
     assert film_format(tmp_path / "film.GIF") == ".gif"
-    monkeypatch.setattr("seastar_gym.extras.find_spec", lambda name: None if name == "imageio_ffmpeg" else name)
+    monkeypatch.setattr("seastar_gym.files.find_spec", lambda name: None if name == "imageio_ffmpeg" else name)
     with pytest.raises(ModuleNotFoundError, match=r"Films need imageio_ffmpeg: pip install .*\[render\]"):
         film_format(tmp_path / "film.mp4")

@@ -9,13 +9,21 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym.cli.main import main
-from seastar_gym.controllers import GreedyPolicy, load_agent, scripted
+from seastar_gym.controllers import GreedyPolicy, load_agent
+from seastar_gym.controllers import open_loop as scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.evaluation.measures import MEASURES, SECONDS, measure_of
+from seastar_gym.evaluation.rollout import (
+    MEASURES,
+    SECONDS,
+    make_batch,
+    measure_of,
+    require_seen,
+    swim_episodes,
+    task_ids,
+)
 from seastar_gym.evaluation.scores import Scores
-from seastar_gym.evaluation.tasks import make_batch, require_seen, swim_episodes, task_ids
 
 SWIM, SHORT, OTHER = "SeastarSwim-v0", "SeastarShort-v0", "SeastarDrift-v0"
 
@@ -65,7 +73,7 @@ def test_returns_are_sums_of_rewards_and_who_does_not_arrive_has_the_time_limit(
 
 
 def test_a_task_of_another_measure_without_a_batch_is_swum_on_its_held_out_split(tasks, monkeypatch):
-    monkeypatch.setattr("seastar_gym.evaluation.tasks.task_ids", lambda: [OTHER])
+    monkeypatch.setattr("seastar_gym.evaluation.rollout.task_ids", lambda: [OTHER])
     env = DriftEnv("test", fidelity="fast")
     assert measure_of(env) is MEASURES[Station] and measure_of(SeastarSwimEnv()) is SECONDS
     swum = swim_episodes(OTHER, scripted("rest"), [0, 1])

@@ -6,16 +6,15 @@ import pytest
 from seastar_gym import Scene
 from seastar_gym.cli.main import main
 from seastar_gym.controllers.greedy import GreedyPolicy
-from seastar_gym.controllers.scripted import scripted
-from seastar_gym.envs.layout import Layout
+from seastar_gym.controllers.open_loop import scripted
+from seastar_gym.envs.observation import Layout
 from seastar_gym.envs.options import SwimOptions, make_scene
 from seastar_gym.envs.robots import Robots
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.waypoints import AlongPath
-from seastar_gym.evaluation import results, statistics
-from seastar_gym.evaluation.disturbances import DISTURBANCES, Disturbance, DisturbedRobots
-from seastar_gym.evaluation.many import swim_many
-from seastar_gym.evaluation.swim import swim
+from seastar_gym.evaluation import results
+from seastar_gym.evaluation import results as statistics
+from seastar_gym.evaluation.swim import DISTURBANCES, Disturbance, DisturbedRobots, swim, swim_many
 from seastar_gym.evaluation.trials import SETS, read_trials
 
 FAST = Scene.preset("fast")

@@ -18,7 +18,7 @@ from oracle import Star, elastic_hessian, inertia_matrix
 from seastar_gym import Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.accuracy.measure import path_lengths
 from seastar_gym.gaits import PAIRS, STRAIGHT, straight_gait
-from seastar_gym.model.rods import make_rods
+from seastar_gym.model import make_rods
 
 KEPT = Path(__file__).parents[1] / "golden" / "exact"
 IN_LINE = {"continuum": Seastar(2, 10), "chapter": Seastar(2, 10, hub_hinge="turning", discretisation="chapter")}

@@ -7,19 +7,8 @@ from typing import Any
 import numpy as np
 
 from fuzz.scenes import Case
-from seastar_gym import (
-    Attachment,
-    Body,
-    GridCurrent,
-    Limb,
-    Scene,
-    ShearCurrent,
-    State,
-    UniformCurrent,
-    Vortex,
-    Water,
-)
-from seastar_gym.scene.actuators.actuator import complete, mirrored
+from seastar_gym import Attachment, Body, GridCurrent, Limb, Scene, ShearCurrent, State, UniformCurrent, Vortex, Water
+from seastar_gym.scene.actuators.base import complete, mirrored
 
 Floats = np.ndarray
 

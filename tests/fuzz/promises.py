@@ -11,13 +11,13 @@ from fuzz.frames import FRAMES, MOVING, REST, Frame, can_be_seen_from
 from fuzz.scenes import IN_WATER, Case, Terms
 from momenta import turned
 from seastar_gym import Numerics, Scene, Simulator, SolverStatus, State, StrokeReport, UniformCurrent
-from seastar_gym.der.rods import Rods
-from seastar_gym.der.stepping.schemes import SCHEMES
-from seastar_gym.model.rods import make_limits, make_rods
-from seastar_gym.scene.per_robot import side_by_side
-from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.model import make_limits, make_rods
+from seastar_gym.rods.bundles import Rods
+from seastar_gym.rods.step import SCHEMES
+from seastar_gym.scene.number import side_by_side
+from seastar_gym.simulator.drive import interval_times
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
-from seastar_gym.simulator.schedule import interval_times
 
 FINEST = 4096
 """Steps are not cut finer than the nominal one over this."""

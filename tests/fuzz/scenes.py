@@ -43,12 +43,12 @@ from seastar_gym import (
     Vortex,
     Water,
 )
-from seastar_gym.scene.actuators.actuator import Actuator
-from seastar_gym.scene.currents import AnyCurrent
+from seastar_gym.scene.actuators.base import Actuator
+from seastar_gym.scene.limb import n_hub_hinges, natural_hub_angle
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.robot import Discretisation, HubHinge
-from seastar_gym.scene.shape import n_hub_hinges, natural_hub_angle
-from seastar_gym.simulator.body_frame import best_fit_heading
+from seastar_gym.scene.water import AnyCurrent
+from seastar_gym.simulator.state import best_fit_heading
 
 Terms = frozenset[str]
 

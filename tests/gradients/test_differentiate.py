@@ -23,7 +23,7 @@ from seastar_gym import (
     Water,
 )
 from seastar_gym.gradients import differentiate
-from seastar_gym.scene.per_robot import at, with_numbers
+from seastar_gym.scene.number import at, with_numbers
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="dual lanes have compiled code alone")
 

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from seastar_gym.gradients.implicit import DUAL
-from seastar_gym.gradients.on_tape import TAPED
-from seastar_gym.simd import dual_lanes, lanes, tape_lanes
-from seastar_gym.simd.compilation import STRICT
-from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simd.pipeline import compiler_of
+from seastar_gym.gradients.tape import DUAL, TAPED
+from seastar_gym.lanes import dual as dual_lanes
+from seastar_gym.lanes import registers as lanes
+from seastar_gym.lanes import tape as tape_lanes
+from seastar_gym.lanes.compile import STRICT
+from seastar_gym.lanes.pipeline import compiler_of
+from seastar_gym.lanes.registers import N_LANES
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="these lanes have compiled code alone")
 

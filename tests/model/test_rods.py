@@ -1,4 +1,4 @@
-"""Coefficients of rods are the chapter's; those of the continuum: tests/der/test_terms.py."""
+"""Coefficients of rods are the chapter's; those of the continuum: tests/rods/test_terms.py."""
 
 import math
 
@@ -7,7 +7,7 @@ import pytest
 
 from oracle import Star
 from seastar_gym import Limb, Numerics, Scene, Seastar, SmaPulse, Water
-from seastar_gym.model.rods import make_limits, make_rods
+from seastar_gym.model import make_limits, make_rods
 from seastar_gym.scene.numerics import ADAPTATION, MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP
 
 

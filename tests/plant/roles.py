@@ -10,7 +10,7 @@ import numpy as np
 from seastar_gym import Scene, Sight, Simulator, SmaWires
 from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.lines import LinePlant, Server, serve
-from seastar_gym.plant.simulated import SimulatedPlant
+from seastar_gym.plant.plant import SimulatedPlant
 from seastar_gym.plant.swim import PlantSwim
 
 PULSE = 2.0

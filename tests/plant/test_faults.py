@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from faults import COLD_WITHIN, LIES, Tank, garbage, greedy
-from seastar_gym.plant import heat
+from seastar_gym.plant import guard as heat
 from seastar_gym.plant.guard import Guard, Limits
 from seastar_gym.plant.lines import LinePlant, Server, sealed
 from seastar_gym.plant.plant import PlantError

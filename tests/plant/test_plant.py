@@ -26,7 +26,7 @@ from seastar_gym.cli.drive import report
 from seastar_gym.cli.main import main
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.scripted import OpenLoopPolicy
+from seastar_gym.controllers.open_loop import OpenLoopPolicy
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.identify import Measurement, identify, trajectory, with_parameters
@@ -34,10 +34,8 @@ from seastar_gym.identify.measurement import ORIENTATION
 from seastar_gym.plant import lines
 from seastar_gym.plant.guard import FIRST, Guard, Limits
 from seastar_gym.plant.lines import LineError, LinePlant, Server, open_serial, opened, sealed
-from seastar_gym.plant.logs import nodes_of
-from seastar_gym.plant.plant import PlantError, Sighting
-from seastar_gym.plant.simulated import SimulatedPlant
-from seastar_gym.plant.swim import PlantSwim
+from seastar_gym.plant.plant import PlantError, Sighting, SimulatedPlant
+from seastar_gym.plant.swim import PlantSwim, nodes_of
 
 SCENE = Scene(actuator=SmaWires(heating_time=0.08, period=0.5)).at("fast")
 OPTIONS = {"scene": SCENE, "decision_period": 0.5, "actions": "pairs"}

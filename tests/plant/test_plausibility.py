@@ -9,8 +9,7 @@ import pytest
 from refusals import assert_refused
 from seastar_gym import Scene, Sight, Simulator, SmaWires
 from seastar_gym.plant.guard import Guard, Limits
-from seastar_gym.plant.plant import PlantError, Sighting
-from seastar_gym.plant.simulated import SimulatedPlant
+from seastar_gym.plant.plant import PlantError, Sighting, SimulatedPlant
 from seastar_gym.plant.swim import PlantSwim
 
 SCENE = Scene(actuator=SmaWires(heating_time=0.08, period=0.5)).at("fast")

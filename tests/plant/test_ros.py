@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from seastar_gym import Scene, Sight, Simulator, SmaWires
-from seastar_gym.controllers import scripted
+from seastar_gym.controllers import open_loop as scripted
 from seastar_gym.plant.guard import Limits
-from seastar_gym.plant.simulated import SimulatedPlant
+from seastar_gym.plant.plant import SimulatedPlant
 from seastar_gym.plant.swim import PlantSwim
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ros_plant.py"

@@ -39,8 +39,7 @@ from seastar_gym.scene.checks import (
     require_within,
     shown,
 )
-from seastar_gym.scene.number import declared
-from seastar_gym.scene.per_robot import PerRobot, unit_of
+from seastar_gym.scene.number import PerRobot, declared, unit_of
 from seastar_gym.scene.serial import KINDS
 
 # A number is within what is declared of it, for all robots and for each.

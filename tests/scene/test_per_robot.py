@@ -19,7 +19,7 @@ from seastar_gym import (
     ThermalSma,
     Water,
 )
-from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.lanes.registers import N_LANES
 from strokes import assert_same_bits
 
 N_ROBOTS = N_LANES + 3

@@ -31,7 +31,7 @@ from seastar_gym import (
     UniformCurrent,
     Water,
 )
-from seastar_gym.model.rods import make_rods
+from seastar_gym.model import make_rods
 from unlike import robot_and_star
 
 TRIANGLE = ((0.03, -0.01), (-0.01, 0.02), (-0.02, -0.02))

@@ -8,17 +8,7 @@ import numpy as np
 import pytest
 
 from oracle import Star
-from seastar_gym import (
-    Contact,
-    Limb,
-    Numerics,
-    Scene,
-    Seastar,
-    Simulator,
-    SmaPulse,
-    Vortex,
-    Water,
-)
+from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Vortex, Water
 
 FIDELITIES = ("fast", "balanced", "accurate", "reference", "chapter")
 

@@ -9,24 +9,10 @@ from scipy.special import ellipe, ellipk, ellipkm1
 
 import oracle
 from exact.solutions import let_pass, pause
-from seastar_gym import (
-    Contact,
-    Disc,
-    Limb,
-    Numerics,
-    Scene,
-    Seastar,
-    Section,
-    Simulator,
-    SmaPulse,
-    Strip,
-    Tube,
-    Water,
-)
+from seastar_gym import Contact, Disc, Limb, Numerics, Scene, Seastar, Section, Simulator, SmaPulse, Strip, Tube, Water
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.model.mesh import make_mesh
-from seastar_gym.model.rods import make_rods
-from seastar_gym.scene.per_robot import numbers_of, unit_of, with_numbers
+from seastar_gym.model import make_mesh, make_rods
+from seastar_gym.scene.number import numbers_of, unit_of, with_numbers
 from seastar_gym.scene.section import BROADSIDE, broadside
 from unlike import DIFFERENT, robot_and_star
 

@@ -39,8 +39,8 @@ from seastar_gym import (
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.tasks import NAMED
 from seastar_gym.envs.waypoints import AlongPath
-from seastar_gym.scene.actuators.pulse import HeatingAndCooling
-from seastar_gym.scene.per_robot import numbers_of
+from seastar_gym.scene.actuators.curves import HeatingAndCooling
+from seastar_gym.scene.number import numbers_of
 from seastar_gym.scene.serial import KINDS, VERSION, from_dict, to_dict
 
 

@@ -42,8 +42,8 @@ from seastar_gym import (
     Vortex,
     Water,
 )
-from seastar_gym.scene.per_robot import side_by_side
-from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.scene.number import side_by_side
 from seastar_gym.simulator import batch
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
 from simulator.test_conservation import CURLED

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse
 from seastar_gym.envs.robots import first_after
-from seastar_gym.simulator.pauses import completed, pausing
-from seastar_gym.simulator.schedule import interval_times, step_times
+from seastar_gym.simulator.drive import interval_times, step_times
+from seastar_gym.simulator.simulator import completed, pausing
 
 CHAPTER = (0.0, 0.1, 1.0)
 durations = st.floats(1e-3, 10.0)

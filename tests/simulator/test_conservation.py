@@ -26,8 +26,8 @@ from seastar_gym import (
     UniformCurrent,
     Water,
 )
-from seastar_gym.der.stepping.schemes import SCHEMES
-from seastar_gym.model.rods import make_rods
+from seastar_gym.model import make_rods
+from seastar_gym.rods.step import SCHEMES
 from strokes import ternary
 
 LOPSIDED = Seastar(3, 5, body=Body(
@@ -87,7 +87,7 @@ def swims() -> Iterator[Any]:
         for hub in HUBS:
             scene = Scene(robot_with(hub), None, numerics=loose)
             yield case(f"{scheme}, {hub}", scene, 8, lambda simulator: rattled(simulator, 0.05), *strokes)
-        # Where edges are 1e16 times as stiff as inertia, elimination leaves nothing of that, see der/momentum.py.
+        # Where edges are 1e16 times as stiff as inertia, elimination leaves nothing of that, see rods/guard.py.
         for nodes in (2, 10, 58):
             for n_limbs, modulus, tolerance in ((3, 1e11, 1e-8), (5, 1e11, 5e-4), (12, 1e9, 5e-4)):
                 robot = Seastar(n_limbs, nodes, limb_length=3e-3, rod_radius=1e-4, youngs_modulus=modulus)

@@ -6,16 +6,7 @@ import numpy as np
 import pytest
 
 import oracle
-from seastar_gym import (
-    AlongLimb,
-    MeasuredCurve,
-    Numerics,
-    Scene,
-    Seastar,
-    Simulator,
-    SmaPulse,
-    Stiffening,
-)
+from seastar_gym import AlongLimb, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse, Stiffening
 from seastar_gym.gaits import PAIRS, STRAIGHT
 from simulator.test_oracle_steps import BENT, TWIN
 

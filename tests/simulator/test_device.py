@@ -15,20 +15,13 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import (
-    Numerics,
-    Scene,
-    Seastar,
-    Simulator,
-    SmaPulse,
-    StrokeReport,
-)
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, StrokeReport
 from seastar_gym.envs.observation import observing
 from seastar_gym.envs.vector import Buffers
-from seastar_gym.simd import cuda
-from seastar_gym.simd.compilation import kept_code
-from seastar_gym.simd.device import Program
-from seastar_gym.simulator.device_batch import DEVICES, DeviceBatch, program_of
+from seastar_gym.lanes import cuda
+from seastar_gym.lanes.compile import kept_code
+from seastar_gym.lanes.device import Program
+from seastar_gym.simulator.device import DEVICES, DeviceBatch, program_of
 from seastar_gym.sweep.command import main as sweep_command
 from strokes import assert_same, finished
 from studies.gpu import (

@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 
 from seastar_gym import Contact, DomainRandomization, Numerics, Scene, Seastar, Simulator, SmaPulse, Uniform
-from seastar_gym.accuracy.commands import STROKES, draw_classes
-from seastar_gym.accuracy.measure import SHORT, swim
-from seastar_gym.accuracy.setting import resolved
+from seastar_gym.accuracy.certificate import resolved
+from seastar_gym.accuracy.measure import SHORT, STROKES, draw_classes, swim
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.contact import LARGEST_OVERLAP
-from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simulator import error_bars
-from seastar_gym.simulator.growth import WINDOW
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.scene.scene import LARGEST_OVERLAP
+from seastar_gym.simulator import watches as error_bars
+from seastar_gym.simulator.watches import WINDOW
 from strokes import assert_same
 
 FAST = Scene.preset("fast")

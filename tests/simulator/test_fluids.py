@@ -20,7 +20,7 @@ from seastar_gym import (
     Water,
     relaxation_time,
 )
-from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.lanes.registers import N_LANES
 from strokes import finished
 
 # Closed forms

@@ -21,10 +21,10 @@ from seastar_gym import (
     UniformCurrent,
     Water,
 )
-from seastar_gym.accuracy.endurance import long_swims
-from seastar_gym.der.stepping.report import SOLVER_ITERATIONS
-from seastar_gym.model import rods as module
-from seastar_gym.simulator.growth import ENOUGH, EVERY, WINDOW, is_watched
+from seastar_gym import model as module
+from seastar_gym.accuracy.measure import long_swims
+from seastar_gym.rods.step import SOLVER_ITERATIONS
+from seastar_gym.simulator.watches import ENOUGH, EVERY, WINDOW, is_watched
 from strokes import finished
 
 RESONANT = Scene(Seastar(nodes_per_limb=12), numerics=Numerics("implicit-midpoint", 10e-3, 1e-5))

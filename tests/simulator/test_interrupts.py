@@ -18,11 +18,11 @@ import pytest
 
 from seastar_gym import DomainRandomization, Scene, Seastar, Simulator, SmaPulse, ThermalSma, Uniform
 from seastar_gym.interrupts import held_back, let_through
-from seastar_gym.model.coefficients import Coefficients
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.model import Coefficients
 from seastar_gym.scene import Numerics
-from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import batch as module
-from seastar_gym.simulator.clock import Clock
+from seastar_gym.simulator.state import Clock
 from strokes import assert_same
 
 FAST = Numerics.preset("fast")

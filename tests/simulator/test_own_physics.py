@@ -11,8 +11,8 @@ from own_terms import Trap
 from seastar_gym import Body, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, register_scheme, register_term
 from seastar_gym.envs.symmetry.wrappers import require_symmetry
 from seastar_gym.gradients import differentiate
+from seastar_gym.lanes.functions import code_digest
 from seastar_gym.scene import numerics
-from seastar_gym.simd.functions import code_digest
 
 START = (0.03, -0.01)  # m/s
 
@@ -106,7 +106,7 @@ def test_scenes_with_own_terms_and_schemes_come_back_from_plain_data():
 
 SOURCE = """
 from constants import RATE
-from seastar_gym.simd.compilation import kernel
+from seastar_gym.lanes.compile import kernel
 
 @kernel
 def half(x):

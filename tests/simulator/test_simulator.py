@@ -8,11 +8,10 @@ import pytest
 
 from hubs import TEN, robot_with
 from seastar_gym import Body, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State
-from seastar_gym.envs.observation import observed_rows
-from seastar_gym.envs.stations import heading_of
-from seastar_gym.scene.per_robot import side_by_side
-from seastar_gym.simd.dispatch import KnownCode, code_for
-from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.envs.observation import heading_of, observed_rows
+from seastar_gym.lanes.dispatch import KnownCode, code_for
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.scene.number import side_by_side
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
 from strokes import assert_same_bits, finished
 

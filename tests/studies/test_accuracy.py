@@ -7,8 +7,7 @@ import pytest
 
 from seastar_gym import Numerics, Scene
 from seastar_gym.accuracy import Certificate, timed_certificate
-from seastar_gym.accuracy.commands import CLASSES
-from seastar_gym.accuracy.measure import Errors, path_lengths, swim
+from seastar_gym.accuracy.measure import CLASSES, Errors, path_lengths, swim
 from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene.numerics import PRESETS, Resolution
 from studies import accuracy as study

@@ -10,7 +10,7 @@ import pytest
 
 from seastar_gym import Numerics, Scene, Seastar
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.evaluation.tasks import make_batch
+from seastar_gym.evaluation.rollout import make_batch
 from seastar_gym.scene.actuators.sma_limb import FREQUENCIES, MEASURED
 from studies import benchmark, fit, gallery, gpu, mutants, robustness, swim_page, tasks
 from studies.command import main

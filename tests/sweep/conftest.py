@@ -14,8 +14,7 @@ if not find_spec("optuna"):
 @pytest.fixture
 def sweep():
     """Four batches of four designs and one stroke."""
-    from seastar_gym.sweep.axes import Choices, Range
-    from seastar_gym.sweep.designs import Sweep
+    from seastar_gym.sweep.designs import Choices, Range, Sweep
 
     axes = Range("robot.limb_length", 0.05, 0.15), Choices("robot.n_limbs", (3, 5))
     return Sweep(Scene.preset("fast"), axes, settling=0, measured=1, samples=8, robots=4)

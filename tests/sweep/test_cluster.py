@@ -10,11 +10,9 @@ import pytest
 import works
 from refusals import assert_refused
 from seastar_gym.scene import Scene
-from seastar_gym.sweep.axes import Range
-from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.designs import Range, Sweep
 from seastar_gym.sweep.executors import RayTasks
-from seastar_gym.sweep.result_files import ResultFiles, read_result_file
-from seastar_gym.sweep.run import run
+from seastar_gym.sweep.run import ResultFiles, read_result_file, run
 
 ray = pytest.importorskip("ray")
 ROOT = Path(__file__).resolve().parents[2]

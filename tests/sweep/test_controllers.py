@@ -15,13 +15,10 @@ from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.swim import swim as swim_one
 from seastar_gym.scene import Scene
-from seastar_gym.sweep.axes import Choices
 from seastar_gym.sweep.command import main
-from seastar_gym.sweep.controllers import Route
-from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.designs import Choices, Route, Sweep
 from seastar_gym.sweep.executors import Processes
-from seastar_gym.sweep.result_files import ResultFiles, read_results, result_file_of
-from seastar_gym.sweep.run import run
+from seastar_gym.sweep.run import ResultFiles, read_results, result_file_of, run
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS, swim
 
 TESTS = Path(__file__).resolve().parents[1]

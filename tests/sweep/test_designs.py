@@ -11,10 +11,7 @@ from seastar_gym.gaits import STRAIGHT, lagged_gait, thrifty_gait
 from seastar_gym.scene import Limb, Numerics, Scene, Seastar, SmaPulse
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.simulator import Simulator
-from seastar_gym.sweep.axes import Choices, Range
-from seastar_gym.sweep.batches import Batch
-from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.gait import gait_of
+from seastar_gym.sweep.designs import Batch, Choices, Range, Sweep, gait_of
 from seastar_gym.sweep.swimming import REFUSED, UNITS, swim, ways
 
 FAST = Scene.preset("fast")
@@ -110,7 +107,7 @@ def test_a_cell_is_named_by_all_that_its_results_depend_on(monkeypatch):
         names(axes=(Range("robot.limb_length", 0.05, 0.16),)), names(axes=(LENGTH, Choices("robot.n_limbs", (5,)))),
         names(gait=np.full((2, 5), 0.5)), *([Batch(frame, each, 1).name] for each in numbers),
     ]  # fmt: skip
-    monkeypatch.setattr("seastar_gym.sweep.configurations.__version__", "99.0")
+    monkeypatch.setattr("seastar_gym.sweep.designs.__version__", "99.0")
     assert len({name for each in (first, *others, names()) for name in each}) == 13
     told = json.loads(frame.text)  # in order, so a name does not depend on that of a scene's fields
     assert list(told) == sorted(told) and list(told["scene"]["robot"]) == sorted(told["scene"]["robot"])

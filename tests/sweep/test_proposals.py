@@ -14,12 +14,10 @@ import pytest
 from losing import Losing, first
 from refusals import assert_refused
 from seastar_gym.scene import Scene
-from seastar_gym.sweep.axes import Choices, Range
-from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.designs import Choices, Range, Sweep
 from seastar_gym.sweep.executors import Outcome
 from seastar_gym.sweep.proposals import Proposals, Search, explore, put_back, put_back_stale, study_of
-from seastar_gym.sweep.result_files import ResultFiles, read_results, result_file_of
-from seastar_gym.sweep.run import run
+from seastar_gym.sweep.run import ResultFiles, read_results, result_file_of, run
 
 AXES = (
     Range("robot.limb_length", 0.05, 0.15),

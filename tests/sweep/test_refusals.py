@@ -7,11 +7,8 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym.scene import Scene, Seastar, SmaPulse
-from seastar_gym.sweep.axes import Choices, Range
-from seastar_gym.sweep.controllers import Route
-from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.gait import gait_of
-from seastar_gym.sweep.text import axis_of
+from seastar_gym.sweep.designs import Choices, Range, Route, Sweep, gait_of
+from seastar_gym.sweep.run import axis_of
 
 FAST = Scene.preset("fast")
 LENGTH = Range("robot.limb_length", 0.05, 0.15)

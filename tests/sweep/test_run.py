@@ -18,12 +18,10 @@ from losing import Interrupted
 from refusals import assert_refused
 from seastar_gym.scene import Scene, Seastar, SmaPulse
 from seastar_gym.simulator import Simulator
-from seastar_gym.sweep.axes import Choices, Range
 from seastar_gym.sweep.command import as_text
-from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.designs import Choices, Range, Sweep
 from seastar_gym.sweep.executors import Outcome, Processes, RayTasks, SlurmJobs, dask_client, outcomes
-from seastar_gym.sweep.result_files import ResultFiles, read_results, result_file_of
-from seastar_gym.sweep.run import ATTEMPTS, run
+from seastar_gym.sweep.run import ATTEMPTS, ResultFiles, read_results, result_file_of, run
 from seastar_gym.sweep.swimming import REFUSED, swim
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -25,7 +25,7 @@ from seastar_gym.controllers.contract import LARGEST_SEEN
 from seastar_gym.controllers.export import tables
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.symmetry.symmetry import BOUNDARY_WIDTH
-from seastar_gym.extras import require_extra
+from seastar_gym.files import require_extra
 from seastar_gym.version import __version__
 
 OPSET, IR_VERSION = 17, 8

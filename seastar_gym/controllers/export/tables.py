@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.description import Description
 from seastar_gym.envs.commands import LIMB_COMMANDS, command_table
-from seastar_gym.envs.symmetry.group import axis_of, n_turns_of
+from seastar_gym.envs.symmetry.symmetry import axis_of, n_turns_of
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]

@@ -26,16 +26,16 @@ from typing import TYPE_CHECKING
 from seastar_gym.lazy import lazily
 
 if TYPE_CHECKING:
-    from seastar_gym.envs.symmetry.group import action_table as action_table
-    from seastar_gym.envs.symmetry.group import compose as compose
-    from seastar_gym.envs.symmetry.group import inverse as inverse
-    from seastar_gym.envs.symmetry.group import limb_order as limb_order
-    from seastar_gym.envs.symmetry.group import memory_mirror as memory_mirror
-    from seastar_gym.envs.symmetry.group import symmetry_of as symmetry_of
-    from seastar_gym.envs.symmetry.group import transform_commands as transform_commands
-    from seastar_gym.envs.symmetry.group import turns as turns
     from seastar_gym.envs.symmetry.symmetry import FrameStack as FrameStack
     from seastar_gym.envs.symmetry.symmetry import Symmetry as Symmetry
+    from seastar_gym.envs.symmetry.symmetry import action_table as action_table
+    from seastar_gym.envs.symmetry.symmetry import compose as compose
+    from seastar_gym.envs.symmetry.symmetry import inverse as inverse
+    from seastar_gym.envs.symmetry.symmetry import limb_order as limb_order
+    from seastar_gym.envs.symmetry.symmetry import memory_mirror as memory_mirror
+    from seastar_gym.envs.symmetry.symmetry import symmetry_of as symmetry_of
+    from seastar_gym.envs.symmetry.symmetry import transform_commands as transform_commands
+    from seastar_gym.envs.symmetry.symmetry import turns as turns
     from seastar_gym.envs.symmetry.wrappers import SymmetryReduction as SymmetryReduction
     from seastar_gym.envs.symmetry.wrappers import VectorFrameStack as VectorFrameStack
     from seastar_gym.envs.symmetry.wrappers import VectorSymmetryReduction as VectorSymmetryReduction

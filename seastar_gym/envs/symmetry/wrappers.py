@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from seastar_gym.envs.attributes import RobotsEnv
 from seastar_gym.envs.commands import sampling_mask
 from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.symmetry.group import memory_mirror, symmetry_of
-from seastar_gym.envs.symmetry.symmetry import FrameStack, Symmetry
+from seastar_gym.envs.symmetry.symmetry import FrameStack, Symmetry, memory_mirror, symmetry_of
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import Mirror, complete
+from seastar_gym.scene.actuators.base import Mirror, complete
 from seastar_gym.scene.checks import require_kind
 from seastar_gym.scene.symmetry import PointGroup
 

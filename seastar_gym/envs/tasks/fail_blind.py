@@ -7,10 +7,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from seastar_gym.envs.headings import wrapped
-from seastar_gym.envs.layout import VELOCITY_SCALE
+from seastar_gym.envs.observation import VELOCITY_SCALE
+from seastar_gym.envs.options import RewardWeights, wrapped
 from seastar_gym.envs.randomization import LIMB_STRENGTHS
-from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.robots import Flags, Floats, Robots, Score
 from seastar_gym.envs.scenery import Scenery
 from seastar_gym.envs.waypoints import Waypoints

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.options import RewardWeights
 from seastar_gym.envs.robots import Flags, Floats, Robots
 from seastar_gym.envs.scenery import Scenery
 from seastar_gym.envs.waypoints import Waypoints

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from seastar_gym.envs.options import RewardWeights
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, LogUniform, Uniform
-from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.robots import Robots
 from seastar_gym.envs.scenery import Scenery
 from seastar_gym.envs.sight import Sight

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from seastar_gym.extras import require_extra
+from seastar_gym.files import require_extra
 
 LARGEST = 2**31
 """Most bytes that all data sets and attributes of a file may declare."""

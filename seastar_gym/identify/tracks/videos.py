@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.extras import require_extra
+from seastar_gym.files import require_extra
 from seastar_gym.identify.tracks.hdf5 import require_plain
 from seastar_gym.identify.tracks.table import Table, form_of
 from seastar_gym.identify.tracks.track import NOT_SEEN, Track, chosen_individual, likely

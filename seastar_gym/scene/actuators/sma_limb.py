@@ -28,10 +28,9 @@ from typing import Annotated, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.actuators.heating import SPENT, WIRE_POWER, WirePair
+from seastar_gym.scene.actuators.base import SPENT, WIRE_POWER, WirePair
 from seastar_gym.scene.checks import as_floats, is_whole_number, shown
-from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive
-from seastar_gym.scene.per_robot import batch_size, column
+from seastar_gym.scene.number import Numbers, batch_size, check_numbers, column, not_negative, positive
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]

@@ -9,7 +9,7 @@ import pytest
 from own_actuators import Remembering, Triangle
 from refusals import assert_refused
 from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Simulator, SmaPulse
-from seastar_gym.scene.actuators.actuator import Actuator, complete
+from seastar_gym.scene.actuators.base import Actuator, complete
 
 NUMERICS = Numerics("implicit-midpoint", 0.01)
 SAMPLED_PULSE = MeasuredCurve((0.0, 0.1, 1.0), (0.0, np.pi / 5, 0.0))

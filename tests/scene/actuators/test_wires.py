@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 
 import oracle
 from seastar_gym import AlongLimb, Scene, Seastar, SmaLimb, SmaPulse, SmaWires, ThermalSma
-from seastar_gym.scene.actuators.actuator import check_actuator
-from seastar_gym.scene.actuators.pulse import pulse
+from seastar_gym.scene.actuators.base import check_actuator
+from seastar_gym.scene.actuators.curves import pulse
 from seastar_gym.scene.actuators.sma_limb import MEASURED
 from studies.fit import curvature
 

@@ -1,0 +1,189 @@
+"""Certificates of the chapter's robot in the chapter's water, which come with the package.
+
+`python -m studies.accuracy --store` measures that of strokes, and those of wires that are commanded several times a
+second, whose settings are the fidelities. Their classes of commands:
+
+random      of strokes: also the straight swim, the four pairs of Fig. 13.8 and the pentagon
+repeated    repetitions of a command and alternations of two, with half as much again for those that were not measured;
+            of wires: a second of commands, repeated
+small       random and repeated commands of a tenth of the amplitude, whose paths are short, with half as much again
+straight    the straight swim alone
+
+Speeds are of `Certificate.machine`. An error bounds 95 % of random sequences with the confidence that `confidence`
+returns, so it is no bound for all: docs/numerics.md says how many of fresh ones exceed it.
+
+Errors and speed that `info` tells: of the package's own certificates, or of a user's.
+"""
+
+import math
+import warnings
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from os import PathLike
+from pathlib import Path
+
+from seastar_gym.accuracy.certificate import CLASSES_VERSION, Certificate, Setting, as_certificate
+from seastar_gym.scene import Scene, Seastar
+from seastar_gym.scene.checks import require_flag, require_number, shown
+from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.version import __version__
+
+FOLDER = Path(__file__).with_name("shipped")
+STROKES = FOLDER / "strokes.json"
+
+
+def file_of(decision_period: float, folder: Path = FOLDER) -> Path:
+    """File of the errors for a time between decisions [s]."""
+    return folder / f"wires_{decision_period:g}s.json"
+
+
+@cache
+def _load(file: Path) -> Certificate:
+    """Certificate of a file, which is of this version because it comes with it."""
+    return replace(Certificate.load(file), version=__version__, classes=CLASSES_VERSION)
+
+
+def chapters_certificate() -> Certificate:
+    """Errors and speeds of the chapter's robot in strokes."""
+    return _load(STROKES)
+
+
+def scene_for(
+    error: float,
+    any_gait: bool = False,
+    robot: Seastar | None = None,
+    certificate: Certificate | str | PathLike[str] | None = None,
+) -> Scene:
+    """Scene at the fastest measured setting whose path error is at most `error`.
+
+    The error is that of the hub's path against infinitely many nodes and infinitely short steps, as a fraction of the
+    path's length. ValueError if no measured setting keeps it, or if the robot was not measured.
+
+    any_gait: Require it for the repetition of any command, too, which is harder.
+    robot: The robot. Nodes per limb and a discretisation that it names are kept, others are chosen.
+    certificate: `Certificate` of the scene, or the file of one, whose errors are those of any gait. It lapses where the
+        robot or the version of the package differs. None means the package's own, which is of the chapter's robot and
+        water.
+
+    >>> scene_for(0.002).robot.nodes_per_limb
+    28
+    >>> scene_for(1e-6)
+    Traceback (most recent call last):
+    ValueError: No measured setting keeps the path error below 0.0001 %: the best, ...
+    """
+    require_flag("any_gait", any_gait)
+    known = chapters_certificate() if certificate is None else as_certificate(certificate)
+    classes = known.promised + known.repeated(tuple(known.settings[0].errors)) if any_gait else known.promised
+    return known.for_error(error, classes, robot)
+
+
+def timed_certificate(decision_period: float) -> Certificate | None:
+    """Errors of the chapter's robot with wires: the larger ones of the measured times around a decision period [s].
+
+    None outside of the measured times.
+    """
+    require_number("decision_period", decision_period, "s")
+    known = {float(each.decision_period or 0.0): each for each in map(_load, FOLDER.glob("wires_*.json"))}
+    shorter = [period for period in known if period <= decision_period * (1.0 + 1e-9)]
+    longer = [period for period in known if period >= decision_period * (1.0 - 1e-9)]
+    if not shorter or not longer:
+        return None
+    one, other = known[max(shorter)], known[min(longer)]
+    return replace(one, settings=tuple(map(_worst, one.settings, other.settings)))
+
+
+def _worst(one: Setting, other: Setting) -> Setting:
+    """A setting with the larger of two errors of every kind."""
+
+    def larger(some: Mapping[str, float], others: Mapping[str, float]) -> dict[str, float]:
+        return {name: max(error, others[name]) for name, error in some.items()}
+
+    space, in_time = max(one.space_error, other.space_error), max(one.time_error, other.time_error)
+    errors = larger(one.errors, other.errors) | {"random": space + in_time}
+    typical = larger(one.typical, other.typical)
+    return replace(one, errors=errors, typical=typical, space_error=space, time_error=in_time)
+
+
+IN_TIME = ("path_error", "gait_error", "typical_error", "typical_gait_error", "space_error", "time_error")
+"""Entries of `info` where decisions are no strokes."""
+NAMES = (*IN_TIME, "batch_real_time_factor")
+"""Entries of `info` where they are strokes: errors, and the speed of a batch."""
+
+
+def errors_in_info(
+    scene: Scene, certificate: Certificate | None = None, decision_period: float | None = None
+) -> dict[str, float]:
+    """Measured errors and speed of a scene by their names in `info`; NaN for scenes not measured.
+
+    certificate: Where they stand, the package's own if None. decision_period: Time between decisions [s]. None means
+    strokes.
+    """
+    known = _certificate(certificate, decision_period)
+    setting = None if known is None else known.of(scene)
+    if known is None or setting is None:
+        return dict.fromkeys(NAMES if decision_period is None else IN_TIME, math.nan)
+    gaits = known.repeated(known.actions)
+    others = [name for name in known.actions if name not in gaits]
+    found = {
+        "path_error": setting.error(others), "gait_error": setting.error(gaits),
+        "typical_error": setting.typical_error(others), "typical_gait_error": setting.typical_error(gaits),
+        "space_error": setting.space_error, "time_error": setting.time_error,
+    }  # fmt: skip
+    return found if known.decision_period is not None else found | {"batch_real_time_factor": setting.speed}
+
+
+def _certificate(certificate: Certificate | None, decision_period: float | None) -> Certificate | None:
+    if certificate is not None:
+        return certificate
+    return chapters_certificate() if decision_period is None else timed_certificate(decision_period)
+
+
+def read_certificate(
+    certificate: Certificate | str | PathLike[str] | None, scene: Scene, decision_period: float | None
+) -> Certificate | None:
+    """Certificate of an object or a file; ValueError where it has lapsed for the scene, or decisions are no strokes.
+
+    decision_period: Time between decisions [s]. None means strokes.
+    """
+    if certificate is None:
+        return None
+    certificate = as_certificate(certificate)
+    certificate.require_valid(scene)
+    if decision_period != certificate.decision_period:
+        stroke = scene.actuator.period
+        own, asked = (
+            f"strokes of {stroke:g} s" if each is None else f"decisions every {each:g} s"
+            for each in (certificate.decision_period, decision_period)
+        )
+        raise ValueError(
+            f"The certificate has errors of {own}, none of {asked}: leave it out, and use error_bars=True, which "
+            "estimates errors of any swim."
+        )
+    return certificate
+
+
+def warn_uncertified(
+    scene: Scene, fidelity: Fidelity | None, certificate: Certificate | None, decision_period: float | None
+) -> None:
+    """Warn where a certificate or a fidelity is given, but no errors of the scene were measured.
+
+    fidelity: None asks for none. decision_period: Time between decisions [s]. None means strokes.
+    """
+    known = _certificate(certificate, decision_period)
+    if (certificate is None and fidelity is None) or (known is not None and known.of(scene) is not None):
+        return
+    if certificate is not None:
+        told = (
+            f"The certificate has no errors of {scene.robot.nodes_per_limb} nodes per limb with "
+            f"{shown(scene.numerics)}, so errors in info are NaN: Certificate.for_error chooses what it has."
+        )
+    else:
+        remedy = "error_bars=True estimates them as the robot swims"
+        if decision_period is None:
+            remedy = "seastar certify measures them"
+        told = (
+            f'Errors of this scene were not measured: fidelity="{fidelity}" promises nothing for it, and errors in '
+            f"info are NaN: {remedy}."
+        )
+    warnings.warn(told, stacklevel=3)

@@ -1,0 +1,61 @@
+"""The hinges at the hub: how they are measured, and their natural angles (13.13), which actuators change with time."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from seastar_gym.lanes.compile import kernel
+from seastar_gym.lanes.registers import add_product, load, store
+from seastar_gym.rods.star import tangent
+from seastar_gym.rods.terms.along import set_natural_curvature
+from seastar_gym.rods.terms.clamp import set_natural_directions
+
+
+class Hub(NamedTuple):
+    """Measure of the hub hinges.
+
+    side: +1 if hub hinges are measured by the opening angle, -1 if by the interior turning angle.
+    angle: The angle of the unactuated hub hinges, measured that way, per limb [rad].
+    """
+
+    side: float
+    angle: np.ndarray
+
+
+class Actuation(NamedTuple):
+    """Rotation of every limb at the ends of an interval [rad], shape (n_limbs, N_LANES), linear in between."""
+
+    delta_psi_start: np.ndarray
+    delta_psi_end: np.ndarray
+
+
+def coefficients(angles: Sequence[float], turning: bool) -> Hub:
+    """Measure of the hub hinges with these natural angles [rad]; turning: by the interior turning angle."""
+    return Hub(side=-1.0 if turning else 1.0, angle=np.array(angles))
+
+
+@kernel
+def set_natural_hub_angles(rods, work, actuation, fraction):
+    """Natural state at `fraction` (lanes) of an interval: of the hub's hinges or clamps, and of limbs bent along."""
+    if rods.along is not None:
+        set_natural_curvature(rods, work, actuation, fraction)
+    if rods.clamp is None:
+        set_natural_moments(rods, work, actuation, fraction)
+    else:
+        set_natural_directions(rods, work, actuation, fraction)
+
+
+@kernel
+def set_natural_moments(rods, work, actuation, fraction):
+    """Natural moments of the hub hinges at `fraction` (lanes) of an interval, (13.13).
+
+    The hinge from limb j to limb j + 1 has the natural angle hub_angle_j + delta_psi_{j+1} - delta_psi_j.
+    """
+    for a in range(rods.n_limbs):
+        b = (a + 1) % rods.n_limbs
+        start = load(actuation.delta_psi_start, b) - load(actuation.delta_psi_start, a)
+        end = load(actuation.delta_psi_end, b) - load(actuation.delta_psi_end, a)
+        angle = load(rods.hub.angle, a) + add_product(start, fraction, end - start)
+        natural_moment = 2.0 * load(rods.bending.EI_over_dl, a * rods.edges_per_limb) * tangent(0.5 * angle)
+        store(work.hub_EI_kappa_bar, a, natural_moment)

@@ -1,0 +1,302 @@
+"""The guard's parts: energies and work are the oracle's, seen from any frame; cuts keep the momenta; hinges that go
+through their poles are seen."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import oracle
+from continuum_oracle import Continuum
+from currents import CURRENTS, velocity
+from hubs import HUBS, TEN
+from oracle import Star
+from seastar_gym import Scene, Seastar, SmaPulse, UniformCurrent, Water
+from seastar_gym.lanes.plain import Lanes, Mask
+from seastar_gym.lanes.registers import N_LANES
+from seastar_gym.model import make_rods
+from seastar_gym.rods.bundles import make_work
+from seastar_gym.rods.guard import (
+    LARGEST_CUT,
+    add_work_of_loads,
+    allowed_energy,
+    energy_noise,
+    frame_velocity,
+    hold_to_energy,
+    may_gain,
+    restore,
+    rigid_motion,
+    save,
+    through_poles,
+)
+from seastar_gym.rods.step import SCHEMES, Stage
+from seastar_gym.rods.terms.fluid import add_work_of_current, freeze_fluid
+from seastar_gym.rods.terms.hub import Actuation
+from slopes import NO_RODS, nodes, plain, rotated, rows
+from stages import EVERYONE, robot_and_star, turn_limbs
+
+STAR = Continuum()
+RODS = make_rods(Scene(TEN, actuator=SmaPulse(0.5)))
+
+
+TERMS = {"tangential_drag_coefficient": 0.2, "added_mass_coefficient": 0.7}
+STREAM = Continuum(**TERMS, current=lambda places: velocity("vortex", places))
+PULL = np.random.default_rng(5).standard_normal((STAR.n_nodes, 2))
+LOADS = tuple((node, *force) for node, force in enumerate(PULL.tolist()))
+STREAM_RODS = make_rods(Scene(TEN, Water(current=CURRENTS["vortex"], **TERMS), SmaPulse(0.5), loads=LOADS))
+FRAME = np.random.default_rng(6).uniform(-1.0, 1.0, (2, N_LANES))
+"""Velocity that every lane is seen from [m/s]."""
+SEEN_FROM = Lanes(FRAME[0]), Lanes(FRAME[1])
+
+
+def moving_robots(seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Bent robots away from the origin that fly, spin and ring: (q, v), shape (N_LANES, n_nodes, 2)."""
+    rng = np.random.default_rng(seed)
+    shape = (N_LANES, STAR.n_nodes, 2)
+    q = STAR.rest + 1e-3 * rng.standard_normal(shape) + 0.3
+    return q, 0.2 * rng.standard_normal(shape) + [0.5, -0.2] + 2.0 * (q - 0.3) @ [[0.0, 1.0], [-1.0, 0.0]]
+
+
+# Energies
+
+
+def stored_by_moving(star: Star, first: np.ndarray, last: np.ndarray) -> float:
+    """Energy at the hub of a robot natural at the rotations `first` [rad], at those of `last` [J]."""
+    if star.clamps:
+        return oracle.clamp_slopes(star, star.rest, first - last)[0]
+    kappa_bar = [oracle.natural_strains(star, one)[-5:] for one in (first, last)]
+    return 0.5 * star.EI * star.edge_length * np.sum(np.diff(kappa_bar, axis=0) ** 2)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("hub", HUBS)
+def test_allowed_energy_is_that_of_the_robot_standing_still_while_its_actuators_move(hub, scheme):
+    """At a step from a quarter to three quarters of an interval; from the larger end and with what moving stores."""
+    robot, star = robot_and_star(hub=hub)
+    rods, (q, v) = make_rods(Scene(robot, actuator=SmaPulse(0.5))), moving_robots()
+    begin, end = np.random.default_rng(1).uniform(-0.4, 0.4, (2, N_LANES, 5))
+    tableau, actuation = SCHEMES[scheme], Actuation(begin.T.copy(), end.T.copy())
+    args = rods, make_work(rods, tableau.n_stages), tableau, actuation, Lanes(0.25), Lanes(0.75), rows(q), rows(v)
+    found = plain(allowed_energy(*args, SEEN_FROM))
+    for lane in range(N_LANES):
+        first, last = (begin[lane] + share * (end[lane] - begin[lane]) for share in (0.25, 0.75))
+        at_start, at_end = (oracle.elastic_energy(star, q[lane], one) for one in (first, last))
+        moved = stored_by_moving(star, first, last)
+        expected = at_end if tableau.dissipative else max(at_start, at_end) + moved
+        seen = v[lane] - FRAME[:, lane]
+        assert found[lane] == pytest.approx(expected + oracle.kinetic_energy(star, seen), rel=1e-12)
+
+
+def test_work_of_currents_and_loads_is_force_times_way_as_the_frame_sees_it():
+    """Drag and the current are those where the stage began; the load's way is that of its node."""
+    h, (q, v), (begin, _) = 0.01, moving_robots(), moving_robots(seed=2)
+    work = make_work(STREAM_RODS, 1)
+    work.q[:], work.step[:] = rows(begin), rows(begin)
+    freeze_fluid(STREAM_RODS, work)
+    of_current, of_loads = (
+        plain(add(STREAM_RODS, work, rows(state), Lanes(h), SEEN_FROM, Lanes(0.0)))
+        for add, state in ((add_work_of_current, v), (add_work_of_loads, q))
+    )
+    for lane in range(N_LANES):
+        drag, fluid = oracle.drag_force(STREAM, v[lane], begin[lane]), velocity("vortex", begin[lane]) - FRAME[:, lane]
+        assert of_current[lane] == pytest.approx(h * np.sum(drag * fluid), rel=1e-12)
+        way = q[lane] - begin[lane] - h * FRAME[:, lane]
+        assert of_loads[lane] == pytest.approx(np.sum(PULL * way), rel=1e-12)
+
+
+def inertia(star: Star, lane_q: np.ndarray) -> np.ndarray:
+    """Mass matrix of robot and fluid carried along, shape (n_nodes, 2, n_nodes, 2)."""
+    return oracle.mass_matrix(star, lane_q).reshape(star.n_nodes, 2, star.n_nodes, 2)
+
+
+def held(share: float, largest_cut: float = LARGEST_CUT, robots: Mask = EVERYONE, star: Star = STAR) -> SimpleNamespace:
+    """Robots held to their potential energy, that of their rigid motion, and `share` of the rest, seen from FRAME."""
+    q, v = moving_robots()
+    rods = RODS if star is STAR else STREAM_RODS
+    state, work = (rows(q), rows(v)), make_work(rods, 1)
+    turn_limbs(rods, work, np.zeros(5))
+    work.q[:] = state[0]
+    freeze_fluid(rods, work)
+
+    def kinetic_energies(velocities: np.ndarray) -> np.ndarray:
+        seen = velocities - FRAME.T[:, None]
+        return np.array(
+            [0.5 * np.einsum("nd,ndme,me", one, inertia(star, at), one) for at, one in zip(q, seen, strict=True)]
+        )
+
+    rigid, kinetic = plain(rigid_motion(rods, work, *state, SEEN_FROM)[5]), kinetic_energies(v)
+    potential = np.array([oracle.elastic_energy(STAR, one, np.zeros(5)) for one in q])
+    allowed = rigid + share * (kinetic - rigid)
+    args = rods, work, SCHEMES["implicit-midpoint"], *state, Lanes(0.01), SEEN_FROM, robots, Lanes(potential + allowed)
+    refused, cut = plain(hold_to_energy(*args, Lanes(largest_cut)))
+    np.testing.assert_array_equal(nodes(state[0]), q)
+    after = nodes(state[1])
+    return SimpleNamespace(
+        q=q, v=v, after=after, rigid=rigid, refused=refused, cut=cut, allowed=allowed, kinetic=kinetic_energies(after)
+    )  # fmt: skip
+
+
+def rigid_motions(q: np.ndarray) -> np.ndarray:
+    """Along x, along y, and about the centre of mass, shape (3, n_nodes, 2)."""
+    r = q - STAR.masses @ q / STAR.masses.sum()
+    motions = np.zeros((3, *q.shape))
+    motions[0, :, 0], motions[1, :, 1], motions[2] = 1.0, 1.0, np.stack([-r[:, 1], r[:, 0]], axis=1)
+    return motions
+
+
+STARS = pytest.mark.parametrize("star", [STAR, STREAM], ids=["alone", "with added mass"])
+
+
+@STARS
+def test_rigid_motion_has_the_least_energy_with_the_same_momenta(star):
+    found = held(0.995, star=star)
+    for lane in range(N_LANES):
+        q, v = found.q[lane], found.v[lane] - FRAME[:, lane]
+        motions, masses = rigid_motions(q), inertia(star, q)
+        inner = np.einsum("and,ndme,bme->ab", motions, masses, motions)
+        projected = np.linalg.solve(inner, np.einsum("and,ndme,me->a", motions, masses, v))
+        assert found.rigid[lane] == pytest.approx(0.5 * projected @ inner @ projected, rel=1e-12)
+
+
+# Cuts and refusals
+
+
+@STARS
+@pytest.mark.parametrize("share, largest_cut", [(0.995, LARGEST_CUT), (0.2, 1.0)])
+def test_a_small_excess_or_any_at_the_last_halving_is_cut_and_the_momenta_stay(star, share, largest_cut):
+    """Those of the robot and of fluid that moves along; robots that are not held keep their bits."""
+    chosen = np.arange(N_LANES) % 2 == 1
+    found = held(share, largest_cut, Mask(chosen), star)
+    np.testing.assert_array_equal(found.cut, chosen)
+    np.testing.assert_array_equal(found.after[~chosen], found.v[~chosen])
+    assert not found.refused.any()
+    np.testing.assert_allclose(found.kinetic[chosen], found.allowed[chosen], rtol=1e-9)
+    for q, v, cut in zip(found.q, found.v, found.after, strict=True):
+        carried = np.einsum("and,ndme->ame", rigid_motions(q), inertia(star, q)).reshape(3, -1)
+        np.testing.assert_allclose(carried @ cut.ravel(), carried @ v.ravel(), rtol=1e-12)
+    assert np.abs(found.after - found.v)[chosen].max() > 1e-4
+
+
+@pytest.mark.parametrize("share, refused", [(0.98, True), (-0.01, True), (1.0 + 1e-9, False)])
+def test_more_than_the_largest_cut_is_refused_and_what_is_allowed_left_alone(share, refused):
+    found = held(share)
+    assert not found.cut.any() and np.all(found.refused == refused)
+    np.testing.assert_array_equal(found.after, found.v)
+
+
+# Poles
+
+
+def turned_about(q: np.ndarray, node: int, nodes: slice, angle: float) -> np.ndarray:
+    """The robot with some nodes turned about another one by an angle [rad]."""
+    result = np.array(q)
+    result[nodes] = q[node] + rotated(q[nodes] - q[node], angle)
+    return result
+
+
+TIP, LIMB = (3, slice(4, 10)), (0, slice(1, 10))
+"""What turns about which node: the end of limb 1 about a hinge within it, and limb 1 about the hub."""
+TURNS = [
+    ("rigid", TIP, 0, 170, False),
+    ("rigid", TIP, -60, -170, False),
+    ("rigid", TIP, 160, 200, True),
+    ("rigid", TIP, 60, 190, True),
+    ("rigid", TIP, -60, -200, True),
+    ("rigid", LIMB, 60, 200, False),  # a clamp has no pole
+    ("opening", TIP, 0, 170, False),
+    ("opening", TIP, 160, 170, False),
+    ("opening", TIP, 160, 200, True),
+    ("opening", TIP, -160, -200, True),
+    ("opening", LIMB, 0, 100, False),  # from 72 degrees, on either side of limb 1
+    ("opening", LIMB, 60, 80, False),
+    ("opening", LIMB, 100, 120, True),
+    ("turning", LIMB, 50, 70, False),
+    ("turning", LIMB, 50, 80, True),
+    ("turning", LIMB, -60, -90, True),
+]
+
+
+@pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk3"])
+@pytest.mark.parametrize("hub, part, before, after, through", TURNS)
+def test_a_hinge_that_turned_through_its_pole_is_seen_and_the_robot_put_back(hub, part, before, after, through, scheme):
+    """The last lane holds a robot that nobody asks about."""
+    rods, tableau = make_rods(Scene(robot_and_star(hub=hub)[0], actuator=SmaPulse(0.5))), SCHEMES[scheme]
+    q, q_1 = (turned_about(STAR.rest, *part, np.radians(angle)) for angle in (before, after))
+    v = np.ones((N_LANES, STAR.n_nodes, 2))
+    q_rows, v_rows, asked = rows(q), rows(v), np.arange(N_LANES) < N_LANES - 1
+    work = make_work(rods, tableau.n_stages)
+    save(rods, work, tableau, q_rows, v_rows)
+    q_rows[:], v_rows[:] = rows(q_1), 0.0
+    found = through_poles(rods, work, q_rows, Mask(asked))
+    restore(rods, work, tableau, q_rows, v_rows, found)
+    np.testing.assert_array_equal(plain(found), asked & through)
+    back = (asked & through)[:, None, None]
+    np.testing.assert_array_equal(nodes(q_rows), np.where(back, q, q_1))
+    np.testing.assert_array_equal(nodes(v_rows), np.where(back, v, 0.0))
+
+
+# The frame that a step is judged in, and what may be rounding
+
+
+ROBOT = Seastar(5, 4)
+IN_VACUUM, STAR_IN_VACUUM = make_rods(Scene(ROBOT, None)), Continuum(5, 4, drag_coefficient=0.0)
+RNG = np.random.default_rng(0)
+Q, V = ROBOT.nodes() + 1e-3 * RNG.standard_normal((ROBOT.n_nodes, 2)), RNG.standard_normal((ROBOT.n_nodes, 2))
+
+
+def test_a_robot_is_judged_as_its_water_sees_it_and_in_vacuum_as_its_own_centre_of_mass_does():
+    stream = make_rods(Scene(ROBOT, Water(current=UniformCurrent(0.3, -0.2))))
+    found = plain(frame_velocity(stream, rows(Q), rows(V)))
+    np.testing.assert_allclose([found[0][0], found[1][0]], [0.3, -0.2])
+    alone = plain(frame_velocity(IN_VACUUM, rows(Q), rows(V)))
+    np.testing.assert_allclose([alone[0][0], alone[1][0]], IN_VACUUM.mass @ V / IN_VACUUM.mass.sum(), rtol=1e-12)
+
+
+@pytest.mark.parametrize("growth, seen", [(0.5, False), (5.0, True)])
+def test_growth_is_seen_from_the_share_of_the_kinetic_energy_on_that_is_rounding(growth, seen):
+    """Of robots at rest in shape that move at 1 m/s. Below it, rounding of healthy robots would have them cut."""
+    work, q, v = make_work(IN_VACUUM, 1), rows(ROBOT.nodes()), rows(V)
+    turn_limbs(IN_VACUUM, work, np.zeros(5))
+    allowed = Lanes(oracle.kinetic_energy(STAR_IN_VACUUM, V) * (1.0 - growth * 1e-12))
+    args = IN_VACUUM, work, SCHEMES["implicit-euler"], q, v, Lanes(10.0), (Lanes(0.0), Lanes(0.0)), EVERYONE, allowed
+    assert np.all(plain(hold_to_energy(*args, Lanes(1.0))[1]) == seen)
+
+
+def test_noise_is_that_of_positions_that_are_all_rounded_the_same_way():
+    """By one unit in the last place, in their difference over a step, a kilometre away; several units are allowed.
+
+    Held nodes add none: with their huge mass, what a robot may have would depend on where it is.
+    """
+    h, far, v = 1e-3, ROBOT.nodes() + 1e3, np.ones((ROBOT.n_nodes, 2))
+    before, after = (oracle.kinetic_energy(STAR_IN_VACUUM, each) for each in (v, v + np.spacing(far) / h))
+    both = IN_VACUUM, make_rods(Scene(ROBOT, None, held_nodes=(0, 3)))
+    noise, of_held = (plain(energy_noise(rods, None, rows(far), Lanes(h), Lanes(0.0), Lanes(before))) for rods in both)
+    assert np.all((0.05 * noise < after - before) & (after - before < 0.5 * noise))
+    assert np.all((of_held > 0.5 * noise) & (of_held < noise))
+
+
+FORCES = tuple((node, *force) for node, force in enumerate(RNG.standard_normal((ROBOT.n_nodes, 2)).tolist()))
+
+
+@pytest.mark.parametrize("loads", [(), FORCES], ids=["free", "with loads"])
+def test_a_step_may_gain_energy_where_what_newton_knows_does_not_rule_it_out(loads):
+    """Phi + v_0 M (v_1 - v_0) - h F v_0 - U(q_0), from the oracle, just above zero or just below."""
+    rods, h = make_rods(Scene(ROBOT, None, loads=loads)), 0.01
+    q_1, v_0 = Q + 1e-3 * RNG.standard_normal(Q.shape), V
+    force = np.array([force for _, *force in loads]) if loads else np.zeros_like(V)
+    change = (q_1 - Q) / h - v_0
+    gained = v_0.ravel() @ oracle.mass_matrix(STAR_IN_VACUUM, Q) @ change.ravel()
+    least = oracle.elastic_energy(STAR_IN_VACUUM, Q, np.zeros(5)) - gained
+    least += h * np.sum(force * v_0)
+    work = make_work(rods, 1)
+    turn_limbs(rods, work, np.zeros(5))
+    work.q[:] = rows(q_1)
+    stage = Stage(rows(Q), rows(v_0), Lanes(h), Lanes(1.0 / h), False)
+    above = np.arange(N_LANES) % 2 == 0
+    phi = Lanes(least + np.where(above, 1e-9, -1e-9) * abs(least))
+    found = plain(may_gain(rods, work, stage, phi, EVERYONE))
+    np.testing.assert_array_equal(found, above)
+    assert not plain(may_gain(rods, work, stage, phi, ~EVERYONE)).any()
+    for named in ("current", "added_mass", "body"):  # of which it knows nothing: any step may
+        others = NO_RODS._replace(**{named: object()})
+        assert may_gain(others, work, stage, phi, EVERYONE) is EVERYONE

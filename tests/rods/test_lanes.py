@@ -1,0 +1,381 @@
+"""Kernels on `Lanes` compute, for every robot, the numbers that float64 arithmetic gives, to the last bit.
+
+Whatever kernels may ask of lanes is asked of the plain twin, too.
+"""
+
+import os
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+import pytest
+from numba.core.errors import TypingError
+
+from seastar_gym.lanes import plain as numpy_lanes
+from seastar_gym.lanes import registers as lanes
+from seastar_gym.lanes.compile import STRICT, entry_point, kernel
+from seastar_gym.lanes.pipeline import compiler_of
+from seastar_gym.lanes.registers import N_LANES, NARROW, PLAIN, any_lane, borrow, load, load_number, splat, store
+
+ONLY_COMPILED = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="numba alone looks at the types of arrays")
+ROUNDS_TWICE = sys.version_info < (3, 13)  # the plain twin, before math.fma
+ROOT = Path(__file__).resolve().parents[2]
+SPECIAL = [0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 5e-324, -2.2e-308, 1.8e308, 1e-160, 1e200, 1.0 + 2**-52]
+
+
+compiled = numba.njit(**STRICT)
+
+
+def rows_of(values) -> np.ndarray:
+    """Numbers as rows of N_LANES, the last row filled up with ones."""
+    flat = np.ravel(values)
+    padded = np.ones((-(-len(flat) // N_LANES), N_LANES))
+    padded.reshape(-1)[: len(flat)] = flat
+    return padded
+
+
+@pytest.fixture(scope="module")
+def operands():
+    """Three columns of numbers: every pair of special values with every third one, and random ones of all sizes."""
+    special = np.array(np.meshgrid(SPECIAL, SPECIAL, SPECIAL)).reshape(3, -1)
+    rng = np.random.default_rng(0)
+    random = rng.standard_normal((3, 4000)) * 10.0 ** rng.integers(-30, 30, (3, 4000))
+    a, b, c = np.concatenate([special, random], axis=1)
+    return SimpleNamespace(a=rows_of(a), b=rows_of(b), c=rows_of(c))
+
+
+def assert_same_bits(found, expected, line=""):
+    """Equal numbers, equal signs of zero, NaN where NaN is expected."""
+    np.testing.assert_array_equal(found, expected, err_msg=line)
+    known = ~np.isnan(expected)
+    np.testing.assert_array_equal(np.signbit(found)[known], np.signbit(expected)[known], err_msg=line)
+
+
+ARITHMETIC = [
+    "a + b", "a - b", "a * b", "a / b", "-a", "a + 0.1", "0.1 + a", "a - 3", "3 - a", "0.1 * a", "a * 3", "1.0 / a",
+    "a / 3", "a * b + c", "a * b - a * c", "sqrt(a)", "absolute(a)", "select(a < b, a, b)", "select(a < b, 2, b)",
+    "select(a < b, a, 2.0)",
+]  # fmt: skip
+COMPARISONS = [
+    "a < b", "a <= b", "a > b", "a >= b", "a == b", "a < 1.0", "1.0 < a", "a <= 1.0", "1 <= a", "a > 1", "1.0 > a",
+    "a >= 1.0", "1.0 >= a", "a == 0.0", "0 == a", "(a < b) & (a > 0.0)", "(a < b) | (a > 0.0)", "~(a < b)",
+]  # fmt: skip
+
+
+def by_numpy(line: str, operands) -> np.ndarray:
+    with np.errstate(all="ignore"):
+        return eval(line, {"sqrt": np.sqrt, "absolute": np.abs, "select": np.where}, vars(operands))
+
+
+def kernel_of(twin: str, template: str, body: str, lines: list[str], form=PLAIN):
+    """A function made of one line of `template` for every line: `store` its value in a row of its own."""
+    stores = "".join(
+        f"        store(out, {len(lines)} * r + {k}, {template.format(line)})\n" for k, line in enumerate(lines)
+    )
+    source = f"def function(a_rows, b_rows, c_rows, out_rows):\n{body}{stores}"
+    namespace = dict(vars(numpy_lanes if twin == "plain" else lanes))
+    exec(source, namespace)
+    function, options = namespace["function"], {**STRICT, "pipeline_class": compiler_of(form)}
+    return function if twin == "plain" else numba.njit(**options)(function)
+
+
+LOOP = """\
+    a_in, b_in, c_in, out = borrow(a_rows), borrow(b_rows), borrow(c_rows), borrow(out_rows)
+    for r in range(a_rows.shape[0]):
+        a, b, c = load(a_in, r), load(b_in, r), load(c_in, r)
+"""
+
+
+@pytest.fixture(params=["compiled", "plain"])
+def twin(request):
+    return request.param
+
+
+@pytest.fixture
+def run_all(twin):
+    def run(template: str, lines: list[str], operands, body: str = LOOP) -> np.ndarray:
+        """Values of every line for every row of operands, shape (n_lines, n_rows, N_LANES)."""
+        out = np.full((len(lines) * len(operands.a), N_LANES), 0.5)
+        kernel_of(twin, template, body, lines)(operands.a, operands.b, operands.c, out)
+        return out.reshape(len(operands.a), len(lines), N_LANES).transpose(1, 0, 2)
+
+    return run
+
+
+# Arithmetic
+
+
+def test_arithmetic_is_that_of_float64_to_the_last_bit_with_no_hidden_contraction(run_all, operands):
+    found = run_all("{}", ARITHMETIC, operands)
+    for value, line in zip(found, ARITHMETIC, strict=True):
+        assert_same_bits(value, by_numpy(line, operands), line)
+
+
+AUGMENTED = """\
+        x, y, z, w = a, a, a, a
+        x += b
+        y -= b
+        z *= b
+        w /= b
+        x += 1.0
+        y -= 2
+        z *= 3.0
+        w /= 7
+"""
+
+
+def test_augmented_assignments_are_the_operators_and_make_new_values(run_all, operands):
+    found = run_all("{}", ["x", "y", "z", "w", "a"], operands, LOOP + AUGMENTED)
+    a, b = operands.a, operands.b
+    with np.errstate(all="ignore"):
+        for value, expected in zip(found, [a + b + 1.0, a - b - 2, a * b * 3.0, a / b / 7, a], strict=True):
+            assert_same_bits(value, expected)
+
+
+def exact_product_sum(c: float, a: float, b: float) -> float:
+    """c + a b rounded once: a fraction has no rounding of its own, and its conversion rounds to nearest."""
+    return float(Fraction(c) + Fraction(a) * Fraction(b))
+
+
+def test_product_sums_are_rounded_once(run_all, twin):
+    if ROUNDS_TWICE and (twin == "plain" or numba.config.DISABLE_JIT):
+        pytest.skip("the plain twin rounds twice before Python 3.13")
+    rng = np.random.default_rng(1)
+    a, b = rng.standard_normal((2, 400 * N_LANES))
+    c = -a * b * (1.0 + 2.0 ** -rng.integers(20, 60, a.size))  # cancels: the second rounding would show
+    operands = SimpleNamespace(a=rows_of(a), b=rows_of(b), c=rows_of(c))
+    lines = [
+        "add_product(c, a, b)",
+        "subtract_product(c, a, -b)",
+        "add_product(0.5, a, b)",
+        "subtract_product(c, 3, b)",
+    ]
+    found = run_all("{}", lines, operands).reshape(len(lines), -1)
+    twice = c + a * b
+    assert np.count_nonzero(found[0] != twice) > 300
+    assert found[0].tolist() == [exact_product_sum(*x) for x in zip(c, a, b, strict=True)]
+    assert found[1].tolist() == found[0].tolist()
+    assert found[2].tolist() == [exact_product_sum(0.5, *x) for x in zip(a, b, strict=True)]
+    assert found[3].tolist() == [exact_product_sum(x, -3.0, y) for x, y in zip(c, b, strict=True)]
+
+
+def test_product_sums_keep_the_signs_of_zero_and_pass_nan_on(run_all, operands):
+    plus, minus = run_all("{}", ["add_product(c, a, b)", "subtract_product(c, a, b)"], operands)
+    # Where neither the product nor the sum is rounded, two operations give what one gives.
+    exact = np.isin(operands.a, [0, 1, -1, np.inf, -np.inf, np.nan]) & np.isin(operands.c, SPECIAL)
+    exact &= np.abs(operands.b) != 5e-324
+    assert exact.sum() > 500
+    a, b, c = operands.a[exact], operands.b[exact], operands.c[exact]
+    with np.errstate(all="ignore"):
+        assert_same_bits(plus[exact], c + a * b)
+        assert_same_bits(minus[exact], c - a * b)
+
+
+# Masks
+
+
+def test_comparisons_and_masks_are_those_of_numpy_and_nan_compares_false(run_all, operands):
+    found = run_all("select({}, 1.0, splat(0.0))", COMPARISONS, operands)
+    for value, line in zip(found, COMPARISONS, strict=True):
+        np.testing.assert_array_equal(value == 1.0, by_numpy(line, operands), err_msg=line)
+        assert set(np.unique(value)) == {0.0, 1.0}
+
+
+def test_any_looks_at_every_lane():
+    @compiled
+    def function(rows):
+        condition = load(borrow(rows), 0) > 0.0
+        return any_lane(condition), any_lane(~condition)
+
+    for rows in (np.zeros((1, N_LANES)), *np.eye(N_LANES)[:, None]):
+        assert function(rows) == (rows.any(), True)
+        assert function(1.0 - rows) == (True, rows.any())
+
+
+# Memory
+
+
+class Bundle(NamedTuple):
+    count: int
+    flag: bool
+    per_robot: np.ndarray
+    shared: np.ndarray
+
+
+def test_load_reads_per_robot_and_shared_rows_and_store_writes_lanes_or_one_number():
+    @compiled
+    def function(bundle, rows):
+        fields, out = borrow(bundle), borrow(rows)
+        store(out, 0, load(fields.per_robot, 1))
+        store(out, 1, load(fields.shared, 2))
+        store(out, 2, splat(load_number(fields.shared, 0)))
+        store(out, 3, 7)
+        if fields.flag:
+            store(out, fields.count, 0.25)
+
+    per_robot, shared, out = (
+        np.random.default_rng(0).random((2, N_LANES)),
+        np.array([1.5, 2.5, 3.5]),
+        np.ones((6, N_LANES)),
+    )
+    function(Bundle(4, True, per_robot, shared), out)
+    np.testing.assert_array_equal(out[0], per_robot[1])
+    np.testing.assert_array_equal(out[1:].T, np.tile([3.5, 1.5, 7.0, 0.25, 1.0], (N_LANES, 1)))
+
+
+def test_rows_need_no_alignment(operands):
+    n = operands.a.size
+    shifted = [np.empty(n + 1)[1:].reshape(operands.a.shape) for _ in range(4)]
+    for array, values in zip(shifted, (operands.a, operands.b, operands.c), strict=False):
+        array[:] = values
+    assert any(array.ctypes.data % 64 for array in shifted)
+    out = shifted[3]
+    kernel_of("compiled", "{}", LOOP, ["a + b"])(*shifted[:3], out)
+    with np.errstate(all="ignore"):
+        assert_same_bits(out, operands.a + operands.b)
+
+
+@ONLY_COMPILED
+def test_narrow_lanes_compute_for_the_first_robots_of_a_row_to_the_same_bits_and_touch_no_other(operands):
+    wide, narrow = (np.full((len(ARITHMETIC) * len(operands.a), N_LANES), 0.5) for _ in range(2))
+    for form, out in ((PLAIN, wide), (NARROW, narrow)):
+        kernel_of("compiled", "{}", LOOP, ARITHMETIC, form)(operands.a, operands.b, operands.c, out)
+    assert_same_bits(narrow[:, : NARROW.width], wide[:, : NARROW.width])
+    np.testing.assert_array_equal(narrow[:, NARROW.width :], 0.5)
+
+
+# Refusals
+
+
+REFUSED = [
+    "a ** 2", "a // 2.0", "a % 2.0", "a + None", "a + 'one'", "a + True", "a + 1j", "select(a < b, a, 1j)",
+    "a + (a < b)", "(a < b) + 1.0", "(a < b) & True", "a & b", "~a", "-(a < b)", "(a < b) == (a < c)", "a != b",
+    "abs(a)", "max(a, b)", "a if a < b else b", "(a < b) and (a < c)", "select(a, b, c)", "select(True, a, b)",
+    "select(a < b, 1.0, 2.0)", "select(a < b, a < b, a < c)", "sqrt(2.0)", "absolute(a < b)",
+    "add_product(1.0, 2.0, 3.0)", "add_product(a, b, a < b)", "splat('one')", "splat(True)", "load(a_in, 1.5)",
+    "load(a_rows, 0)", "load_number(a_in, 0)", "splat(any_lane(a))", "splat(any_lane(1.0))", "a < b",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("line", REFUSED)
+def test_what_lanes_cannot_do_is_a_typing_error_at_compilation_and_a_type_error_in_plain_python(line, twin):
+    one = np.ones((1, N_LANES))
+    if line == "load(a_rows, 0)" and (twin == "plain" or numba.config.DISABLE_JIT):
+        pytest.skip("an array is its own rows in plain Python")
+    with pytest.raises((TypingError, TypeError)):
+        kernel_of(twin, "{}", LOOP, [line])(one, one, one, one.copy())
+
+
+@ONLY_COMPILED
+@pytest.mark.parametrize(
+    "array",
+    [
+        np.ones((1, N_LANES), np.float32),
+        np.ones((1, N_LANES), np.int64),
+        np.ones((N_LANES, 2)).T,
+        np.ones((2, 2 * N_LANES))[:, ::2],
+        np.ones((1, 1, N_LANES)),
+        (np.ones(3), np.ones(4)),
+        "rows",
+    ],
+    ids=["float32", "int64", "transposed", "strided", "three axes", "plain tuple", "string"],
+)
+def test_only_contiguous_float64_rows_and_named_tuples_of_them_can_be_borrowed_and_shared_ones_not_written(array):
+    @compiled
+    def function(rows):
+        return any_lane(load(borrow(rows), 0) > 0.0)
+
+    @compiled
+    def write(rows):
+        store(borrow(rows), 0, 1.0)
+
+    with pytest.raises(TypingError):
+        function(array)
+    with pytest.raises(TypingError):
+        write(np.zeros(3))  # shared
+
+
+@kernel
+def as_lanes(number):
+    return splat(number)
+
+
+@ONLY_COMPILED
+def test_a_kernel_whose_arguments_tell_no_form_has_no_lanes_of_its_own():
+    @compiled
+    def function(out):
+        store(borrow(out), 0, as_lanes(1.0))
+
+    with pytest.raises(TypingError, match="splat needs lanes, rows or a bundle of rows among the arguments"):
+        function(np.ones((1, N_LANES)))
+
+
+# The width
+
+
+@pytest.mark.parametrize("width", ["3", "eight", ""])
+def test_an_impossible_width_is_refused(width):
+    environment = {**os.environ, "SEASTAR_LANES": width}
+    command = [sys.executable, "-c", "from seastar_gym import Simulator"]
+    answer = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert answer.returncode == 1
+    last = answer.stderr.strip().splitlines()[-1]
+    assert f"SEASTAR_LANES={width!r}" in last and "2, 4, 8 or 16" in last
+
+
+# A kernel asks a bundle whether a term is there, and what it does with one that is not need not compile.
+
+
+class Part(NamedTuple):
+    weight: Any
+
+
+class Whole(NamedTuple):
+    drag: Any
+    part: Any
+
+
+@kernel
+def asked(whole):
+    """Every way to ask."""
+    total = splat(1.0) if whole.drag is None else load(whole.drag, 0)
+    part = whole.part
+    if part is None or part.weight is None:
+        return total
+    if whole.drag is not None and whole.part is not None:
+        total = total + load(whole.drag, 1)
+    return total + load(part.weight, 0)
+
+
+@kernel
+def handed_on(whole):
+    return asked(whole)
+
+
+@entry_point
+def ask(whole, out):
+    store(borrow(out), 0, handed_on(borrow(whole)))
+
+
+TWO, ONE = np.full((2, N_LANES), 3.0), np.full((1, N_LANES), 7.0)
+
+
+@pytest.mark.parametrize(
+    "whole, answer",
+    [
+        (Whole(None, None), 1.0),
+        (Whole(TWO, None), 3.0),
+        (Whole(None, Part(None)), 1.0),
+        (Whole(None, Part(ONE)), 8.0),
+        (Whole(TWO, Part(ONE)), 13.0),
+    ],
+)
+def test_kernels_see_what_a_bundle_has_and_what_it_has_not(whole, answer):
+    out = np.zeros((1, N_LANES))
+    ask(whole, out)
+    np.testing.assert_array_equal(out, answer)
