@@ -1,17 +1,8 @@
-"""Coefficients of a scene for the kernels of `rods`.
+"""Coefficients of a scene for the kernels of `rods`: the way from what a user says to what kernels read.
 
-`mesh.py` divides limbs into edges and nodes, `rods.py` makes the coefficients of one robot and the tolerances of its
-solver, and `coefficients.py` joins those of a batch.
-
-Coefficients of one robot of a scene for the kernels, and limits of its solver. Every term is one line.
-
-`Coefficients`: coefficients and limits of a batch of robots, one set for all lane groups or one for each.
-
-Mesh of a robot: its limbs, divided into edges and nodes.
-
-Coefficients of a body, for the kernels in rods/body.py.
-
-Coefficients of a current, for the kernels in rods/terms/current.py, and its velocities.
+Limbs are divided into edges and nodes (`make_mesh`), every term makes its coefficients of that mesh, one line each, and
+`Coefficients` joins those of a batch: one set for all lane groups, or one for each where robots have numbers of their
+own. Bodies and currents are made likewise.
 """
 
 import math

@@ -67,7 +67,7 @@ COUNTING: dict[str, Any] = {
     "load": _load, "store": _store, "splat": Constant,
     "load_at": lambda rows, row: Counted(load_at(rows, row).numbers),
 }  # fmt: skip
-"""Functions in place of those of numpy_lanes.py."""
+"""Functions in place of those of plain.py."""
 
 
 @np.errstate(all="ignore")

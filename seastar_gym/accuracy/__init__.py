@@ -1,7 +1,8 @@
-"""What speed costs a scene in accuracy: settings with their measured errors, and the certificates that hold them.
+"""What speed costs a scene in accuracy.
 
-`certify(scene)` and `seastar certify` measure them of any scene (measure.py, command.py); those of the
-chapter's robot come with the package (chapter.py).
+In comes a scene; out goes a `Certificate`, its settings with their measured errors and speeds, of which `scene_for`
+takes the fastest below an error. `certify(scene)` and `seastar certify` measure one (measure.py, command.py); those of
+the chapter's robot come with the package (chapters.py). Errors are those of swims beside finer ones: no formula foretells them.
 """
 
 from seastar_gym.accuracy.certificate import Certificate, Setting, as_certificate

@@ -1,11 +1,11 @@
 """Errors of space and time of any scene.
 
-Sequences of all classes of commands (commands.py) are swum with every resolution and numerics of SETTINGS, with the
+Sequences of all classes of commands are swum with every resolution and numerics of SETTINGS, with the
 same nodes and very short steps, and with many nodes and very short steps: the last stand for the continuum. The error
 of space is that of few nodes with short steps against many nodes; that of time is that of a setting against short steps
 with the same nodes; both are largest distances of the hub at ends of strokes, as fractions of the length of the hub's
-path through the water. The sum of the two bounds the whole error, also where they cancel. Long swims tell which
-settings gather energy (endurance.py).
+path through the water. The sum of the two bounds the whole error, also where they cancel.
+Long swims tell which settings gather energy.
 
 Classes of command sequences that errors are measured over.
 

@@ -1,1 +1,6 @@
-"""The command `seastar`: every subcommand is a module with `main(arguments)`, imported when it is asked for."""
+"""The command `seastar`.
+
+In come words of a shell; out go exit codes, files, and one sentence for what cannot be. Every subcommand is a module
+with `main(arguments)`, imported when it is asked for: help is there at once, and extras are needed by their commands
+alone.
+"""

@@ -1,7 +1,7 @@
 """What is under way: `Lag`, commands from decisions to wires, and `Tracker`, pictures from robots to who decides.
 
 A picture is a row of numbers: hub x, y [m], cosine and sine of the heading, and what else is seen of the limbs, in the
-order and the units of `layout.py`: places of stations, then, where nodes are seen, velocities. A decision knows the two
+order and its units: places of stations, then, where nodes are seen, velocities. A decision knows the two
 that the last decisions knew.
 """
 

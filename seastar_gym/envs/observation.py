@@ -1,8 +1,8 @@
-"""Observations of robots, filled by kernels: what they see, in the order and the units of `layout.py`.
+"""Observations of robots, filled by kernels: what they see.
 
 Layout of an observation: what a robot sees, in which order and units.
 
-A limb has nine stations, evenly spaced from hub to tip, whatever its nodes, see stations.py: observations, and policies
+A limb has nine stations, evenly spaced from hub to tip, whatever its nodes: observations, and policies
 made for them, do not depend on the mesh. Stations of the chapter's robot are its nodes.
 
 The body frame has its origin at the hub. Its x axis is the direction of limb 1 of the rest shape, after the rotation
@@ -24,7 +24,7 @@ waypoints, which are always the last four numbers; an environment may leave the 
 those of every limb, such as its last command.
 
 Further entries of a task stand after those of the limbs, before the waypoints. If headings are asked for
-(`headings.py`), they are cosine and sine of the turn to the heading at the current waypoint, and of that to the heading
+(`options.py`), they are cosine and sine of the turn to the heading at the current waypoint, and of that to the heading
 at the next. A task may show nothing of the limbs' shape: its observation then begins with the numbers of the limbs.
 
 With a `Sight`, fewer stations may be seen, or none, and further entries after those of the task say what follows from
@@ -303,7 +303,7 @@ def at_stations(positions: Floats, robot: Seastar, orientation: Floats | None = 
 def body_heading(
     positions: Floats, robot: Seastar, orientation: Floats | None = None, rest: Floats | None = None
 ) -> Floats:
-    """Direction of the body frame's x axis [rad], shape (n_robots,), see `layout.py`.
+    """Direction of the body frame's x axis [rad], shape (n_robots,), see `observation.py`.
 
     positions: Node positions [m], shape (n_robots, n_nodes, 2). orientation: As in `roots_from_hub`.
     rest: Node positions at rest [m], shape (n_nodes, 2) or (n_robots, n_nodes, 2). None means those of `robot`.

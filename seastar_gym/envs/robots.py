@@ -359,7 +359,7 @@ class Robots:
             kept[name][robot, : len(value)], kept[name][robot, len(value) :] = value, 0
 
     def observe(self) -> NDArray[np.float32]:
-        """Observations, shape (n_robots, size), a fresh array; see layout.py."""
+        """Observations, shape (n_robots, size), a fresh array; see observation.py."""
         at, tracker = self.layout, self._tracker
         if tracker is None:
             return self._with_more(self._seen_now(), np)

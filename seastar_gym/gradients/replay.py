@@ -2,7 +2,7 @@
 
 Steps are replayed from what history.py has kept of them, side by side on the lanes of lanes/tape.py, as if each
 were of another robot. Newton's solution of a stage is read instead of found, and is differentiated as solved exactly,
-as in implicit.py: q becomes q - H^-1 g, q and H constant. The tape has g alone. It ends there, and goes on from q as
+as in tape.py: q becomes q - H^-1 g, q and H constant. The tape has g alone. It ends there, and goes on from q as
 from what has no parents. Where it is read, slopes s in q become slopes -H^-1 s in g, as H is symmetric; H is made and
 eliminated on the lanes of `Simulator`. The tape is read for one step after the other: what steps leave for each other
 (q, v and a) takes derivatives from each to the one before.

@@ -298,7 +298,7 @@ def _joined(groups: list[_Group], start: Start, slopes: Start) -> tuple[Motion, 
 
 
 def _heading(places: Floats, rises: Floats, rest: Floats, rest_rises: Floats) -> tuple[Floats, Floats]:
-    """Heading of every state and its slopes, see body_frame.py."""
+    """Heading of every state and its slopes, see state.py."""
     across, along = turned_from(places, rest)
     of_places, of_rest = slopes_of_heading(places, rest)
     rise = np.einsum("knx,knxu->ku", of_places, rises) + np.einsum("knx,nxu->ku", of_rest, rest_rises)

@@ -189,7 +189,7 @@ def arrays_of(bundle: Any) -> list[Floats]:
 
 @kernel
 def correct_slopes(rods, work, scheme, k, stage, q_0, v_0, h, robots):
-    """Settle the momentum, see momentum.py, and then the slopes of the robots in the mask, after stage k of a step."""
+    """Settle the momentum, see guard.py, and then the slopes of the robots in the mask, after stage k of a step."""
     correct_momentum(rods, work, scheme, k, stage, q_0, v_0, h, robots)
     factorise(rods, work, stage, None)
     substitute_star(rods, work, work.step)

@@ -2,7 +2,7 @@
 
 Parameters are fitted by their logarithms, so their errors are relative. Each column of the Jacobian comes from a scene
 in which one parameter has changed a little. These scenes and the scene itself are simulated side by side, as robots of
-one batch. `search.py` says where a fit begins, and what is refused. Intervals are those of `covariance.py`, whose
+one batch. `search.py` says where a fit begins, and what is refused. Intervals are those of `measurement.py`, whose
 residuals may depend on those before them. Combinations of parameters, singular vectors of the Jacobian, whose relative
 error is above UNTOLD are not determined by the data, and the estimate says so.
 

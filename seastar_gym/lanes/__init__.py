@@ -1,8 +1,9 @@
-"""Lanes and what computes on them: from one source, machine code of kernels for many robots at once.
+"""One robot per SIMD lane: what a number of a kernel is, and how kernels are compiled.
 
-Kernels come in as Python functions of `Lanes`, and numbers of robots as rows of arrays; machine code goes out, for SIMD
-registers, for devices with a thread per robot, or with derivatives. What rows hold is in their type, so nobody writes a
-kernel twice, and what Python calls runs in Python.
+In come kernels, functions of numbers in Python; out goes machine code, kept on disk, in which every number is that of
+N_LANES robots, has slopes beside it, or is written down on a tape. Robots of a batch differ in numbers and not in what
+is done with them, and a processor adds eight numbers as fast as one: hence lanes. No lane knows of another, so a robot
+has the same bits in any company.
 """
 
 from seastar_gym.interrupts import held_back

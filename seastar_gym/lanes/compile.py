@@ -66,7 +66,7 @@ class Kernel(CPUDispatcher):
 
 
 def kernel(function, **options):
-    """Compile `function` as a building block. Called in Python it is that, on the lanes of numpy_lanes.py."""
+    """Compile `function` as a building block. Called in Python it is that, on the lanes of plain.py."""
     compiled = numba.njit(**BLOCK, **options)(function)
     if isinstance(compiled, CPUDispatcher):  # nothing is with NUMBA_DISABLE_JIT=1
         compiled.__class__ = Kernel  # numba offers no other way to say how its dispatchers are called

@@ -6,7 +6,7 @@ not share holds the numbers of N_LANES robots, and their slopes behind them; sha
 is decided by values alone, so slopes are those of the branch that was taken. Where a slope does not exist it is zero,
 as that of a root of zero is: kernels take roots of squared speeds, by which they multiply.
 
-Beside the functions of lanes.py there are `slope_of` and `with_slope`. The form is `DUAL` of gradients/tape.py.
+Beside the functions of registers.py there are `slope_of` and `with_slope`. The form is `DUAL` of gradients/tape.py.
 """
 
 from llvmlite import ir

@@ -1,4 +1,4 @@
-"""The plain twin of lanes.py on numpy: kernels run on it as the Python that they are, slowly, step by step.
+"""The plain twin of registers.py on numpy: kernels run on it as the Python that they are, slowly, step by step.
 
 A kernel that Python calls does, to be called one by one, stepped through or counted, and with NUMBA_DISABLE_JIT=1 the
 whole package:

@@ -18,10 +18,10 @@ mask. They are ordered: a NaN compares false with everything, so it never passes
 are unaligned on purpose: numpy does not align to 64 bytes.
 
 The type of rows says what they hold and how kernels compute on it, their `Form`: registers of N_LANES robots or of
-fewer, one robot of 32 for devices, numbers with a slope (dual_lanes.py) or with a place on a tape (tape_lanes.py). One
+fewer, one robot of 32 for devices, numbers with a slope (dual.py) or with a place on a tape (tape.py). One
 source serves all: lanes that are loaded from rows are of the rows' form, and so is what is computed from them.
 
-numpy_lanes.py lists all that kernels may ask of lanes, and does the same on numpy: what Python calls is that.
+plain.py lists all that kernels may ask of lanes, and does the same on numpy: what Python calls is that.
 """
 
 import functools
@@ -435,7 +435,7 @@ _teach(operator.neg, functools.partial(_signature, Lanes), ((Lanes,),), _compute
 
 
 class Operation(_Intrinsic):  # type: ignore[misc]  # final, to mypy
-    """A function that kernels may ask of lanes. Called in Python, it is that of numpy_lanes.py."""
+    """A function that kernels may ask of lanes. Called in Python, it is that of plain.py."""
 
     at: Callable[[Form], "Operation"]
 

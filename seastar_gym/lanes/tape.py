@@ -11,7 +11,7 @@ robots do not share holds the values, the factors behind them and the place as a
 constant. An entry has two parents: both places as int32 in one number, then the partial derivatives of all robots. As
 for dual lanes, what robots do is decided by values alone, and where a slope does not exist it is zero.
 
-There is one tape in a process at a time. Beside the functions of lanes.py there are `begin_tape`, `end_of_tape`,
+There is one tape in a process at a time. Beside the functions of registers.py there are `begin_tape`, `end_of_tape`,
 `leave_places`, `tape_is_full` and `at_place`. The form is `TAPED` of gradients/tape.py.
 """
 

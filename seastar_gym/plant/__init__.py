@@ -1,5 +1,7 @@
-"""Robots in a tank, and simulated ones in their place: sight, heat, a guard, and an environment around them.
+"""Robots in a tank, and simulated ones in their place.
 
-A `Plant` is sighted, heated and stopped. `LinePlant` talks to one by lines of text, `SimulatedPlant` is one, a `Guard`
-stands before one, and `PlantSwim` is the environment in which policies drive it.
+In come commands of a policy and places that a camera sees; out go pulses of wires and logs. A `Plant` is sighted,
+heated and stopped: `LinePlant` talks to one by lines of text, `SimulatedPlant` is one, a `Guard` stands before one, and
+`PlantSwim` is the environment in which policies drive it. The guard trusts neither side, because wires that stay hot
+burn.
 """

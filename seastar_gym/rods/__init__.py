@@ -1,5 +1,9 @@
 """Planar discrete elastic rods: numbers in, numbers out; no robot, no clock.
 
+In come coefficients, places and velocities of a group of robots, as rows; out come those at the end of an interval, with
+a report. A time step is a minimisation (newton.py) of a potential that terms add up to (potential.py, terms/), under a
+guard, because plain Newton steps fail at the extremes and the midpoint rule may pump energy (guard.py).
+
 symbol         name             unit    what it is, and the chapter's equation
 q              q                m       coordinates of all nodes (13.1)
 v              v                m/s     their velocities
@@ -23,7 +27,7 @@ h, gamma       h, gamma         s       time step; coefficient of a stage times 
 Phi            phi, energy      J       incremental potential of a stage, see potential.py
 
 Entry points call the machine code of kernels. What Python calls itself, `drag_slopes(c, wx, wy)`, runs in Python. What
-kernels may ask of a processor is listed in numpy_lanes.py. NUMBA_DISABLE_JIT=1 runs everything so, in any debugger,
+kernels may ask of a processor is listed in plain.py. NUMBA_DISABLE_JIT=1 runs everything so, in any debugger,
 thousands of times slower.
 
 Work of a Newton iteration of the chapter's discretisation (46 nodes), counted by studies/operations.py; shares of
@@ -31,9 +35,9 @@ the time are those of an AVX-512 processor, by `python -m studies.speed.throughp
 
 part            kflop   time    what
 hub hinges       0.2     3 %    root edges, five hinges, their couplings (potential.py)
-limbs            9.5    80 %    assembly and elimination in one sweep, 211 flop per node (potential.py, star_matrix.py)
-ring             0.8     8 %    elimination of root nodes and hub (star_matrix.py)
-substitution     1.0     9 %    back through the limbs, and the Newton step (star_matrix.py, newton.py)
+limbs            9.5    80 %    assembly and elimination in one sweep, 211 flop per node (potential.py, linear.py)
+ring             0.8     8 %    elimination of root nodes and hub (linear.py)
+substitution     1.0     9 %    back through the limbs, and the Newton step (linear.py, newton.py)
 
 In the continuum's discretisation limbs take 11.8 kflop, because the middles of edges have drag and inertia too, the hub
 0.7 instead of the ring, 13.7 in all.

@@ -64,7 +64,7 @@ class BodyWork(NamedTuple):
 
     turn: (cos, sin) of its angle, by the iterate. arm: A_k by the iterate, (x, y) per limb and corner [m].
     frozen: What a stage takes from its first guess, see FROZEN. hat: X_hat and U_hat, per limb [m], [m/s].
-    turning: b_hat [kg m/s] of the stage, then B [N] of every stage, (x, y) each, see stepping/momentum.py.
+    turning: b_hat [kg m/s] of the stage, then B [N] of every stage, (x, y) each, see guard.py.
     system: Coupling of hub and angle, (x, y) [N]; stiffness of the angle [N m] and its residual [N m].
     """
 

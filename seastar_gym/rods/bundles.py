@@ -77,8 +77,8 @@ class Work(NamedTuple):
 
     q, q_hat, v_hat: Iterate, start of the stage and its velocity, per coordinate [m, m/s].
     step: Last Newton step taken, per coordinate [m].
-    factors, ring, root_factors, root_solution: The linear system, see star_matrix.py.
-    root_edges: Geometry of the root edges, see geometry.py.
+    factors, ring, root_factors, root_solution: The linear system, see linear.py.
+    root_edges: Geometry of the root edges, see star.py.
     hub_moment, hub_stiffness: Sums over the hub hinges, or clamps, of a limb's root edge, per limb [N m].
     hub_coupling: 2 x 2 block of every hub hinge, four rows per limb [N/m]; stiffnesses of clamps, see clamp.py [N m].
     hub_EI_kappa_bar: Natural moment of the hub hinges, per limb [N m].
@@ -91,7 +91,7 @@ class Work(NamedTuple):
     normals: Unit normals of the edges where a stage began, or None in scenes that need none; see fluid.py.
     current: Velocity of the fluid at every node there [m/s], or None.
     added_mass: Mass of fluid at every node there, xx, xy, yy [kg], or None.
-    pivots, root_pivots: For solutions of other right-hand sides, see star_solution.py, or None where nobody asks.
+    pivots, root_pivots: For solutions of other right-hand sides, see linear.py, or None where nobody asks.
     contact: Memory of contact, or None.
     tension, bending: EA eps [N] and EI kappa [N m] of edges and hinges where a stage began, or None without damping.
     body: Memory of a body, or None.

@@ -26,7 +26,7 @@ the cut is of the order of the scheme's own error.
 Schemes of higher order take the energy in the middle of a step and promise no such balance. In a guarded step they are
 held to the larger of the energies that the robot standing still has at the step's ends, and what moving the
 natural hub angles, and natural curvature, alone can store. What limbs store that press each other, and may get back,
-counts at the start of all steps, and at the end of implicit Euler's: where others look ahead (contact.py), limbs that
+counts at the start of all steps, and at the end of implicit Euler's: where others look ahead (forces.py), limbs that
 part get nothing back.
 
 U is that of the stiffness that limbs have at the time, see along.py. So what actuators put in or take out by stiffening

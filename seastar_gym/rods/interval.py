@@ -231,7 +231,7 @@ def advance(
         robot turn alike.
     failed: 0 for robots that go on, else their SolverStatus, shape (n_groups, 1, N_LANES).
     report: Counts and extremes, added to, shape (n_groups, len(REPORT_ROWS), N_LANES).
-    limits: Tolerances and bounds, see scales.py.
+    limits: Tolerances and bounds, see newton.py.
     effort: Work and moments of the actuators, added to, shape (n_groups, MOMENTS + n_limbs, N_LANES), see report.py;
         (n_groups, 0, N_LANES) where nobody asks for them.
     """

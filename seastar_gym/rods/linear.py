@@ -10,7 +10,7 @@ y = (W_y - l W_x)/d_y) and z = (r_x/d_x, (r_y - l r_x)/d_y) for the substitution
 
 Blocks are tuples: symmetric ones (xx, xy, yy), couplings (xx, xy, yx, yy) row by row.
 
-Solutions of an eliminated star of chains, see star_matrix.py, for its own right-hand side and for another one.
+Solutions of an eliminated star of chains, see linear.py, for its own right-hand side and for another one.
 
 Root nodes and a rigid hub: root nodes couple with the hub's place and orientation, not with each other.
 

@@ -99,7 +99,7 @@ def minimise(rods, work, stage, active, tolerance, iteration_limit):
     """Minimise Phi over work.q, in place, for the robots in the mask `active`.
 
     tolerance: Largest node move of the last Newton step [m], or of the one that is left out because it is predictable,
-        see skip_last.py. iteration_limit: Most Newton steps per robot.
+        see newton.py. iteration_limit: Most Newton steps per robot.
 
     Returns (converged, Phi, iterations, regularised, backtracks), per robot: a mask, the potential before the last step
     [J], and counts of Newton steps, of those with a convex matrix, and of shortened ones.
@@ -224,12 +224,12 @@ class Scales(NamedTuple):
     """One row each, but for `held`.
 
     shortest_edge: Smallest natural length of an edge [m].
-    curvature_rate: How fast the quadratic length shrinks with the step [1/s^2], see skip_last.py.
-    predictable: Potential [J] up to which Newton steps are predictable, see skip_last.py; none is where drag on slender
+    curvature_rate: How fast the quadratic length shrinks with the step [1/s^2], see newton.py.
+    predictable: Potential [J] up to which Newton steps are predictable, see newton.py; none is where drag on slender
         edges curves the potential more than that allows for.
     damped: Potential [J] up to which drag takes more energy than an unregularised step may create, see guard.py; zero
         without drag.
-    stiffness_ratio: How much stiffer edges are than inertia, the more the longer the step [1/s^2], see momentum.py.
+    stiffness_ratio: How much stiffer edges are than inertia, the more the longer the step [1/s^2], see guard.py.
     free_mass: Of the nodes that are not held [kg].
     held: Whether nodes are held, so that no frame but the laboratory's will do.
     """

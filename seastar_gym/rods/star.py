@@ -7,7 +7,7 @@ the hub hinge from limb j to limb j + 1, whose first edge is the root edge of li
 limb has none: hinges that are not there have no stiffness. With a rigid hub, the hinge of a root edge is its clamp.
 
 Where the hub is a body with a size, root edges start at its rim. Behind the nodes then stand the place of the body's
-angle and, limb by limb, the places of the roots, which follow from hub and angle, see body/body.py. In scenes with
+angle and, limb by limb, the places of the roots, which follow from hub and angle, see body.py. In scenes with
 contact, the corners of its outline follow, which move as the roots do and have no numbers of their own.
 
 Edges of a planar rod and the angles between them.
@@ -203,7 +203,7 @@ def tail_node(rods, e):
 
 @kernel
 def hinge_edges(rods, e):
-    """(a, b, side): the edges of the hinge that ends with edge e, and how its angle is measured, see geometry.py."""
+    """(a, b, side): the edges of the hinge that ends with edge e, and how its angle is measured, see star.py."""
     if e % rods.edges_per_limb == 0:
         return e, (e + rods.edges_per_limb) % rods.n_edges, rods.hub.side
     return e - 1, e, 1.0

@@ -137,7 +137,7 @@ def scheme_of(name: str, damping: float) -> Scheme:
 class Stage(NamedTuple):
     """An implicit stage: q_hat [m] and v_hat [m/s], rows per coordinate, gamma [s] and its reciprocal, lanes.
 
-    ahead: Whether the scheme asks in the middle of a step, so that contact has to look ahead, see contact/contact.py.
+    ahead: Whether the scheme asks in the middle of a step, so that contact has to look ahead, see contact/forces.py.
     """
 
     q_hat: Any
@@ -317,7 +317,7 @@ def start_at_rest(rods, work, stage, frame, robots):
 # Rows of a lane group's report, shape (len(REPORT_ROWS), N_LANES): what happened to its robots.
 REPORT_ROWS = (
     "newton_iterations",
-    "solver_iterations",  # of the conjugate gradients where limbs touch, see linear/coupled.py
+    "solver_iterations",  # of the conjugate gradients where limbs touch, see contact/coupled.py
     "regularised",  # Newton steps that needed the convex matrix
     "backtracks",  # halvings of a Newton step by the line search
     "steps",  # time steps taken
@@ -326,7 +326,7 @@ REPORT_ROWS = (
     "energy_cuts",  # steps after which velocities were cut, see guard.py
     "covered",  # time [s]
     "smallest_hub_t",  # smallest tan(phi/2) of a hub hinge
-    "largest_overlap",  # of limbs that touch each other or a body, see contact/crossing.py
+    "largest_overlap",  # of limbs that touch each other or a body, see contact/pairs.py
 )
 (
     NEWTON_ITERATIONS, SOLVER_ITERATIONS, REGULARISED, BACKTRACKS, STEPS, HALVINGS, REJECTIONS, ENERGY_CUTS, COVERED,

@@ -1,8 +1,9 @@
-"""Description of what is simulated: robot, fluid, actuator, contact and numerics, joined in a `Scene`.
+"""Description of what is simulated: robot, water, actuator, contact and numerics, joined in a `Scene`.
 
-All parts are frozen dataclasses in SI units. Their annotations declare units and bounds of numbers (`number.py`),
-`checks.py` refuses bad values, `per_robot.py` allows numbers that differ from robot to robot, and `serial.py` writes
-scenes to plain data.
+In come a user's numbers in SI units; out go frozen dataclasses that have been checked together, or one sentence that
+says what cannot be. Annotations declare units and bounds of numbers, and which may differ from robot to robot
+(`number.py`, `checks.py`); `serial.py` writes scenes to plain data. A scene is numbers and words, without compiled
+code, so that it can be read, compared and kept where nothing is simulated.
 """
 
 from seastar_gym.scene.actuators.curves import Limited, MeasuredCurve, SmaPulse

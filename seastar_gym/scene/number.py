@@ -3,7 +3,7 @@
     density: Annotated[Numbers, not_negative("kg/m^3")] = 1000.0
 
 `check_numbers` refuses what was not declared. Numbers of the type `Numbers` may differ from robot to robot, see
-per_robot.py; those of the type `Profile` may differ along a limb. Results of sweeps have the units.
+number.py; those of the type `Profile` may differ along a limb. Results of sweeps have the units.
 
 Numbers of a scene that may differ from robot to robot in a batch: those that a part declares as `Numbers`.
 

@@ -1,6 +1,6 @@
 """`Water`: the fluid around the robot.
 
-Currents: velocity fields of the fluid. Some numbers may differ from robot to robot, see per_robot.py.
+Currents: velocity fields of the fluid. Some numbers may differ from robot to robot, see number.py.
 """
 
 from __future__ import annotations

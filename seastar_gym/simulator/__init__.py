@@ -1,8 +1,9 @@
 """A batch of robots of one scene, advanced by intervals of time. A stroke is the interval of one actuation period.
 
-`simulator.py` offers what users call, `batch.py` holds the robots' numbers and calls the kernels, `drive.py` turns
-commands into rotations of limbs, `clock.py` counts time, `lock.py` keeps intervals whole, `workers.py` shares a batch
-out over threads and `error_bars.py` estimates the hub's error by a twin.
+In come commands in [-1, 1] for every limb; out go states and a report of every interval. `simulator.py` offers what
+users call, `drive.py` turns commands into rotations of limbs, `batch.py` holds the robots' numbers and calls the
+kernels of `rods`, `state.py` and `lock.py` keep intervals whole, and `watches.py` tells errors and energies that grow.
+A batch is the rule and one robot its smallest case, since eight cost as much as one.
 """
 
 from seastar_gym.simulator.report import SolverStatus, StrokeReport

@@ -67,7 +67,7 @@ class StrokeReport(NamedTuple):
         distance at which they touch: 1 where centre lines meet. 0 where surfaces are apart at the ends of all steps,
         also if contact pushed them apart within a step. See scene/scene.py.
     error_estimate: Estimate of the hub's error, of space and time [m]: a bound that holds in about 95 % of strokes, see
-        error_bars.py. NaN without `error_bars`.
+        watches.py. NaN without `error_bars`.
     heating_time: Time for which wires were heated, summed over limbs [s]; NaN if the actuator does not say it.
     energy: Electric energy of that heat, with the actuator's heating power [J]; NaN if the actuator does not say it.
     work: Mechanical work of the actuators, from their moments at the ends of the steps of `Numerics.step` [J]. What
@@ -75,7 +75,7 @@ class StrokeReport(NamedTuple):
     peak_moment: Largest moment that a limb resisted its actuator with at these times [N m], likewise. A moment is the
         slope of the elastic energy in the limb's rotation.
     energy_growth: Kinetic energy relative to the water, each over the squared largest command so far, over the largest
-        in the first 20 strokes. Well above 1, the numerics gather energy, see growth.py. 1 in the first 20 strokes; NaN
+        in the first 20 strokes. Well above 1, the numerics gather energy. 1 in the first 20 strokes; NaN
         for the chapter's scene at a fidelity, which gathers none, and on other devices than "cpu".
     """
 

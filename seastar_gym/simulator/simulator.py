@@ -87,11 +87,11 @@ class Simulator:
     n_robots: Number of robots.
     threads: Number of threads that share the lane groups; all processors if None. A robot's trajectory is the same to
         the last bit whatever the batch, the lane and the number of threads.
-    error_bars: Whether to estimate the hub's error by a twin of shorter edges and steps, see error_bars.py. It changes
+    error_bars: Whether to estimate the hub's error by a twin of shorter edges and steps, see watches.py. It changes
         no bit of a trajectory, and a stroke takes three to five times as long.
     effort: Whether to measure the work and the largest moment of the actuators. It changes no bit of a trajectory.
     device: "cpu", "cuda" for an NVIDIA GPU with one robot per thread, or "scalar" for its twin on the processor, which
-        is slow and for tests. The device changes no bit of a trajectory either, see device_batch.py.
+        is slow and for tests. The device changes no bit of a trajectory either, see device.py.
 
     A stroke, or any interval, that is not completed (Ctrl-C, an exception, a generator that is closed or dropped) is
     undone. While one is under way, other calls that would change the simulator are refused with a RuntimeError.

@@ -1,4 +1,4 @@
-"""Every operation of the lanes that are differentiated: the values of lanes.py, and the derivatives of calculus."""
+"""Every operation of the lanes that are differentiated: the values of registers.py, and the derivatives of calculus."""
 
 from functools import cache
 

@@ -83,7 +83,7 @@ def test_an_edited_kernel_never_runs_from_the_cache_and_an_unchanged_one_always_
     assert energy == pytest.approx(STRETCHED, rel=1e-9)
     assert (hits, misses) == (0, 1)
     assert copy.run() == [energy, 1, 0]
-    # stretching.py is called by energy.py, whose own file stays as it was.
+    # stretching.py is called by potential.py, whose own file stays as it was.
     copy.edit("seastar_gym/rods/terms/stretching.py", "return 0.5 * load", "return 3.5 * load")
     assert copy.run() == [pytest.approx(7.0 * energy), 0, 1]
     copy.edit("seastar_gym/rods/terms/stretching.py", "return 3.5 * load", "return 0.5 * load")

@@ -4,11 +4,11 @@ A task is an object that says what is drawn, where the targets are and how a dec
 `seastar_gym.envs.robots`; the environments of `SeastarSwim-v0` take it. Here they have names, and get ids.
 
 miswired.py    limbs whose wires may be swapped
-prey.py        prey that is faster than the robot, course.py its courses
+prey.py        prey that is faster than the robot
 station.py     a place to keep in a current that shows in the velocities
 fail_blind.py  dead limbs of a robot that sees its way alone
-obst_trap.py   a goal behind discs, most of which may form a horseshoe, discs.py the ways around them
-prizes.py      more prizes than can be reached, rounds.py the best choice of them
+obst_trap.py   a goal behind discs, most of which may form a horseshoe, and the ways around them
+prizes.py      more prizes than can be reached, and the best choice of them
 sim_to_real.py a robot that a late camera sees, and whose stiffness and drag are not known
 """
 

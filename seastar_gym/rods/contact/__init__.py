@@ -1,1 +1,6 @@
-"""Contact of limbs with each other and with a body, from who is near whom to the linear system that it couples."""
+"""Contact of limbs with each other and with a body.
+
+In come places of all nodes; out go the pairs that are near each other (pairs.py), their forces (forces.py), and the
+linear system that they couple (coupled.py). Limbs that touch are no chains of neighbours any more, so only scenes with
+contact pay for it.
+"""

@@ -1,6 +1,6 @@
 """Which nodes and edges may touch in a stage, of limbs and of a body: listed from its first guess, robot by robot.
 
-Which nodes are near a body, and which edges near its corners: listed for broad_phase.py.
+Which nodes are near a body, and which edges near its corners: listed for pairs.py.
 
 How near limbs came to passing through each other, or a body; a step in which they would is refused.
 """
