@@ -2,7 +2,8 @@
 
 In comes a scene; out goes a `Certificate`, its settings with their measured errors and speeds, of which `scene_for`
 takes the fastest below an error. `certify(scene)` and `seastar certify` measure one (measure.py, command.py); those of
-the chapter's robot come with the package (chapters.py). Errors are those of swims beside finer ones: no formula foretells them.
+the chapter's robot come with the package (chapters.py). Errors are those of swims beside finer ones: no formula
+foretells them.
 """
 
 from seastar_gym.accuracy.certificate import Certificate, Setting, as_certificate

@@ -1,8 +1,8 @@
 """Planar discrete elastic rods: numbers in, numbers out; no robot, no clock.
 
-In come coefficients, places and velocities of a group of robots, as rows; out come those at the end of an interval, with
-a report. A time step is a minimisation (newton.py) of a potential that terms add up to (potential.py, terms/), under a
-guard, because plain Newton steps fail at the extremes and the midpoint rule may pump energy (guard.py).
+In come coefficients, places and velocities of a group of robots, as rows; out come those at the end of an interval,
+with a report. A time step is a minimisation (newton.py) of a potential that terms add up to (potential.py, terms/),
+under a guard, because plain Newton steps fail at the extremes and the midpoint rule may pump energy (guard.py).
 
 symbol         name             unit    what it is, and the chapter's equation
 q              q                m       coordinates of all nodes (13.1)
