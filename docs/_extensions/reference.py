@@ -31,18 +31,24 @@ def parsed(module: str) -> ast.Module:
 
 
 def exported(package: str) -> list[str]:
-    """Names that a package imports below `if TYPE_CHECKING:`, see seastar_gym/lazy.py."""
-    (block,) = (node for node in parsed(package).body if isinstance(node, ast.If))
-    return sorted(alias.name for node in block.body if isinstance(node, ast.ImportFrom) for alias in node.names)
+    """Names that a package's stub imports."""
+    imports = (node for node in stub(package).body if isinstance(node, ast.ImportFrom) and node.module)
+    return sorted(alias.name for node in imports for alias in node.names)
+
+
+def stub(package: str) -> ast.Module:
+    """What a package says that it exports, if it imports it when it is asked for."""
+    file = ROOT.joinpath(*package.split("."), "__init__.pyi")
+    return ast.parse(file.read_text(encoding="utf-8") if file.is_file() else "")
 
 
 def defined(module: str, name: str) -> tuple[str, Definition | None]:
     """The module in which a class or function is defined, and its definition; None for anything else."""
-    for node in ast.walk(parsed(module)):
+    for node in (*ast.walk(parsed(module)), *stub(module).body):
         if isinstance(node, Definition) and node.name == name:
             return module, node
         if isinstance(node, ast.ImportFrom) and node.module and any(alias.name == name for alias in node.names):
-            return defined(node.module, name)
+            return defined(f"{module}.{node.module}" if node.level else node.module, name)
     return module, None
 
 

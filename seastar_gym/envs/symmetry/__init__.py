@@ -21,26 +21,6 @@ A `Symmetry` knows the group, the layout and the actions of a robot. Its methods
 (..., size), and elements of shape (...).
 """
 
-from typing import TYPE_CHECKING
+from lazy_loader import attach_stub
 
-from seastar_gym.lazy import lazily
-
-if TYPE_CHECKING:
-    from seastar_gym.envs.symmetry.symmetry import FrameStack as FrameStack
-    from seastar_gym.envs.symmetry.symmetry import Symmetry as Symmetry
-    from seastar_gym.envs.symmetry.symmetry import action_table as action_table
-    from seastar_gym.envs.symmetry.symmetry import compose as compose
-    from seastar_gym.envs.symmetry.symmetry import inverse as inverse
-    from seastar_gym.envs.symmetry.symmetry import limb_order as limb_order
-    from seastar_gym.envs.symmetry.symmetry import memory_mirror as memory_mirror
-    from seastar_gym.envs.symmetry.symmetry import symmetry_of as symmetry_of
-    from seastar_gym.envs.symmetry.symmetry import transform_commands as transform_commands
-    from seastar_gym.envs.symmetry.symmetry import turns as turns
-    from seastar_gym.envs.symmetry.wrappers import SymmetryReduction as SymmetryReduction
-    from seastar_gym.envs.symmetry.wrappers import VectorFrameStack as VectorFrameStack
-    from seastar_gym.envs.symmetry.wrappers import VectorSymmetryReduction as VectorSymmetryReduction
-    from seastar_gym.envs.symmetry.wrappers import observed_mirror as observed_mirror
-    from seastar_gym.envs.symmetry.wrappers import require_symmetry as require_symmetry
-    from seastar_gym.envs.symmetry.wrappers import symmetry_in as symmetry_in
-else:
-    __all__, __getattr__, __dir__ = lazily(__name__)
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
