@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from agents.ppo import actor, describe
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.learned import LearnedPolicy
-from seastar_gym.envs.observation import Layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.symmetry import Symmetry, VectorFrameStack
 from seastar_gym.envs.symmetry.symmetry import inverse
 from seastar_gym.scene.checks import require_count, require_kind

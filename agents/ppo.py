@@ -32,9 +32,10 @@ from seastar_gym.controllers.greedy import turned
 from seastar_gym.controllers.learned import LearnedPolicy, Weights
 from seastar_gym.controllers.registry import task_of
 from seastar_gym.envs.commands import Discrete, command_table
-from seastar_gym.envs.observation import Layout, heading_of
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import RewardWeights
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
+from seastar_gym.envs.stations import heading_of
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction, observed_mirror
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.envs.waypoints import AlongPath

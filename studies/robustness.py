@@ -17,7 +17,7 @@ import numpy as np
 
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy, bundled_file, load
-from seastar_gym.envs.observation import Layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.sight import Sight
 from seastar_gym.evaluation.swim import HELD_OUT_SEED, TIME_LIMIT, swim_many

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.learned import bundled_file, load
-from seastar_gym.envs.observation import heading_of
 from seastar_gym.envs.options import wrapped
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.rendering import limb_nodes
+from seastar_gym.envs.stations import heading_of
 from seastar_gym.evaluation.films import RecordingEnv
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import STRAIGHT

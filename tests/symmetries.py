@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from seastar_gym import Numerics, SymmetryReduction
-from seastar_gym.envs.observation import Layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import Symmetry
 from seastar_gym.envs.symmetry.symmetry import n_limbs_of

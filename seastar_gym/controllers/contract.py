@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import MOST_LIMBS, Actions, action_space
-from seastar_gym.envs.observation import Layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.sight import Sight, told
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_array, shown

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, cast, get_args
 
 from seastar_gym.envs import TASKS
 from seastar_gym.envs.commands import Actions, Discrete, checked_decision_period, choices
-from seastar_gym.envs.observation import N_STATIONS, OBSERVATION_LAYOUT, Entry, Layout, memory_size
+from seastar_gym.envs.layout import N_STATIONS, OBSERVATION_LAYOUT, Entry, Layout, memory_size
 from seastar_gym.envs.randomization import Distribution
 from seastar_gym.envs.sight import Drawn, Sight, require_action_delay
 from seastar_gym.envs.symmetry import FrameStack, Symmetry, memory_mirror, symmetry_of

@@ -22,9 +22,10 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import can_be_decided_by, observed
 from seastar_gym.envs.commands import Actions, checked_decision_period, command_table, decisions_in
-from seastar_gym.envs.observation import OBSERVATION_LAYOUT, Layout, heading_of
+from seastar_gym.envs.layout import OBSERVATION_LAYOUT, Layout
 from seastar_gym.envs.options import RewardWeights
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
+from seastar_gym.envs.stations import heading_of
 from seastar_gym.files import beside
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_kind, require_number

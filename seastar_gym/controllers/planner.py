@@ -20,18 +20,10 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.controllers.contract import can_be_decided_by, observed, starts
 from seastar_gym.controllers.greedy import Searcher, require_search, waypoints_of
 from seastar_gym.envs.commands import checked_decision_period, command_table
-from seastar_gym.envs.observation import (
-    HEADINGS,
-    N_STATIONS,
-    VELOCITY_SCALE,
-    Layout,
-    body_heading,
-    memory_size,
-    node_weights,
-    of_beginning,
-)
+from seastar_gym.envs.layout import HEADINGS, N_STATIONS, VELOCITY_SCALE, Layout, memory_size
 from seastar_gym.envs.options import HeadingTargets, RewardWeights, make_scene, wrapped
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
+from seastar_gym.envs.stations import body_heading, node_weights, of_beginning
 from seastar_gym.gaits import evolved_gaits
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.base import complete

@@ -1,7 +1,7 @@
 """What is under way: `Lag`, commands from decisions to wires, and `Tracker`, pictures from robots to who decides.
 
 A picture is a row of numbers: hub x, y [m], cosine and sine of the heading, and what else is seen of the limbs, in the
-order and its units: places of stations, then, where nodes are seen, velocities. A decision knows the two
+order and the units of `layout.py`: places of stations, then, where nodes are seen, velocities. A decision knows the two
 that the last decisions knew.
 """
 
@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.observation import N_STATIONS, VELOCITY_SCALE, lengths_of, pictures_of
+from seastar_gym.envs.layout import N_STATIONS, VELOCITY_SCALE
+from seastar_gym.envs.observation import lengths_of, pictures_of
 from seastar_gym.envs.options import wrapped
 from seastar_gym.envs.randomization import Distribution
 from seastar_gym.envs.sight import Drawn, Sees, bounds_of, stations_seen

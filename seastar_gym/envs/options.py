@@ -4,7 +4,7 @@ The reward: a sum of named terms, and the route along which progress counts.
 
 Headings: which way robots are asked to look at their waypoints, and how far they still have to turn.
 
-The heading of a robot is the direction of the x axis of its body frame (`observation.py`): that of limb 1, by all
+The heading of a robot is the direction of the x axis of its body frame (`layout.py`): that of limb 1, by all
 stations. Limbs are told from each other, as by a camera on limb 1: a heading repeats after 360 degrees, not after 72.
 Angles are those of the world, anti-clockwise from +x.
 

@@ -20,16 +20,8 @@ from numpy.typing import NDArray
 from seastar_gym.accuracy.chapters import errors_in_info, read_certificate
 from seastar_gym.envs.commands import action_masks, can_be_masked, masked_limbs
 from seastar_gym.envs.delays import Lag, Piece, Tracker
-from seastar_gym.envs.observation import (
-    N_STATIONS,
-    Entry,
-    Layout,
-    axes_of,
-    lengths_of,
-    observed_rows,
-    rows_on_device,
-    to_float32,
-)
+from seastar_gym.envs.layout import N_STATIONS, Entry, Layout
+from seastar_gym.envs.observation import axes_of, lengths_of, observed_rows, rows_on_device, to_float32
 from seastar_gym.envs.options import SwimOptions, pulses_of
 from seastar_gym.envs.randomization import ACTION_DELAY, LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.scenery import NOTHING, Scenery

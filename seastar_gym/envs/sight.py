@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.observation import N_STATIONS, Entry
+from seastar_gym.envs.layout import N_STATIONS, Entry
 from seastar_gym.envs.randomization import ACTION_DELAY, Distribution
 from seastar_gym.files import read_json
 from seastar_gym.scene.checks import as_float, is_whole_number, require_number, shown

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.envs.observation import HEADINGS, Entry
+from seastar_gym.envs.layout import HEADINGS, Entry
 from seastar_gym.envs.options import HeadingTargets, RewardWeights, Weights, reward_terms, wrapped
 from seastar_gym.envs.paths import FARTHEST, WAYPOINT_RADIUS, cross_track_error, make_path, shortest_way
 from seastar_gym.envs.robots import Flags, Floats, Robots, Score, Task

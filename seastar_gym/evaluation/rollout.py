@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.contract import Policy, actions_in, require_fit, require_policy
 from seastar_gym.controllers.greedy import Searcher
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.observation import Layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.robots import Split, Task
 from seastar_gym.envs.sight import told
 from seastar_gym.envs.tasks.prey import Prey

@@ -25,12 +25,13 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit, require_policy
 from seastar_gym.controllers.greedy import turned
 from seastar_gym.envs.commands import decisions_in
-from seastar_gym.envs.observation import VELOCITY_SCALE, heading_of
+from seastar_gym.envs.layout import VELOCITY_SCALE
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.paths import MOST_WAYPOINTS, PATHS, WAYPOINT_RADIUS, cross_track_error, make_path, path_length
 from seastar_gym.envs.robots import Flags, Outcome, Robots
 from seastar_gym.envs.seastar_swim import OneRobotEnv
 from seastar_gym.envs.sight import Drawn, Sight
+from seastar_gym.envs.stations import heading_of
 from seastar_gym.envs.vector import ManyRobotsEnv
 from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.envs.waypoints import Path as SwimPath

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from seastar_gym.command import refused_by_disk
 from seastar_gym.envs.attributes import arguments_of
 from seastar_gym.envs.delays import Lag, Pictures, Tracker
-from seastar_gym.envs.observation import N_STATIONS, lengths_of
+from seastar_gym.envs.layout import N_STATIONS
+from seastar_gym.envs.observation import lengths_of
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.robots import Flags, Floats, Robots
 from seastar_gym.envs.seastar_swim import Observation, OneRobotEnv, RenderMode

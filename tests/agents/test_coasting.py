@@ -7,8 +7,8 @@ from gymnasium.vector import AutoresetMode
 from agents import ppo as coasting
 from agents.ppo import CoastingProgress, Hyperparameters, fit_coasting
 from later import Later
-from seastar_gym.envs.observation import body_heading
 from seastar_gym.envs.options import RewardWeights, make_scene
+from seastar_gym.envs.stations import body_heading
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.simulator import Simulator
 

@@ -20,7 +20,8 @@ from seastar_gym.controllers.export.c_code import CODE, to_c
 from seastar_gym.controllers.export.onnx_graph import to_onnx
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.commands import to_commands
-from seastar_gym.envs.observation import VELOCITY_SCALE, Layout, heading_of
+from seastar_gym.envs.layout import VELOCITY_SCALE, Layout
+from seastar_gym.envs.stations import heading_of
 
 ROOT = Path(__file__).resolve().parents[2]
 N_SWUM, N_DRAWN = 5000, 5000

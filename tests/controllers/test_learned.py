@@ -18,7 +18,7 @@ from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, camera_of, load, save
 from seastar_gym.envs.commands import command_table
-from seastar_gym.envs.observation import Layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.sight import told
 from seastar_gym.envs.symmetry import VectorSymmetryReduction

@@ -13,8 +13,9 @@ from seastar_gym import RewardWeights, SymmetryReduction
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import LIMB_COMMANDS, action_space, command_table, to_commands
 from seastar_gym.envs.goal import SERVED, GoalForm
-from seastar_gym.envs.observation import Layout, weights
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.stations import weights
 
 
 @pytest.mark.parametrize("n_limbs", [3, 5, 6])

@@ -32,7 +32,7 @@ from seastar_gym import (
     ThermalSma,
 )
 from seastar_gym.accuracy.chapters import NAMES, STROKES
-from seastar_gym.envs.observation import HEADINGS, VELOCITY_SCALE, Layout
+from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
 from seastar_gym.envs.options import scene_at
 from seastar_gym.envs.paths import PATHS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv

@@ -30,7 +30,7 @@ from seastar_gym.envs.attributes import checked_options
 from seastar_gym.envs.commands import action_space, choices, command_table, to_commands
 from seastar_gym.envs.frame import Frame
 from seastar_gym.envs.goal import GoalForm
-from seastar_gym.envs.observation import Layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import HeadingTargets, RewardWeights
 from seastar_gym.envs.paths import FARTHEST, PATHS, make_path, register_path
 from seastar_gym.envs.randomization import LogUniform, Normal

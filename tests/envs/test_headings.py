@@ -7,9 +7,10 @@ import pytest
 
 from seastar_gym import HeadingTargets, RewardWeights, SmaWires
 from seastar_gym.envs import symmetry
-from seastar_gym.envs.observation import HEADINGS, Layout, body_heading
+from seastar_gym.envs.layout import HEADINGS, Layout
 from seastar_gym.envs.options import wrapped
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.stations import body_heading
 from seastar_gym.gaits import turning_wave
 from symmetries import symmetry_for
 

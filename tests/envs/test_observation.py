@@ -20,8 +20,10 @@ from seastar_gym import (
     Uniform,
 )
 from seastar_gym.envs.commands import command_table
-from seastar_gym.envs.observation import HEADINGS, VELOCITY_SCALE, Layout, at_stations, heading_of, observe, stations_of
+from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
+from seastar_gym.envs.observation import observe
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.stations import at_stations, heading_of, stations_of
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.lanes.registers import N_LANES

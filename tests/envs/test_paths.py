@@ -9,7 +9,11 @@ from scipy.interpolate import CubicSpline
 from refusals import assert_refused
 from seastar_gym import Attachment, Body, Scene, Seastar
 from seastar_gym.envs import paths
-from seastar_gym.envs.observation import (
+from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.paths import FEW, PATHS, cross_track_error, make_path, path_length, register_path, shortest_way
+from seastar_gym.envs.robots import Robots
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.stations import (
     at_stations,
     body_heading,
     node_weights,
@@ -18,10 +22,6 @@ from seastar_gym.envs.observation import (
     stations_of,
     weights,
 )
-from seastar_gym.envs.options import SwimOptions
-from seastar_gym.envs.paths import FEW, PATHS, cross_track_error, make_path, path_length, register_path, shortest_way
-from seastar_gym.envs.robots import Robots
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.waypoints import AlongPath
 
 ORIGIN = np.zeros(2)

@@ -37,7 +37,7 @@ from seastar_gym import (
 )
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table, to_commands
-from seastar_gym.envs.observation import Layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import Symmetry, SymmetryReduction, VectorSymmetryReduction, symmetry_in
 from seastar_gym.envs.vector import SeastarSwimVectorEnv

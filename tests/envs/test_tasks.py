@@ -10,7 +10,7 @@ import pytest
 import seastar_gym
 from refusals import assert_refused
 from seastar_gym import FailBlind, Miswired, ObstTrap, Prey, Prizes, Sight, Station
-from seastar_gym.envs.observation import Layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.randomization import drawn_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import limb_order, symmetry_in, transform_commands

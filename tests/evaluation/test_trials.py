@@ -7,7 +7,7 @@ from seastar_gym import Scene
 from seastar_gym.cli.main import main
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.open_loop import scripted
-from seastar_gym.envs.observation import Layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import SwimOptions, make_scene
 from seastar_gym.envs.robots import Robots
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv

@@ -22,7 +22,8 @@ from seastar_gym import (
     Vortex,
     Water,
 )
-from seastar_gym.envs.observation import body_axis, stations
+from seastar_gym.envs.observation import body_axis
+from seastar_gym.envs.stations import stations
 from seastar_gym.lanes import plain as numpy_lanes
 from seastar_gym.lanes import registers as lanes
 from seastar_gym.lanes.plain import Lanes, Mask

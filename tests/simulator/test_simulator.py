@@ -8,7 +8,8 @@ import pytest
 
 from hubs import TEN, robot_with
 from seastar_gym import Body, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State
-from seastar_gym.envs.observation import heading_of, observed_rows
+from seastar_gym.envs.observation import observed_rows
+from seastar_gym.envs.stations import heading_of
 from seastar_gym.lanes.dispatch import KnownCode, code_for
 from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.scene.number import side_by_side

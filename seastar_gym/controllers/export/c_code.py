@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.contract import LARGEST_SEEN
 from seastar_gym.controllers.export import tables
 from seastar_gym.controllers.learned import LearnedPolicy
-from seastar_gym.envs.observation import N_STATIONS, SIZES, VELOCITY_SCALE, at_stations, weights
+from seastar_gym.envs.layout import N_STATIONS, SIZES, VELOCITY_SCALE
+from seastar_gym.envs.stations import at_stations, weights
 from seastar_gym.envs.symmetry.symmetry import BOUNDARY_WIDTH
 from seastar_gym.scene.checks import require_count, require_kind
 from seastar_gym.version import __version__

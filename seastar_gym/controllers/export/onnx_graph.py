@@ -2,7 +2,7 @@
 
 | input | shape | what it is |
 |---|---|---|
-| `observation` | (n, size), float32 | observations of the environment, see `observation.py` |
+| `observation` | (n, size), float32 | observations of the environment, see `layout.py` |
 | `past` | (n, past, size), float32 | those before, latest first; of policies with memory |
 
 | output | shape | what it is |

@@ -14,7 +14,7 @@ void seastar_begin(struct seastar *robot)
     robot->begun = 0;
 }
 
-/* Vector (x, y) of a station from the hub, of points [m] or velocities [m/s]; see envs/observation.py. */
+/* Vector (x, y) of a station from the hub, of points [m] or velocities [m/s]; see envs/stations.py. */
 static void at_station(const double *points, int limb, int station, double *x, double *y)
 {
     const double *of_limb = points + 2 * (1 + limb * SEASTAR_PER_LIMB);

@@ -9,7 +9,7 @@ symmetry group is the turn (g even) or the turn and mirror (g odd) that brings s
 An element carries a robot with its waypoints onto another robot, whose limb j was limb `limb_order(n)[g, j]`; a mirror
 swaps the commands + and -, and does to the memory of actuators what they say (`memory_mirror`). A turn leaves the turns
 that asked headings ask for as they are, a mirror reverses them. Further entries of an observation are carried by what
-they are (`observation.py`). A controller that sees only waypoints in sector 0 and whose actions are carried back is
+they are (`layout.py`). A controller that sees only waypoints in sector 0 and whose actions are carried back is
 equivariant: in a turned or mirrored world it swims the turned or mirrored way.
 
 Robots with less symmetry have less to turn and to mirror: four limbs at a rectangle have a mirror and half a turn. A

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, as_array, choices, command_table
-from seastar_gym.envs.observation import Layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.scene import Scene, checks
 from seastar_gym.scene.actuators.base import Actuator, Mirror, complete, is_actuator
 from seastar_gym.scene.checks import MOST_LIMBS, is_whole_number, require_choice, require_count, require_kind, shown

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from seastar_gym.envs.observation import VELOCITY_SCALE
+from seastar_gym.envs.layout import VELOCITY_SCALE
 from seastar_gym.envs.options import RewardWeights, wrapped
 from seastar_gym.envs.randomization import LIMB_STRENGTHS
 from seastar_gym.envs.robots import Flags, Floats, Robots, Score
