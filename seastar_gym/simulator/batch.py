@@ -130,7 +130,7 @@ class Batch:
     def __init__(self, scene: Scene, n_robots: int, threads: int, effort: bool):
         self._scene, self.n_robots = scene, n_robots
         self._known_parts: dict[bool, list[slice]] = {}  # by whether coefficients are shared
-        self._code, self._advance = KnownCode(), advance.at(NARROW if n_robots <= FEW else PLAIN)
+        self._code, self._form = KnownCode(), NARROW if n_robots <= FEW else PLAIN
         n_groups, n_limbs, n_rows = -(-n_robots // N_LANES), scene.robot.n_limbs, 2 * scene.robot.n_nodes
         self._scheme = scheme_for(scene)
         self.coefficients = Coefficients(scene, n_robots)
@@ -314,7 +314,7 @@ class Batch:
             work, actuation = self.memory[thread]
             shape, n_turning = self._shape_of(part, begin, end)
             self._call(
-                self._advance, self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"],
+                advance.at(self._form), self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"],
                 actuation, self.q[part], self.v[part], self.a[part], self.peaks[part], times, shape, n_turning,
                 self.status[part], self.report[part], self.coefficients.limits(part.start), self.effort[part],
                 kind=shape.ndim,

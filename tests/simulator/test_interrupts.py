@@ -66,6 +66,9 @@ class Kernel:
         finally:
             self.at_work -= 1
 
+    def at(self, form):
+        return self
+
     def remove(self) -> None:
         """From now on kernels run as they are."""
         self.patch.setattr(module, "advance", self.advance)
