@@ -316,8 +316,8 @@ class Batch:
             self._call(
                 advance.at(self._form), self.coefficients.rods(part.start), work, self._scheme,
                 SCHEMES["implicit-euler"], actuation, self.q[part], self.v[part], self.a[part], self.peaks[part], times,
-                shape, n_turning, self.status[part], self.report[part], self.coefficients.limits(part.start), self.effort[part],
-                kind=shape.ndim,
+                shape, n_turning, self.status[part], self.report[part], self.coefficients.limits(part.start),
+                self.effort[part], kind=shape.ndim,
             )  # fmt: skip
 
         self.workers.run(swim, self._parts())
