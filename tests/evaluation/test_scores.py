@@ -9,8 +9,7 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym.cli.main import main
-from seastar_gym.controllers import GreedyPolicy, load_agent
-from seastar_gym.controllers import open_loop as scripted
+from seastar_gym.controllers import GreedyPolicy, load_agent, scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -29,12 +28,10 @@ SWIM, SHORT, OTHER = "SeastarSwim-v0", "SeastarShort-v0", "SeastarDrift-v0"
 
 
 class DriftEnv(SeastarSwimEnv):
-    """A task of another measure, with a split."""
+    """An environment of a task with a split."""
 
-    challenge = Station()
-
-    def __init__(self, split="train", **arguments):
-        assert split == "test"
+    def __init__(self, split="train", task="drift", **arguments):
+        assert split == "test" and task == "drift"
         super().__init__(**arguments)
 
 
@@ -45,7 +42,7 @@ def tasks():
     batch = {"vector_entry_point": "seastar_gym.envs.vector:SeastarSwimVectorEnv"}
     short = {"path": [[0.03, 0.0]], "random_heading": True, "fidelity": "fast"}
     gym.register(SHORT, **entry, **batch, max_episode_steps=30, kwargs=short)
-    gym.register(OTHER, DriftEnv, max_episode_steps=33, kwargs={"fidelity": "fast"})
+    gym.register(OTHER, DriftEnv, max_episode_steps=33, kwargs={"fidelity": "fast", "task": "drift"})
     yield
     for task in (SHORT, OTHER):
         del gym.registry[task]
@@ -75,7 +72,9 @@ def test_returns_are_sums_of_rewards_and_who_does_not_arrive_has_the_time_limit(
 def test_a_task_of_another_measure_without_a_batch_is_swum_on_its_held_out_split(tasks, monkeypatch):
     monkeypatch.setattr("seastar_gym.evaluation.rollout.task_ids", lambda: [OTHER])
     env = DriftEnv("test", fidelity="fast")
-    assert measure_of(env) is MEASURES[Station] and measure_of(SeastarSwimEnv()) is SECONDS
+    assert measure_of(env) is SECONDS
+    monkeypatch.setitem(MEASURES, type(env.task), MEASURES[Station])
+    assert measure_of(env) is MEASURES[Station]
     swum = swim_episodes(OTHER, scripted("rest"), [0, 1])
     side = np.hypot(*env.reset(seed=0)[0][182:184]) * 100.0
     np.testing.assert_allclose(MEASURES[Station].of(swum), side, rtol=1e-3)

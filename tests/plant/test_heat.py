@@ -10,7 +10,7 @@ import pytest
 from faults import Tank
 from refusals import assert_refused
 from seastar_gym import Scene, Simulator, SmaWires, ThermalSma
-from seastar_gym.controllers import open_loop as scripted
+from seastar_gym.controllers import scripted
 from seastar_gym.controllers.learned import pretrained
 from seastar_gym.plant import guard as heat
 from seastar_gym.plant.guard import Guard, Limits

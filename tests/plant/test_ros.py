@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from seastar_gym import Scene, Sight, Simulator, SmaWires
-from seastar_gym.controllers import open_loop as scripted
+from seastar_gym.controllers import scripted
 from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.plant import SimulatedPlant
 from seastar_gym.plant.swim import PlantSwim
