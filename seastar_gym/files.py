@@ -1,6 +1,6 @@
 """Files that are written all at once, or line by line, never through a link; and JSON files of others.
 
-Optional dependencies: what is missing is said in a sentence with the command that installs it.
+Also what is said of optional dependencies that are missing: a sentence with the command that installs them.
 """
 
 import errno

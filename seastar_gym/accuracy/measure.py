@@ -1,15 +1,12 @@
-"""Errors of space and time of any scene.
+"""Errors of space and time of any scene, over classes of commands, and whether its settings gather energy.
 
-Sequences of all classes of commands are swum with every resolution and numerics of SETTINGS, with the
-same nodes and very short steps, and with many nodes and very short steps: the last stand for the continuum. The error
-of space is that of few nodes with short steps against many nodes; that of time is that of a setting against short steps
-with the same nodes; both are largest distances of the hub at ends of strokes, as fractions of the length of the hub's
-path through the water. The sum of the two bounds the whole error, also where they cancel.
-Long swims tell which settings gather energy.
+Sequences of all classes of commands are swum with every resolution and numerics of SETTINGS, with the same nodes and
+very short steps, and with many nodes and very short steps: the last stand for the continuum. The error of space is that
+of few nodes with short steps against many nodes; that of time is that of a setting against short steps with the same
+nodes; both are largest distances of the hub at ends of strokes, as fractions of the length of the hub's path through
+the water. The sum of the two bounds the whole error, also where they cancel.
 
-Classes of command sequences that errors are measured over.
-
-Every class is drawn anew from a seed, as many sequences as are asked for, ten strokes each:
+Every class of commands is drawn anew from a seed, as many sequences as are asked for, ten strokes each:
 
 random ternary          -1, 0 or 1 for every limb and stroke
 random continuous       from [-1, 1] for every limb and stroke
@@ -20,17 +17,14 @@ alternating continuous
 opposed neighbours      two neighbours turned towards or from each other, by 1, another pair in every stroke
 small                   random continuous, a tenth of the amplitude
 
-Whether a setting gathers energy over long swims.
+Errors are measured over ten strokes, and long swims tell which settings gather energy. The implicit midpoint rule damps
+nothing, and on some meshes it resonates with some steps: the robot gathers energy for a hundred strokes, and only then
+swims differently. Kinetic energies at the ends of strokes tell, without a swim of short steps to compare with. They are
+relative to the water, which may carry the robot off.
 
-Errors are measured over ten strokes. The implicit midpoint rule damps nothing, and on some meshes it resonates with
-some steps: the robot gathers energy for a hundred strokes, and only then swims differently. Kinetic energies at the
-ends of strokes tell, without a swim of short steps to compare with. They are relative to the water, which may carry the
-robot off.
-
-A robot as the water sees it: its start and its way relative to the current.
-
-A uniform current is a translation: what swims in it has the errors of still water, though it is carried off. Where the
-water differs from place to place, the current is that at the hub.
+In a current, a robot's start and way are those that the water sees. A uniform current is a translation: what swims in
+it has the errors of still water, though it is carried off. Where the water differs from place to place, the current is
+that at the hub.
 """
 
 import os

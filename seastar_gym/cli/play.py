@@ -3,10 +3,6 @@
 Keys act at the next decision, and as long as they are held. Without a display, --keys "a a*5 1w up ." presses keys, one
 word per decision, and --film writes what is seen.
 
-The environment of `seastar play`: its pictures say what the keys do, and number the limbs.
-
-Keys of the keyboard and the commands that they mean.
-
 The row of digits turns limbs 1, 2, .. anti-clockwise (+), the row below clockwise (-). The third row swims along a limb
 for as long as it is held, by the lagged gait or, where decisions are strokes, the straight one; an arrow takes the limb
 that points most its way. Keys that are held together add up.

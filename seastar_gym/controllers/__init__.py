@@ -1,6 +1,8 @@
 """Controllers: scripted gaits, the greedy agent, the planner, and learned policies with their weights.
 
-They need numpy and safetensors. What an agent of one's own must have is in `contract.py`; names are in `registry.py`.
+In come observations, out go actions; they need numpy and safetensors alone, so that a policy runs where nothing is
+compiled. What an agent of one's own must have is in `contract.py`, networks are in `learned.py`, names in
+`registry.py`.
 
     from seastar_gym.controllers import pretrained
 

@@ -1,5 +1,9 @@
 """Environments of robots that swim by decisions. Importing this package registers their ids, and nothing else.
 
+In come actions, out go observations and rewards. An environment (seastar_swim.py, vector.py) holds robots (robots.py),
+which ask a task where its targets are and how a decision is scored: `AlongPath` in waypoints.py, or those of `tasks`.
+The terms of rewards are in options.py.
+
 `SeastarSwim-v0`, the same with continuous commands, the timed environments that decide several times a second, one that
 asks for headings, and the tasks of `seastar_gym.envs.tasks`: every id is a row of `IDS`.
 """

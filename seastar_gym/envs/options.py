@@ -1,8 +1,7 @@
-"""Options that all environments share, checked once, and the scene that they mean.
+"""Options that all environments share, the weights and terms of the reward, and the headings that may be asked for.
 
-The reward: a sum of named terms, and the route along which progress counts.
-
-Headings: which way robots are asked to look at their waypoints, and how far they still have to turn.
+`SwimOptions` are checked once, and know the scene that they mean. `reward_terms` are the named terms of which tasks on
+waypoints make their reward; `Robots` in robots.py adds them up. `HeadingTargets` say which way robots have to look.
 
 The heading of a robot is the direction of the x axis of its body frame (`layout.py`): that of limb 1, by all
 stations. Limbs are told from each other, as by a camera on limb 1: a heading repeats after 360 degrees, not after 72.

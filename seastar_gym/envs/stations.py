@@ -27,7 +27,7 @@ class Stations(NamedTuple):
     n_stations, n_nodes: Numbers of stations and nodes of a limb, without the hub. weights: Row after row, shape
     (n_stations n_nodes,). first, last: Nodes of every station whose weights are not zero, the last excluded, shape
     (n_stations,) each; whole numbers. root_weights: Weights of the root of a limb on a body, shape (n_stations,), or
-    None where limbs begin at the hub. first_root: Row of the first root's x, among those of places (der/star.py).
+    None where limbs begin at the hub. first_root: Row of the first root's x, among those of places (rods/star.py).
     """
 
     n_stations: int

@@ -6,9 +6,8 @@
     found = rollout(batch, load(), seeds=0, record=["time"])
     found.success.mean(), found.last("time")
 
-Registered environments of this package, by id, and episodes that an agent swims in them, one for each seed.
-
-Measures of tasks: a number for every episode, and whether more or less of it is better.
+`swim_episodes` does so in a registered environment, an episode for each seed. The `Measure` of a task is a number of
+every episode, and says whether more or less of it is better.
 """
 
 from __future__ import annotations

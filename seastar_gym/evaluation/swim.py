@@ -1,13 +1,8 @@
-"""One agent swims one episode: `swim`, and what can be measured on it afterwards.
+"""One agent swims one episode, `swim`, or many side by side, `swim_many`, nominal or disturbed.
 
-Many swims side by side, nominal or disturbed.
-
-Paths that command lines ask for, by name or by the file of their waypoints.
-
-Disturbances of the swims of a batch: a current, a weak limb, noise on observations, lost strokes.
-
-A uniform current is a change of frame: the robots swim in still water, towards waypoints that drift the other way, and
-observations and positions are carried back. So every robot of a batch has a current in a direction of its own.
+Disturbances are a current, a weak limb, noise on observations and lost strokes. A uniform current is a change of frame:
+the robots swim in still water, towards waypoints that drift the other way, and observations and positions are carried
+back. So every robot of a batch has a current in a direction of its own.
 """
 
 from __future__ import annotations

@@ -1,16 +1,15 @@
-"""Kernels of time steps on a tape, replayed from what history.py has kept of them.
+"""Kernels whose numbers carry slopes: on a tape, by differences, and through Newton's solutions.
 
-Newton's solution of a stage is read instead of found, and g alone is left of what would be eliminated, see replay.py.
+On a tape, kernels of time steps are replayed from what history.py has kept of them. Newton's solution of a stage is
+read instead of found, and g alone is left of what would be eliminated, see replay.py.
 
-Slopes of what is computed before a swim, and costs nothing, by differences of fourth order.
+What is computed before a swim, and costs nothing, has slopes by differences of fourth order. Coefficients of rods,
+places at rest and rotations by actuators follow from numbers of a scene by short formulas. Four more points of them
+give slopes to some 1e-11: formulas with powers up to the fourth have no error but rounding.
 
-Coefficients of rods, places at rest and rotations by actuators follow from numbers of a scene by short formulas. Four
-more points of them give slopes to some 1e-11: formulas with powers up to the fourth have no error but rounding.
-
-Swims with slopes: `advance_slopes` is `advance` of rods/interval.py on dual lanes, to the same bits.
-
-A stage ends where the gradient g of Phi vanishes to Newton's tolerance. Slopes that were carried through Newton's steps
-lag one step behind. So one more step is taken, with slopes alone, at the positions that Newton's method has found:
+`advance_slopes` is `advance` of rods/interval.py on dual lanes, to the same bits. A stage ends where the gradient g of
+Phi vanishes to Newton's tolerance. Slopes that were carried through Newton's steps lag one step behind. So one more
+step is taken, with slopes alone, at the positions that Newton's method has found:
 
     slope of q  <-  slope of q - H^-1 (slope of g),    H the Hessian of Phi there,
 

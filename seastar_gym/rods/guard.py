@@ -1,4 +1,6 @@
-"""The guard of retried and regularised steps: none creates energy, none turns a hinge through its pole.
+"""The guard of energy, the balance of momentum, and the rigid motion that both keep.
+
+Energy: no retried or regularised step creates any, and none turns a hinge through its pole.
 
 With U at the natural hub angles of the step's end, implicit Euler (13.9) over dq = q_1 - q_0 ends with the energy
 
@@ -15,19 +17,19 @@ Energies are measured in a frame that moves with the velocity c of the fluid at 
 centre of mass. Seen from there, the kinetic energy is that of v - c, a current u does the work h drag (u - c), and a
 dead load F does F (dq - h c). With the balance of momentum, P_1 - P_0 = h (drag + F), any c says the same: another one
 changes the energy's growth by -c (P_1 - P_0) and the work by -c h (drag + F). But only implicit Euler has the drag of
-the step's end throughout the step. With a c fixed in the laboratory, the other schemes would be held to one thing
-there and to another where everything moves uniformly. In still water c is zero, and a uniform current changes nothing.
-It is zero, too, where nodes are held in the laboratory.
+the step's end throughout the step. With a c fixed in the laboratory, the other schemes would be held to one thing there
+and to another where everything moves uniformly. In still water c is zero, and a uniform current changes nothing. It is
+zero, too, where nodes are held in the laboratory.
 
 A step that created energy is refused, or, where little is to be taken away, its velocities about the rigid motion with
 the same momenta are cut down to the energy allowed: momentum and angular momentum, with those of added mass, stay, and
 the cut is of the order of the scheme's own error.
 
 Schemes of higher order take the energy in the middle of a step and promise no such balance. In a guarded step they are
-held to the larger of the energies that the robot standing still has at the step's ends, and what moving the
-natural hub angles, and natural curvature, alone can store. What limbs store that press each other, and may get back,
-counts at the start of all steps, and at the end of implicit Euler's: where others look ahead (forces.py), limbs that
-part get nothing back.
+held to the larger of the energies that the robot standing still has at the step's ends, and what moving the natural hub
+angles, and natural curvature, alone can store. What limbs store that press each other, and may get back, counts at the
+start of all steps, and at the end of implicit Euler's: where others look ahead (forces.py), limbs that part get nothing
+back.
 
 U is that of the stiffness that limbs have at the time, see along.py. So what actuators put in or take out by stiffening
 a bent limb is in these balances as what they do by moving its natural state.
@@ -36,23 +38,22 @@ At phi = pi a hinge would store infinite energy, but a Newton step may jump over
 folded over itself. Such steps are refused, too, while they are not very short: an edge that collapses turns its hinges
 over at no such cost.
 
-Linear momentum, which no internal force changes, whatever the rounding of a linear solution.
-
-Summed over all nodes, internal forces and contact cancel, so a full Newton step balances the momentum exactly, however
-rough its other parts are. Its rounding does not: elimination subtracts stiffnesses EA/l from each other until the
-inertia m/gamma^2 is left, and loses as many digits as EA/l over m/gamma^2, times the edges of a limb squared, has. The
-move of the whole robot is then off by that share of the last Newton step, which is as long as the tolerance lets it be.
+Momentum: no internal force changes the linear one, whatever the rounding of a linear solution. Summed over all nodes,
+internal forces and contact cancel, so a full Newton step balances the momentum exactly, however rough its other parts
+are. Its rounding does not: elimination subtracts stiffnesses EA/l from each other until the inertia m/gamma^2 is left,
+and loses as many digits as EA/l over m/gamma^2, times the edges of a limb squared, has. The move of the whole robot is
+then off by that share of the last Newton step, which is as long as the tolerance lets it be.
 
 So where that can be seen, at any step in vacuum and in a fluid at very long ones, the whole robot takes one Newton step
 of its own after the others: from the residual summed over the nodes, and its slope. In vacuum it is exact.
 
-A body whose centre of mass is not the hub has the momentum b = omega J_S because it turns, too (body/). Stages take
+A body whose centre of mass is not the hub has the momentum b = omega J_S because it turns, too (body.py). Stages take
 its rate as d_theta J*_S - gamma omega*^2 A*_S from their first guess, which is off by the scheme's error. Here the rate
 is B = (b - b_hat)/gamma, of the angle that the stage has found, with b_hat = b_0 + h sum_{j<i} a_ij B_j: b follows the
 tableau as velocities do, and what nodes get is what b loses. The implicit midpoint rule, damped or not, ends with b of
 the angle and velocity that it extrapolates to, so that its B is the difference of b over the whole step.
 
-The rigid motion that has a robot's momentum and angular momentum, and what its velocities are about it.
+Rigid motion: the one that has a robot's momentum and angular momentum; velocities are cut down about it.
 """
 
 from seastar_gym.lanes.compile import kernel

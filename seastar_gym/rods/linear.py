@@ -10,9 +10,9 @@ y = (W_y - l W_x)/d_y) and z = (r_x/d_x, (r_y - l r_x)/d_y) for the substitution
 
 Blocks are tuples: symmetric ones (xx, xy, yy), couplings (xx, xy, yx, yy) row by row.
 
-Solutions of an eliminated star of chains, see linear.py, for its own right-hand side and for another one.
+An eliminated star is solved for its own right-hand side, and for others.
 
-Root nodes and a rigid hub: root nodes couple with the hub's place and orientation, not with each other.
+With a rigid hub, root nodes couple with the hub's place and orientation, not with each other.
 
 The hub's unknowns are its place and its turns (see terms/clamp.py): that of elasticity, Phi, and that of damping, a
 dummy where there is none. A root node couples with a turn by -C grad theta, the hub by the sum of +C grad theta, the

@@ -3,12 +3,11 @@
 Every robot of a lane group has its own state of the search: a robot that has converged, failed or was never active is
 frozen by a mask, and nothing that one robot needs (a regularised matrix, a shorter step) changes another robot's bits.
 
-When Newton's last step may be left out, because quadratic convergence foretells that it would be small enough.
-
-After one of its first steps, of size d, the next is expected to be at most d^2/(quadratic length). That is measured,
-not proved: by `python -m studies.speed.foresight --discretisation chapter` at commit 0e818f3, in 1000 strokes of every
-kind by eight robots, stiff and soft, with edges of 3 to 50 radii, at steps of 0.1 to 20 ms, in water and in vacuum. Had
-every step been just small enough, the one left out would have been
+Newton's last step may be left out where quadratic convergence foretells that it would be small enough. After one of its
+first steps, of size d, the next is expected to be at most d^2/(quadratic length). That is measured, not proved: by
+`studies.speed.foresight` of commit 0e818f3, in 1000 strokes of every kind by eight robots, stiff and soft, with edges
+of 3 to 50 radii, at steps of 0.1 to 20 ms, in water and in vacuum. Had every step been just small enough, the one left
+out would have been
 
     99 %     99.9 %    worst
     0.7      1.6       18       times as large as foreseen
@@ -29,7 +28,8 @@ energy; 0.02 % did up to PREDICTABLE_STRAIN, 0.1 % up to ten times and 0.5 % up 
 curvature of drag, about l rho_f C_d/(pi r rho_m), is ten times CURVATURE, as with edges of a thousand radii, no step is
 left out: one that was had been 300 times the tolerance.
 
-Scales of a robot that decide what Newton's method, the guard and the balance of momentum look at.
+`coefficients` has the scales of a robot that decide what Newton's method, the guard and the balance of momentum look
+at.
 """
 
 from collections.abc import Sequence

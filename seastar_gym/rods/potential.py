@@ -24,7 +24,7 @@ regularised: made again from the convex parts alone (mask `convex`): the Gauss-N
 of bending, no compression in T/|e| n n^T, no mu Hess theta. That matrix is positive definite by construction, and the
 full one, with its quadratic convergence, is used wherever its pivots allow it.
 
-Elastic and kinetic energy of a lane group, and the moments that resist its actuators.
+At the end are the elastic and kinetic energy of a lane group, and the moments that resist its actuators.
 """
 
 import numpy as np

@@ -10,11 +10,8 @@ Where the hub is a body with a size, root edges start at its rim. Behind the nod
 angle and, limb by limb, the places of the roots, which follow from hub and angle, see body.py. In scenes with
 contact, the corners of its outline follow, which move as the roots do and have no numbers of their own.
 
-Edges of a planar rod and the angles between them.
-
-Limbs cut into edges and nodes: what the coefficients of all terms are made from.
-
-How a node moves in an implicit stage.
+Below are the geometry of edges and hinges, the mesh that coefficients of all terms are made from, and how a node moves
+in an implicit stage.
 """
 
 from typing import Any, NamedTuple

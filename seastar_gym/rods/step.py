@@ -1,4 +1,8 @@
-"""Time stepping schemes: diagonally implicit Runge-Kutta tableaux whose stages are all solved by one kernel.
+"""One time step: schemes, the stages of a step, its error, the guard's verdict, and what is counted of it.
+
+`try_step` makes a step, or says for which robots it failed; `solve_stages` solves its stages one after the other, and
+`end_guarded_step` refuses one that ends with too much energy. Schemes are diagonally implicit Runge-Kutta tableaux
+whose stages are all solved by one kernel.
 
 A stage i of a step h from (q_0, v_0) is implicit Euler with gamma = a_ii h, from
 q_hat = q_0 + h sum_{j<i} a_ij V_j and v_hat = v_0 + h sum_{j<i} a_ij A_j.
@@ -12,12 +16,6 @@ then keeps, in every step, the share |R| of its amplitude,
 Those that a step resolves, x << 1, lose d x^2/2 per step, which is d x/2 per radian and below the midpoint rule's own
 error of phase, x^2/12 per radian, from x = 6 d on. Those that it does not, x >> 1, lose 2 d per step. The method is
 algebraically stable for d >= 0: two solutions of a dissipative problem never move apart.
-
-The implicit stages of a time step: their beginning, their result, and the error of a step.
-
-One time step: its stages, its error, and the guard's verdict on the energy that it ends with.
-
-The report of a stroke: counts and extremes of every robot.
 """
 
 from typing import Any, NamedTuple

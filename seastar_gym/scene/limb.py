@@ -1,8 +1,6 @@
-"""`Limb`: a limb that differs from the robot's others, with profiles along its length.
+"""Limbs: `Limb` differs from the robot's others, `AlongLimb` and `Stiffening` say how actuators act along it.
 
-`AlongLimb` and `Stiffening`: actuators that act on limbs along their length, on natural curvature and stiffness.
-
-Geometry of a robot at rest: node positions, natural angles of hinges, and limbs that may touch.
+With them is the geometry of limbs at rest: places of nodes, natural angles of hinges, and limbs that may touch.
 """
 
 from __future__ import annotations

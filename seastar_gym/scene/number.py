@@ -2,12 +2,10 @@
 
     density: Annotated[Numbers, not_negative("kg/m^3")] = 1000.0
 
-`check_numbers` refuses what was not declared. Numbers of the type `Numbers` may differ from robot to robot, see
-number.py; those of the type `Profile` may differ along a limb. Results of sweeps have the units.
+`check_numbers` refuses what was not declared. Numbers of the type `Numbers` may differ from robot to robot;
+those of the type `Profile` may differ along a limb. Results of sweeps have the units.
 
-Numbers of a scene that may differ from robot to robot in a batch: those that a part declares as `Numbers`.
-
-Each is one number for all robots, or an array of shape (n_robots,). Arrays are kept as tuples (`PerRobot`), so that
+Such a number is one for all robots, or an array of shape (n_robots,). Arrays are kept as tuples (`PerRobot`), so that
 parts are frozen, hashable and equal by value.
 """
 

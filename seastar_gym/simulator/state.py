@@ -1,8 +1,7 @@
-"""`State`: positions, velocities, time and actuators of all robots of a simulator.
+"""State of all robots of a simulator: `State` as users get and set it, and the `Clock` that counts time.
 
-`Clock`: the simulated time of every robot.
-
-Heading of the body frame, by the rotation of the rest shape that fits the nodes best, and where limbs begin.
+With them are the heading of the body frame, by the rotation of the rest shape that fits the nodes best, and where limbs
+begin.
 """
 
 from __future__ import annotations

@@ -1,24 +1,22 @@
-"""`Watch`: what is told of robots beside their state, asked around every interval.
+"""What is told of robots beside their state: a `Watch` is asked around every interval.
 
-`EnergyGrowth`: whether time stepping gathers energy, told while robots swim.
+`EnergyGrowth` tells whether time stepping gathers energy. On some meshes the implicit midpoint rule resonates with some
+steps: the robot gathers energy for a hundred strokes, and only then swims differently. The fidelities were tried
+(accuracy/measure.py), and a certificate tells it of its settings. Whoever chooses other numerics is told here: the
+kinetic energy relative to the water, over the largest in the first strokes. Energies go with the square of commands, so
+each counts over that of the largest command so far.
 
-On some meshes the implicit midpoint rule resonates with some steps: the robot gathers energy for a hundred strokes, and
-only then swims differently. The fidelities were tried (accuracy/measure.py), and a certificate tells it of its
-settings. Whoever chooses other numerics is told here: the kinetic energy relative to the water, over the largest in the
-first strokes. Energies go with the square of commands, so each counts over that of the largest command so far.
-
-`ErrorBars`: how far the hub may be from where it is with infinitely many nodes and infinitely short steps.
-
-A twin of the simulator swims along: the same scene with edges and time steps half as long, the same commands and
-resets. The two are never brought together, so their distance has the errors of all intervals since the reset, of
-space and of time. The estimate is
+`ErrorBars` tell how far the hub may be from where it is with infinitely many nodes and infinitely short steps. A twin
+of the simulator swims along: the same scene with edges and time steps half as long, the same commands and resets. The
+two are never brought together, so their distance has the errors of all intervals since the reset, of space and of time.
+The estimate is
 
     factor * (largest distance of the two hubs at ends of intervals since the reset + newton_tolerance * limb_length).
 
 With errors of second order, the error is 4/3 of the distance. Undamped limbs ring longer than steps resolve, and errors
 of space and time may cancel in one robot and not in the other, so the factors are larger: those that cover the true
-error in about 95 % of strokes of the robot that needs the largest, as `python -m studies.accuracy.error_bars` at commit
-055100c4 measured (docs/numerics.md).
+error in about 95 % of strokes of the robot that needs the largest, as `studies.accuracy.error_bars` of commit 055100c4
+measured (docs/numerics.md).
 """
 
 from __future__ import annotations

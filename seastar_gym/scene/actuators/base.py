@@ -7,10 +7,10 @@ the limb by delta_psi [rad], positive anti-clockwise. A stroke is the interval o
 actuator that says nothing: no memory, energy that is not known, and wires that can always be heated. A class of one's
 own may say more, derived from that base or not.
 
-Where numbers of an actuator differ from robot to robot (see number.py), curves have one more axis, shape
+Where numbers of an actuator differ from robot to robot (see scene/number.py), curves have one more axis, shape
 (*t.shape, n_robots), and commands the shape (n_robots, n_limbs). Durations are equal for all robots of a batch.
 
-Heat that actuators are given, how long and at what electric power, and pairs of wires that are heated.
+`WirePair` has what pairs of wires share that are heated: for how long, and at what electric power.
 """
 
 from __future__ import annotations
@@ -227,7 +227,7 @@ class WirePair(ActuatorBase):
 
     @property
     def mirror(self) -> Mirror:
-        """What a mirror does to the state: the wires change places, see `actuator.mirrored`."""
+        """What a mirror does to the state: the wires change places, see `mirrored`."""
         return tuple((k ^ 1, 1) for k in range(self.rest.shape[-1]))
 
     def delta_psi(self, t: ArrayLike) -> Floats:

@@ -284,7 +284,7 @@ class Limited(ActuatorBase):
 
     @property
     def mirror(self) -> Mirror:
-        """What a mirror does to the state: the rotation changes its sign, see `actuator.mirrored`."""
+        """What a mirror does to the state: the rotation changes its sign, see `base.mirrored`."""
         return ((0, -1),)
 
     @property

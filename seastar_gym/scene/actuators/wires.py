@@ -1,11 +1,10 @@
-"""`SmaWires`: two shape memory alloy wires per limb with the linear heating and cooling of Fig. 13.5b.
+"""Wires of shape memory alloy, two for every limb: `SmaWires` with the linear heating and cooling of Fig. 13.5b, and
+`ThermalSma` with temperatures, by Joule heating, cooling in water and hysteresis.
 
-`ThermalSma`: a shape memory alloy actuator with Joule heating, cooling in water and hysteresis.
-
-Every limb has two wires, one for each direction of rotation. A command heats the wire of its sign for a fraction of the
-heating time (pulse width), from now on, however warm it is; the other wire goes on with what is left of its pulse. A
-wire is thin and has one temperature T. With its heat capacity C, the electric power P and the heat transfer to the
-water h A per kelvin,
+`ThermalSma`: every limb has two wires, one for each direction of rotation. A command heats the wire of its sign for a
+fraction of the heating time (pulse width), from now on, however warm it is; the other wire goes on with what is left of
+its pulse. A wire is thin and has one temperature T. With its heat capacity C, the electric power P and the heat
+transfer to the water h A per kelvin,
 
     C dT/dt = P - h A (T - T_water)    =>    T = T_inf + (T_0 - T_inf) exp(-t/tau),    tau = C/(h A),
 
