@@ -168,6 +168,8 @@ def warn_uncertified(
 ) -> None:
     """Warn where a certificate or a fidelity is given, but no errors of the scene were measured.
 
+    Called two calls below where an environment is made, which the warning names.
+
     fidelity: None asks for none. decision_period: Time between decisions [s]. None means strokes.
     """
     known = _certificate(certificate, decision_period)
@@ -186,4 +188,4 @@ def warn_uncertified(
             f'Errors of this scene were not measured: fidelity="{fidelity}" promises nothing for it, and errors in '
             f"info are NaN: {remedy}."
         )
-    warnings.warn(told, stacklevel=3)
+    warnings.warn(told, stacklevel=4)

@@ -227,7 +227,7 @@ class Pressed:
 def test_something_shows_before_the_simulator_is_loaded():
     """Numba and what it compiles take a second at best; pygame does not."""
     script = (
-        "import sys\nfrom seastar_gym.cli import play, screen\n"
+        "import sys\nfrom seastar_gym.cli import play, swim as screen\n"
         "def show(picture): print('numba' in sys.modules, picture.std() > 1.0); return sys.exit()\n"
         "from contextlib import contextmanager\n"
         "screen._window = contextmanager(lambda fps: iter([show]))\n"

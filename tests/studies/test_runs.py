@@ -150,6 +150,7 @@ def test_mutants_are_killed_by_the_core_by_all_or_by_nothing_and_the_checkout_st
         subprocess.run(["git", *words], cwd=tmp_path, check=True)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(mutants, "PACKAGE", "toy")
+    monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)  # options of plugins that are not loaded
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")  # a start of pytest takes half as long
     for _ in range(2):  # what has a line is not run again
         assert main(["mutants", "--count", "9", "--kernels", "0", "--out", "runs"]) == 0
