@@ -19,7 +19,7 @@ from seastar_gym.envs.options import wrapped
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.rendering import limb_nodes
 from seastar_gym.envs.stations import heading_of
-from seastar_gym.evaluation.films import RecordingEnv
+from seastar_gym.evaluation.playback import RecordingEnv
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene

@@ -26,11 +26,11 @@ from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.registry import HELP, learned_policy, load_agent
 from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import make_scene, scene_at
-from seastar_gym.envs.paths import WAYPOINT_RADIUS
+from seastar_gym.envs.paths import PATH_HELP, WAYPOINT_RADIUS, load_path
 from seastar_gym.envs.sight import FOR_CAMERA, Sight, told
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.rollout import require_seen
-from seastar_gym.evaluation.swim import PATH_HELP, Swim, load_path, swim
+from seastar_gym.evaluation.swim import Swim, swim
 from seastar_gym.files import require_extra, write_atomically
 from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.lines import LinePlant, open_serial

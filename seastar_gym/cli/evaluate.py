@@ -26,13 +26,13 @@ from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.controllers.registry import DEFAULTS, HELP, fitting_agents, load_agents
 from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import scene_at
-from seastar_gym.envs.paths import WAYPOINT_RADIUS
+from seastar_gym.envs.paths import PATH_HELP, WAYPOINT_RADIUS, load_path
 from seastar_gym.evaluation import scores
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.results import Row, write_csv
 from seastar_gym.evaluation.rollout import require_task, task_ids
 from seastar_gym.evaluation.scores import Scores, measured, policies_of
-from seastar_gym.evaluation.swim import PATH_HELP, TIME_LIMIT, load_path
+from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.evaluation.trials import SETS, as_text, trials
 from seastar_gym.files import require_extra
 from seastar_gym.scene import Scene

@@ -4,112 +4,30 @@ The window needs a display; a film, --film swim.mp4 or swim.gif, does not. With 
 environment, as that has been made; otherwise it swims along --path. Without options, the learned policy decides every
 0.2 s which limbs to heat, as in the picture of README.md. A policy of a file swims the robot that it was trained on, as
 often as it decides, where options name none.
-
-Where pictures go: into a window, or into the file of a film.
 """
 
 import argparse
-import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import gymnasium as gym
 
+from seastar_gym.cli.screen import Show, outcome, rate, screen, show_all
 from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.registry import HELP, is_file, learned_policy, load_agent
-from seastar_gym.envs.canvas import INK, WATER, Canvas, Window, import_pygame
 from seastar_gym.envs.commands import decisions_in
+from seastar_gym.envs.paths import PATH_HELP, load_path
 from seastar_gym.envs.sight import Camera, Sight, read_camera
-from seastar_gym.evaluation.films import Picture, film, film_format
 from seastar_gym.evaluation.rollout import make_task, require_seen, rollout
-from seastar_gym.evaluation.swim import PATH_HELP, TIME_LIMIT, load_path
+from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene
 
 if TYPE_CHECKING:
     import gymnasium as gym
-
-SIZE = (960, 720)
-"""Width and height of a window [px]."""
-FPS, GIF_FPS = 30, 20
-"""Pictures per second of a window or an MP4, and of a GIF."""
-
-Show = Callable[[Picture], bool]
-"""Function that shows a picture; False once nobody looks any more."""
-
-
-def rate(file: Path | None, decision_period: float, speed: float) -> tuple[int, float]:
-    """Number of pictures of a decision, and pictures per second, at a speed in multiples of real time."""
-    wanted = FPS if file is None or film_format(file) == ".mp4" else GIF_FPS
-    number = max(1, round(wanted * decision_period / speed))
-    return number, number * speed / decision_period
-
-
-@contextmanager
-def screen(file: Path | None, fps: float) -> Iterator[Show]:
-    """Context that gives a function to show pictures with: in a film, or in a window if there is no file.
-
-    ValueError, with what to do instead, where no window can be opened.
-    """
-    if file is None:
-        with _window(fps) as show:
-            yield show
-        return
-    with film(file, fps) as add:
-
-        def keep(picture: Picture) -> bool:
-            add(picture)
-            return True
-
-        yield keep
-
-
-@contextmanager
-def _window(fps: float) -> Iterator[Show]:
-    pygame, window = import_pygame(), Window()
-    with warnings.catch_warnings(action="ignore"):
-        window.is_wanted(SIZE)
-    if not window.is_seen:
-        raise ValueError("No window can be opened here: write a film, --film swim.mp4 or swim.gif.")
-
-    def show(picture: Picture) -> bool:
-        if not window.is_wanted(SIZE):
-            return False
-        height, width, _ = picture.shape
-        window.show(pygame.image.frombuffer(picture.tobytes(), (width, height), "RGB"), fps)
-        return True
-
-    yield show
-    window.close()
-
-
-def wait(show: Show) -> None:
-    """Show that something begins: machine code of the simulator takes a while to load, and longer to be made."""
-    canvas = Canvas(SIZE, 24)
-    canvas.begin(WATER)
-    for line, text in enumerate(("Starting ...", "The first start on a machine compiles the simulator.")):
-        canvas.write(text, (SIZE[0] / 2, SIZE[1] / 2 + 40 * line), INK, (0.5, 0.5))
-    canvas.finish()
-    show(canvas.pixels())
-
-
-def show_all(env: "gym.Env[Any, Any]", show: Show) -> bool:
-    """Show the pictures since the last call; False once nobody looks any more."""
-    pictures: Any = env.render()
-    return all(show(picture) for picture in pictures or ())
-
-
-def outcome(env: Any, info: dict[str, Any]) -> str:
-    """How an episode went, in words: waypoints, or whether a task without them was done."""
-    if "waypoint_index" in info:
-        how = f"{info['waypoint_index']} of {len(env.waypoints)} waypoints"
-    else:
-        how = "done" if info["is_success"] else "not done"
-    return f"{how} in {info['time']:.1f} s"
 
 
 LEARNED_PERIOD = 0.2

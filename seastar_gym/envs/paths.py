@@ -17,12 +17,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene.checks import require_callable, require_few, require_kind, require_unmasked, shown
+from seastar_gym.scene.csv_rows import read_numbers
 
 Floats: TypeAlias = NDArray[np.float64]
 Point: TypeAlias = Sequence[float]
@@ -310,3 +312,20 @@ def _regular_polygon(n_sides: int, side: float) -> Waypoints:
 def _walk(legs: NDArray[np.float64], headings: NDArray[np.float64]) -> NDArray[np.float64]:
     """Corners [m], shape (n, 2), of a walk from the origin with legs [m] along headings [rad], shape (n,) each."""
     return np.cumsum(legs[:, None] * np.column_stack([np.cos(headings), np.sin(headings)]), axis=0)
+
+
+# Paths that command lines ask for
+
+PATH_HELP = f"Name of a path ({', '.join(PATHS)}), or a text file with x and y [m] of one waypoint per line."
+
+
+def load_path(name: str) -> Any:
+    """Name of a path, or waypoints [m], shape (n, 2), of a text file."""
+    if name in PATHS or not Path(name).is_file():
+        make_path(name, np.random.default_rng(0))
+        return name
+    waypoints = read_numbers(name, "x and y [m] of a waypoint", 2, MOST_WAYPOINTS)
+    try:
+        return make_path(waypoints, np.random.default_rng(0))
+    except ValueError as bad:
+        raise ValueError(f"{name}: {bad}") from bad

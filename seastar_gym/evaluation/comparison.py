@@ -14,8 +14,9 @@ from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.seastar_swim import OneRobotEnv, SeastarSwimEnv
-from seastar_gym.evaluation.films import Playback, RecordingEnv, film
+from seastar_gym.evaluation.films import film
 from seastar_gym.evaluation.pictures import FPS, FRAMES_PER_STROKE, draw_traces
+from seastar_gym.evaluation.playback import Playback, RecordingEnv
 from seastar_gym.evaluation.results import as_text, results, time_series, write_csv
 from seastar_gym.evaluation.rollout import MOST_DECISIONS
 from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, swim

@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from seastar_gym.controllers.greedy import turned
 from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.layout import VELOCITY_SCALE
 from seastar_gym.envs.options import SwimOptions
-from seastar_gym.envs.paths import MOST_WAYPOINTS, PATHS, WAYPOINT_RADIUS, cross_track_error, make_path, path_length
+from seastar_gym.envs.paths import WAYPOINT_RADIUS, cross_track_error, path_length
 from seastar_gym.envs.robots import Flags, Outcome, Robots
 from seastar_gym.envs.seastar_swim import OneRobotEnv
 from seastar_gym.envs.sight import Drawn, Sight
@@ -33,7 +32,6 @@ from seastar_gym.envs.waypoints import Path as SwimPath
 from seastar_gym.evaluation.rollout import MOST_DECISIONS, Episodes, Info, rollout
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_callable, require_count, require_kind, require_number
-from seastar_gym.scene.csv_rows import read_numbers
 from seastar_gym.scene.number import column
 from seastar_gym.simulator import SolverStatus
 
@@ -198,21 +196,6 @@ def _swim_of(agent: str, found: Episodes, robot: int) -> Swim:
         energy=of["energy"][1:],
         solver_message=None if status is SolverStatus.CONVERGED else status.sentence,
     )
-
-
-PATH_HELP = f"Name of a path ({', '.join(PATHS)}), or a text file with x and y [m] of one waypoint per line."
-
-
-def load_path(name: str) -> Any:
-    """Name of a path, or waypoints [m], shape (n, 2), of a text file."""
-    if name in PATHS or not Path(name).is_file():
-        make_path(name, np.random.default_rng(0))
-        return name
-    waypoints = read_numbers(name, "x and y [m] of a waypoint", 2, MOST_WAYPOINTS)
-    try:
-        return make_path(waypoints, np.random.default_rng(0))
-    except ValueError as bad:
-        raise ValueError(f"{name}: {bad}") from bad
 
 
 CURRENT_DIRECTIONS = 8

@@ -26,7 +26,8 @@ from typing import Any
 from tqdm import tqdm
 
 from seastar_gym.command import DEFAULT, INTERRUPTED, answered
-from seastar_gym.evaluation.swim import PATH_HELP, TIME_LIMIT, load_path
+from seastar_gym.envs.paths import PATH_HELP, load_path
+from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.files import require_extra, within, write_json
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, shown

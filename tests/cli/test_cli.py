@@ -11,11 +11,9 @@ import pytest
 from PIL import Image
 
 from seastar_gym import Scene, Seastar, Sight
-from seastar_gym.cli import compile
-from seastar_gym.cli import play as played
-from seastar_gym.cli import swim as screen
+from seastar_gym.cli import compile, played, screen
+from seastar_gym.cli.keys import Steering, known_keys, typed
 from seastar_gym.cli.main import COMMANDS, main
-from seastar_gym.cli.play import Steering, known_keys, typed
 from seastar_gym.controllers.open_loop import GAITS
 from seastar_gym.controllers.registry import AGENTS
 from seastar_gym.envs.paths import PATHS
@@ -227,7 +225,7 @@ class Pressed:
 def test_something_shows_before_the_simulator_is_loaded():
     """Numba and what it compiles take a second at best; pygame does not."""
     script = (
-        "import sys\nfrom seastar_gym.cli import play, swim as screen\n"
+        "import sys\nfrom seastar_gym.cli import play, screen\n"
         "def show(picture): print('numba' in sys.modules, picture.std() > 1.0); return sys.exit()\n"
         "from contextlib import contextmanager\n"
         "screen._window = contextmanager(lambda fps: iter([show]))\n"

@@ -16,17 +16,8 @@ from seastar_gym.envs.frame import Frame
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation import pictures
 from seastar_gym.evaluation.comparison import evaluate
-from seastar_gym.evaluation.films import (
-    CLOSING_SECONDS,
-    UNIT,
-    Playback,
-    RecordingEnv,
-    film,
-    film_format,
-    frequent_colours,
-    shrunk,
-    write_gif,
-)
+from seastar_gym.evaluation.films import CLOSING_SECONDS, film, film_format, frequent_colours, shrunk, write_gif
+from seastar_gym.evaluation.playback import UNIT, Playback, RecordingEnv
 from seastar_gym.evaluation.report import charts, page
 from seastar_gym.evaluation.report.charts import Curve
 from seastar_gym.evaluation.report.page import Remarks, ResultsTable

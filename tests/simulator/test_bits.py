@@ -286,7 +286,9 @@ FEW["held, along limbs"] = Row(
 )
 
 
-@pytest.mark.parametrize("name", FEW)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name != "default strokes")) for name in FEW]
+)
 def test_few_robots_on_narrow_lanes_have_their_bits(monkeypatch, name):
     whole = swim(FEW[name])
     monkeypatch.setattr(batch, "FEW", N_LANES // 2)

@@ -89,6 +89,7 @@ def test_random_and_repeated_commands_in_time_are_bounded_apart():
     assert found.errors == {"random": 0.05, "repeated": 0.8} and found.typical == {"random": 0.03, "repeated": 0.6}
 
 
+@pytest.mark.slow
 def test_a_study_stores_every_preset_and_nothing_whose_limit_is_in_doubt(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(study, "Plan", lambda: TINY)
     (tmp_path / "shipped").mkdir()

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seastar_gym.evaluation.swim import load_path
+from seastar_gym.envs.paths import load_path
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
 from studies import swim_page

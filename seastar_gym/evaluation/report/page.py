@@ -16,8 +16,8 @@ from urllib.parse import quote
 import numpy as np
 import plotly.offline
 
-from seastar_gym.evaluation.films import UNIT, Playback
 from seastar_gym.evaluation.pictures import flow_in
+from seastar_gym.evaluation.playback import UNIT, Playback
 from seastar_gym.evaluation.report.charts import Curve, curves_figure, paths_figure, to_html
 from seastar_gym.evaluation.results import COLUMNS, Row, in_words, number
 from seastar_gym.evaluation.swim import Swim

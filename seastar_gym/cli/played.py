@@ -1,0 +1,80 @@
+"""The environment of `seastar play`: its pictures say what the keys do, and number the limbs."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.cli.keys import ALONG, MINUS, PLUS
+from seastar_gym.envs.canvas import INK, WATER, Colour, import_pygame
+from seastar_gym.envs.rendering import FAINT_INK, limb_nodes
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+
+TEXT, LINE = 17, 22
+"""Heights of letters and of lines [px]."""
+COLUMN = 132
+"""Width of the column of keys [px]."""
+CORNER = (16, 44)
+"""Place of the help in the picture [px]."""
+
+
+class PlayedEnv(SeastarSwimEnv):
+    """`SeastarSwimEnv` whose pictures have the numbers of the limbs and, while `help` is True, the keys."""
+
+    def __init__(self, **arguments: Any):
+        self.help = True
+        super().__init__(render_mode="rgb_array_list", **arguments)
+
+    def limb_directions(self) -> NDArray[np.float64]:
+        """Directions of the limbs in the world, from the hub to the tip [rad], shape (n_limbs,)."""
+        positions = self.simulator.positions[0]
+        x, y = (positions[self._limbs[:, -1]] - positions[0]).T
+        return np.arctan2(y, x)
+
+    @property
+    def _limbs(self) -> NDArray[np.int_]:
+        robot = self.scene.robot
+        return limb_nodes(robot.n_limbs, robot.nodes_per_limb)
+
+    def draw_frame(self) -> None:
+        """Draw a picture, and the help."""
+        super().draw_frame()
+        self.last_picture = self._frames[-1] = self._annotated(self._frames[-1])
+
+    def _annotated(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        pygame = import_pygame()
+        pygame.font.init()
+        font = pygame.font.Font(pygame.font.get_default_font(), TEXT)
+        height, width, _ = picture.shape
+        surface = pygame.image.frombuffer(picture.tobytes(), (width, height), "RGB").copy()
+
+        def write(text: str, x: float, y: float, colour: Colour = INK) -> None:
+            surface.blit(font.render(text, True, colour, WATER), (round(x), round(y)))
+
+        for limb, (x, y) in self._numbers():
+            write(str(limb + 1), x - 5, y - TEXT / 2, FAINT_INK)
+        for number, (keys, meaning) in enumerate(keys_help(self.scene.robot.n_limbs) if self.help else ()):
+            write(keys, CORNER[0], CORNER[1] + LINE * number)
+            write(meaning, CORNER[0] + COLUMN, CORNER[1] + LINE * number, FAINT_INK)
+        return np.frombuffer(pygame.image.tobytes(surface, "RGB"), np.uint8).reshape(picture.shape)
+
+    def _numbers(self) -> list[tuple[int, NDArray[np.float64]]]:
+        """Limbs that are not heated, whose names the picture lacks, and the places of their numbers [px]."""
+        positions, camera = self.simulator.positions[0], self._batch.pictures.renderer_of(0).camera
+        tips, angles = camera.to_pixels(positions[self._limbs[:, -1]]), self.limb_directions()
+        outward = 18.0 * np.stack([np.cos(angles), -np.sin(angles)], axis=1)
+        return [
+            (limb, tips[limb] + outward[limb]) for limb in np.flatnonzero(self._robots.last_commands[0] == 0.0).tolist()
+        ]
+
+
+def keys_help(n_limbs: int) -> list[tuple[str, str]]:
+    """Keys and what they do, in lines."""
+    spaced = [" ".join(row[:n_limbs].upper()) for row in (PLUS, MINUS, ALONG)]
+    return [
+        (spaced[0], f"limbs 1 to {n_limbs} turn +, anti-clockwise"),
+        (spaced[1], f"limbs 1 to {n_limbs} turn \u2212, clockwise"),
+        (spaced[2], f"swim along limb 1 to {n_limbs}"),
+        ("arrows", "swim that way"),
+        ("Z  F1  Esc", "begin anew, hide this, end"),
+    ]
