@@ -69,7 +69,7 @@ class Nearest(OnRoute):
 
 
 class Clear(OnRoute):
-    """Likewise, and takes no action that ends near a disc that it sees."""
+    """Takes the action that ends nearest to the target, and none that ends near a disc that it sees."""
 
     def cost(self, observations: Floats32, target: Floats, after: Floats) -> Floats:
         discs = self.scene.robot.limb_length * self.own(observations).reshape(len(observations), 1, -1, 3)

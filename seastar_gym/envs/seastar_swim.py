@@ -20,8 +20,7 @@ from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.robots import Robots, Split, Task
 from seastar_gym.envs.sight import Drawn, Sight
-from seastar_gym.envs.tasks import chosen_task
-from seastar_gym.envs.vector import FRAMES_PER_SECOND, ManyRobotsEnv, warn_of_errors
+from seastar_gym.envs.vector import FRAMES_PER_SECOND, ManyRobotsEnv, swimmers
 from seastar_gym.envs.waypoints import Path
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, require_seed
@@ -399,18 +398,14 @@ class SeastarSwimEnv(OneRobotEnv):
         render_mode: RenderMode | None = None,
         frames_per_stroke: int | None = None,
     ):
-        robots = Robots(
-            chosen_task(
-                task, path=path, reward=reward, waypoint_radius=waypoint_radius, random_heading=random_heading,
-                headings=headings,
-            ),
+        robots = swimmers(
+            1, 1, split, task,
             SwimOptions(
                 actions, fidelity, scene, randomization, certificate, error_bars, decision_period,  # type: ignore[arg-type]
                 observe_actuators, device, sight, action_delay,  # type: ignore[arg-type]  # plain data, too
             ),
-            1, 1, split=split,
+            path=path, reward=reward, waypoint_radius=waypoint_radius, random_heading=random_heading, headings=headings,
         )  # fmt: skip
-        warn_of_errors(robots)
         super().__init__(robots, render_mode, frames_per_stroke)
 
     _arguments = arguments_of(__init__)

@@ -448,27 +448,30 @@ class SeastarSwimVectorEnv(ManyRobotsEnv):
             require_flag("disable_env_checker", disable_env_checker)
         require_flag("on_device", on_device)
         self.threads, self.disable_env_checker = threads, disable_env_checker
-        robots = Robots(
-            chosen_task(
-                task, path=path, reward=reward, waypoint_radius=waypoint_radius, random_heading=random_heading,
-                headings=headings,
-            ),
+        robots = swimmers(
+            num_envs, threads, split, task,
             SwimOptions(
                 actions, fidelity, scene, randomization, certificate, error_bars, decision_period,  # type: ignore[arg-type]
                 observe_actuators, device, sight, action_delay,  # type: ignore[arg-type]  # plain data, too
             ),
-            num_envs, threads, split=split,
+            path=path, reward=reward, waypoint_radius=waypoint_radius, random_heading=random_heading, headings=headings,
         )  # fmt: skip
-        warn_of_errors(robots)
         super().__init__(robots, max_episode_steps, autoreset_mode, render_mode, frames_per_stroke, bool(on_device))
 
     _arguments = arguments_of(__init__)
 
 
-def warn_of_errors(robots: Robots) -> None:
-    """Warn of scenes whose errors nobody has measured, if the task tells errors."""
+def swimmers(
+    n_robots: int, threads: int | None, split: Split, task: Any, options: SwimOptions, **waypoints: Any
+) -> Robots:
+    """Robots of an environment, with a warning if the task tells errors that nobody has measured of the scene.
+
+    waypoints: Arguments of an environment whose task is a path.
+    """
+    robots = Robots(chosen_task(task, **waypoints), options, n_robots, threads, split=split)
     if robots.task.tells_errors:
         warn_uncertified(robots.scene, robots.options.fidelity_of_scene, robots.certificate, robots.timed)
+    return robots
 
 
 def frames_of_a_decision(robots: Robots, asked: int | None) -> int:

@@ -288,7 +288,7 @@ class EntryPoint(CPUDispatcher):
     """A function that Python calls, each kind of which one process compiles while others wait for it."""
 
     def at(self, form: Form):
-        """The same function, which borrows arrays as rows of a form."""
+        """This entry point as it is compiled for arrays that are rows of a form."""
         return self if form == PLAIN else _at(self, form)
 
     def compile(self, sig):

@@ -223,11 +223,6 @@ class Seastar:
             return list(itertools.combinations(range(self.n_limbs), 2))
         return limbs_that_may_touch([shape.gap for shape in shapes], alike)
 
-    @property
-    def is_symmetric(self) -> bool:
-        """Whether rotation by one limb and reflection at limb 1 leave the robot unchanged; in a batch, every robot."""
-        return self.point_group().is_whole
-
     def point_group(self, directed: bool = False) -> PointGroup:
         """Turns and mirrors that leave the robot unchanged; in a batch, every robot.
 
