@@ -6,9 +6,9 @@ against the continuum, that of time is that of the setting against short steps w
 can be promised, because where they cancel it is by luck. An error is the hub's largest distance from the other path, at
 ends of strokes, as a fraction of that path's length. `--store` writes the tables of `seastar_gym.accuracy.chapters`.
 
-With 0.5, 0.2 and 0.1 s between decisions, robots have `SmaWires` and swim ten seconds, half of them by random commands,
-half by a random second that is repeated; their paths are seen at whole seconds. `--fresh` swims sequences that no table
-used, and counts those whose error exceeds what the table promises of a preset.
+With 0.1 to 0.5 s between decisions, robots have `SmaWires` and swim ten seconds by commands of the classes in TIMED,
+with the damping of soft silicone and without any. `--fresh` swims sequences and decision periods that no table used,
+and tells the largest error over what the table promises of a preset.
 """
 
 import itertools
@@ -16,16 +16,17 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
+import gymnasium as gym
 import numpy as np
 
 from seastar_gym.accuracy import Certificate, Setting, chapters_certificate, timed_certificate
 from seastar_gym.accuracy import chapters as chapter
 from seastar_gym.accuracy import measure as measuring
-from seastar_gym.accuracy.certificate import CLASSES_VERSION, at, physics
+from seastar_gym.accuracy.certificate import CLASSES_VERSION, REPEATED, at, physics
 from seastar_gym.accuracy.command import progress_bar
 from seastar_gym.accuracy.measure import (
     CLASSES,
@@ -38,11 +39,15 @@ from seastar_gym.accuracy.measure import (
     path_lengths,
     rounded_up,
     swim_all,
+    whole_seconds,
 )
+from seastar_gym.controllers.contract import actions_of
+from seastar_gym.controllers.registry import load_agent
+from seastar_gym.envs.commands import to_commands
 from seastar_gym.gaits import PAIRS, STRAIGHT, pentagon_gait
-from seastar_gym.scene import Numerics, Scene, SmaWires
+from seastar_gym.scene import Numerics, Scene, Seastar, SmaWires
 from seastar_gym.scene.numerics import DAMPING, PRESETS, Fidelity, Resolution, SchemeName
-from seastar_gym.scene.robot import Discretisation
+from seastar_gym.scene.robot import SILICONE, Discretisation
 from seastar_gym.simulator import Simulator
 from seastar_gym.version import __version__
 from studies.frame import Floats, Results, Study, rounded
@@ -178,7 +183,8 @@ class Plan:
     shortest: Shortest time step of the settings [s].
     finest: Most nodes per limb with which settings are measured at all tolerances, and adapted steps.
     rounds: Rounds of timing.
-    timed, timed_limit: Sequences of either kind with decisions in time, and what stands for their continuum.
+    timed, periods, timed_limit: Sequences of every class with decisions in time, times between decisions [s]
+        (resonances lie 40 ms apart, see docs/numerics.md), and what stands for the continuum of these swims.
     """
 
     n_random: int = 51
@@ -194,14 +200,15 @@ class Plan:
     shortest: float = 0.1 * MILLI
     finest: int = 19
     rounds: int = 3
-    timed: int = 60
+    timed: int = 24
+    periods: tuple[float, ...] = (0.1, 0.125, 0.15, 0.2, 0.25, 0.3, 0.5)
     timed_limit: tuple[int, float] = (73, 0.2 * MILLI)
 
 
 QUICK = Plan(
     n_random=6, n_slow=2, n_gaits=2, side=(1, 0), limit=(37, 0.4 * MILLI), fine=0.4 * MILLI, opinion=(10, 1 * MILLI),
-    meshes=(("continuum", 7), ("continuum", 10), ("chapter", 10)), shortest=2 * MILLI, rounds=1, timed=2,
-    timed_limit=(37, 1 * MILLI),
+    meshes=(("continuum", 7), ("continuum", 10), ("chapter", 10)), shortest=2 * MILLI, rounds=1, timed=12,
+    periods=(0.2, 0.5), timed_limit=(37, 1 * MILLI),
 )  # fmt: skip
 
 
@@ -461,60 +468,185 @@ def in_strokes(plan: Plan) -> tuple[Certificate, dict[str, float]]:
 
 # Commands in time
 
-WIRES = replace(Scene(), actuator=SmaWires())
+ROBOTS: dict[str, tuple[float | None, int, int]] = {"wires": (SILICONE, 1, 1), "undamped": (None, 2, 3)}
+"""Relaxation times [s] of the robots with `SmaWires` that are measured, by the names of their files: that of the
+environments, which has the damping of silicone, and the chapter's, which has none. Without damping, swims converge
+late: the other numbers divide the step of the limit, and the number of sequences."""
 SECONDS, SEED = 10, 0
 SLOWEST = 0.1
-"""Errors of swims that are slower than this [limb lengths per second] are fractions of a path at this speed: repeated
-seconds hardly swim, so that shares of their paths would say nothing."""
+"""Errors of swims that are slower than this [limb lengths per second] are fractions of a path at this speed: held and
+repeated commands hardly swim, so that shares of their paths would say nothing."""
+HELD = (10.0, 5.0, 2.0, 1.0)
+"""Times for which a command is held [s]."""
 
 
-def timed_sequences(period: float, n: int, seed: int = SEED) -> Floats:
-    """Commands of decisions, shape (n_decisions, 2 n, 5): random ones, then a second that is repeated."""
-    a_second, rng = round(1.0 / period), np.random.default_rng([seed, round(1000 * period)])
-    commands = rng.uniform(-1.0, 1.0, (SECONDS * a_second, 2 * n, 5))
+def wired(robot: str) -> Scene:
+    """The chapter's scene with wires and the damping of one of ROBOTS."""
+    return replace(Scene(), actuator=SmaWires(), robot=Seastar(relaxation_time=ROBOTS[robot][0]))
+
+
+def ternary(rng: np.random.Generator, *shape: int) -> Floats:
+    """Commands of -1, 0 and 1, shape (*shape, 5)."""
+    return rng.integers(-1, 2, (*shape, 5)).astype(float)
+
+
+def in_turn(commands: Floats, every: float, period: float) -> Floats:
+    """Commands that change every so many seconds, as decisions, shape (n_decisions, n, 5), the last at the end."""
+    k = (np.arange(round(SECONDS / period)) * period / every + 1e-9).astype(int)
+    return np.asarray(commands[k % len(commands)])
+
+
+def held(rng: np.random.Generator, n: int, period: float) -> Floats:
+    """Commands that are held for each of HELD in turn."""
+    return np.concatenate([in_turn(ternary(rng, SECONDS, n // len(HELD)), each, period) for each in HELD], axis=1)
+
+
+def on_off(rng: np.random.Generator, n: int, period: float) -> Floats:
+    """A command for a second, then a second of rest."""
+    return in_turn(np.stack([ternary(rng, n), np.zeros((n, 5))]), 1.0, period)
+
+
+def paired(rng: np.random.Generator, n: int, period: float) -> Floats:
+    """Two limbs of another pair of opposed commands in every decision, as the actions "pairs" are."""
+    table = np.array([command for command in itertools.product((-1.0, 0.0, 1.0), repeat=5) if sorted(command) == PAIR])
+    return np.asarray(table[rng.integers(len(table), size=(round(SECONDS / period), n))])
+
+
+PAIR = [-1.0, 0.0, 0.0, 0.0, 1.0]
+DRIVERS = {"SeastarSwimTimed-v0": ("learned", "planner"), "SeastarSwimTimedModerate-v0": ("learned", "greedy")}
+"""Ids, and the bundled agents whose commands are swum again."""
+
+
+@cache
+def driven() -> Floats:
+    """Commands of DRIVERS for twenty decisions on random paths, shape (20, 16, 5)."""
+    found = []
+    for (id, names), seed in itertools.product(DRIVERS.items(), range(4)):
+        for name in names:
+            agent = load_agent(name, cast(Any, gym.make(id, fidelity="fast").unwrapped))
+            actions = actions_of(agent, 5)
+            env = gym.make(id, fidelity="fast", path="random", actions=actions)
+            observation, _ = env.reset(seed=seed)
+            commands = list[Floats]()
+            while len(commands) < 20:
+                action = agent.predict(observation, deterministic=True)[0]
+                commands.append(to_commands(actions, 5, [action], 1)[0])
+                observation = env.step(action)[0]
+            found.append(commands)
+    return np.array(found).swapaxes(0, 1)
+
+
+def policies(rng: np.random.Generator, n: int, period: float) -> Floats:
+    """What bundled policies, the planner and the greedy rule do, again and again, at any period."""
+    chosen = driven()[:, rng.integers(0, driven().shape[1], n)]
+    return np.resize(chosen, (round(SECONDS / period), n, 5))
+
+
+def repeated_second(rng: np.random.Generator, n: int, period: float) -> Floats:
+    """A second of random commands, repeated."""
+    a_second = rng.uniform(-1.0, 1.0, (max(1, round(1.0 / period)), n, 5))
+    return np.resize(a_second, (round(SECONDS / period), n, 5))
+
+
+def at_random(rng: np.random.Generator, n: int, period: float) -> Floats:
+    """Another command for every decision, half of them of -1, 0 and 1."""
+    commands = rng.uniform(-1.0, 1.0, (round(SECONDS / period), n, 5))
     commands[:, ::2] = rng.integers(-1, 2, commands[:, ::2].shape)
-    commands[:, n:] = np.tile(commands[:a_second, n:], (SECONDS, 1, 1))
     return commands
 
 
-def timed_setting(resolution: Resolution, space: Floats, in_time: Floats) -> Setting:
-    """Setting of path errors of random and then of as many repeated commands; rounded upwards to two digits."""
-    discretisation, nodes_per_limb, numerics = resolution
-    (random, repeated), (random_in_time, repeated_in_time) = np.split(space, 2), np.split(in_time, 2)
-    of_space, of_time = rounded_up(random.max()), rounded_up(random_in_time.max())
-    medians = {"random": np.median(random + random_in_time), "repeated": np.median(repeated + repeated_in_time)}
-    return Setting(
-        nodes_per_limb, numerics.scheme, numerics.step, numerics.newton_tolerance,
-        errors={"random": of_space + of_time, "repeated": rounded_up(repeated.max() + repeated_in_time.max())},
-        typical={name: rounded_up(float(each)) for name, each in medians.items()},
-        space_error=of_space, time_error=of_time, discretisation=discretisation, damping=numerics.damping,
-    )  # fmt: skip
+def repeated_command(rng: np.random.Generator, n: int, period: float) -> Floats:
+    """Every command of -1, 0 and +1 for ten seconds, once per class under the robot's symmetry, as scripts do."""
+    return np.tile([*gaits().commands[0], *PAIRS.values()], (round(SECONDS / period), 1, 1))
 
 
-def every(period: float, plan: Plan) -> Certificate:
-    """Errors of all presets for a time between decisions [s]."""
-    began, commands = time.process_time(), timed_sequences(period, plan.timed)
-    nodes, step = plan.timed_limit
-    limit = Resolution("continuum", nodes, Numerics("implicit-midpoint", step, TIGHT))
-    with progress_bar(f"every {period:g} s") as progress:
-        found = measure(WIRES, [*PRESETS.values()], limit, lambda *_: limit.numerics, commands, progress, period,
+TIMED: dict[str, Callable[[np.random.Generator, int, float], Floats]] = {
+    "random": at_random, "pairs": paired, "repeated second": repeated_second, "held": held, "on-off": on_off,
+    "policies": policies, "repeated command": repeated_command,
+}  # fmt: skip
+"""Classes of commands in time, by name."""
+
+
+def timed_sequences(period: float, n: int, seed: int = SEED) -> tuple[Floats, dict[str, slice]]:
+    """Sequences of all classes of TIMED, n of each that is drawn, shape (n_decisions, n_robots, 5); their places."""
+    rng = np.random.default_rng([seed, round(1000 * period)])
+    drawn = {name: draw(rng, n, period) for name, draw in TIMED.items()}
+    ends = np.cumsum([each.shape[1] for each in drawn.values()]).tolist()
+    places = {name: slice(end - each.shape[1], end) for (name, each), end in zip(drawn.items(), ends, strict=True)}
+    return np.concatenate([*drawn.values()], axis=1), places
+
+
+@dataclass(frozen=True)
+class Timed:
+    """Errors of space and of time of one resolution, by class of TIMED: shape (n_sequences,) each."""
+
+    resolution: Resolution
+    space: Mapping[str, Floats]
+    time: Mapping[str, Floats]
+
+    def by_class(self, of: Callable[[Floats], float]) -> dict[str, float]:
+        """A number of the sums of every class, rounded upwards to two digits."""
+        return {name: rounded_up(float(of(space + self.time[name]))) for name, space in self.space.items()}
+
+    def setting(self) -> Setting:
+        """Setting of the largest errors and of their medians."""
+        discretisation, nodes_per_limb, numerics = self.resolution
+        space, in_time = (rounded_up(max(map(np.max, some.values()))) for some in (self.space, self.time))
+        return Setting(
+            nodes_per_limb, numerics.scheme, numerics.step, numerics.newton_tolerance,
+            errors=self.by_class(np.max), typical=self.by_class(np.median), space_error=space, time_error=in_time,
+            discretisation=discretisation, damping=numerics.damping,
+        )  # fmt: skip
+
+
+def timed_limit(robot: str, plan: Plan) -> tuple[Resolution, int]:
+    """What stands for the continuum of one of ROBOTS, and the number of sequences of a class and period."""
+    (nodes, step), (_, finer, fewer) = plan.timed_limit, ROBOTS[robot]
+    return Resolution("continuum", nodes, Numerics("implicit-midpoint", step / finer, TIGHT)), plan.timed // fewer
+
+
+def every(robot: str, period: float, plan: Plan) -> list[Timed]:
+    """Errors of all presets of one of ROBOTS for a time between decisions [s]."""
+    limit, n = timed_limit(robot, plan)
+    commands, places = timed_sequences(period, n)
+    with progress_bar(f"{robot}, every {period:g} s") as progress:
+        found = measure(wired(robot), [*PRESETS.values()], limit, lambda *_: limit.numerics, commands, progress, period,
                         SLOWEST * SECONDS)  # fmt: skip
     each = zip(PRESETS.values(), found.space, found.time, strict=True)
-    stored = tuple(timed_setting(resolution, space.path, in_time.path) for resolution, space, in_time in each)
-    (swum,) = swim_all([at(WIRES, PRESETS["fast"])], commands, period=period)
-    ends = [np.percentile(some, (0, 50, 100)) for some in np.split(1e3 * path_lengths(WIRES, swum.hub, 0.0), 2)]
-    shown = [[rounded(float(end), 2) for end in some] for some in ends]
+    return [
+        Timed(resolution, *({name: errors.path[place] for name, place in places.items()} for errors in (space, time)))
+        for resolution, space, time in each
+    ]
+
+
+def joint(some: Sequence[Timed]) -> Timed:
+    """Errors of one resolution for all periods together."""
+    space, in_time = ({name: np.concatenate([getattr(each, part)[name] for each in some]) for name in some[0].space}
+                      for part in ("space", "time"))  # fmt: skip
+    return Timed(some[0].resolution, space, in_time)
+
+
+def in_time(robot: str, plan: Plan) -> Certificate:
+    """Errors of all presets of one of ROBOTS, each the largest of all PERIODS."""
+    began = time.process_time()
+    of_periods = [every(robot, period, plan) for period in plan.periods]
+    settings = tuple(joint(some).setting() for some in zip(*of_periods, strict=True))
+    limit, n = timed_limit(robot, plan)
+    table = {
+        f"{period:g}": {name: [each.by_class(np.max), each.by_class(np.median)]
+                        for name, each in zip(PRESETS, found, strict=True)}
+        for period, found in zip(plan.periods, of_periods, strict=True)
+    }  # fmt: skip
     return Certificate(
-        physics(WIRES), stored, ("random",), ("random", "repeated"), plan.timed,
-        limit_error=rounded_up(min(each.space_error for each in stored) / 3.0), classes=CLASSES_VERSION,
-        version=__version__, machine=machine(), decision_period=period,
+        physics(wired(robot)), settings, tuple(TIMED), tuple(TIMED), n * len(plan.periods),
+        limit_error=rounded_up(min(each.space_error for each in settings) / 3.0),
+        classes=CLASSES_VERSION, version=__version__, machine=machine(), decision_period=max(plan.periods),
         measured_over={
             "command": "python -m studies.accuracy --store",
-            "seconds": SECONDS, "random": plan.timed, "a repeated second": plan.timed,
+            "seconds": SECONDS, "periods": list(plan.periods), "of each class and period": n,
             "shortest path": f"{SLOWEST:g} limb lengths per second",
-            "limit": f"{nodes} nodes per limb, {step / MILLI:g} ms",
-            "paths": dict(zip(("random", "repeated"), shown, strict=True)),
-            "processor_seconds": round(time.process_time() - began),
+            "limit": f"{limit.nodes_per_limb} nodes per limb, {limit.numerics.step / MILLI:g} ms",
+            "largest and median by period": table, "processor_seconds": round(time.process_time() - began),
         },
     )  # fmt: skip
 
@@ -524,40 +656,75 @@ def every(period: float, plan: Plan) -> Certificate:
 FRESH_SEED = 2_026
 
 
-def exceeding(name: Fidelity, samples: int) -> dict[str, float]:
-    """Share of fresh sequences of every class whose error exceeds what the package's table promises of a preset."""
+FRESH_PERIODS = (0.13, 0.17, 0.2, 0.23)
+"""Times between decisions [s] of fresh sequences."""
+
+
+def exceeding(name: Fidelity, samples: int) -> dict[str, Floats]:
+    """Errors of fresh sequences of every class of strokes over what the package's table promises of a preset."""
     commands, known = draw_classes(samples, 5, FRESH_SEED), in_table(name)
     limit = Resolution("continuum", measuring.MANY_NODES, measuring.SHORT)
     swum, exact = swim_all([Scene.preset(name), at(Scene(), limit)], commands)
     off = errors(swum, exact, path_lengths(Scene(), exact.hub)).path.reshape(len(CLASSES), samples)
     kinds = {"random ternary": "random", "random continuous": "random", "small": "small"}
     bounds = [known.errors[kinds[each]] if each in kinds else known.error(("random", "repeated")) for each in CLASSES]
-    return dict(zip(CLASSES, (off > np.array(bounds)[:, None]).mean(axis=1).tolist(), strict=True))
+    return dict(zip(CLASSES, off / np.array(bounds)[:, None], strict=True))
+
+
+def exceeding_in_time(robot: str, names: Sequence[Fidelity], samples: int) -> dict[Fidelity, dict[str, Floats]]:
+    """Errors of fresh sequences of every class in time, at FRESH_PERIODS, over what `info` promises of presets."""
+    found: dict[Fidelity, list[dict[str, Floats]]] = {name: [] for name in names}
+    limit = Resolution("continuum", measuring.MANY_NODES, Numerics("implicit-midpoint", 0.2 * MILLI, TIGHT))
+    for period in FRESH_PERIODS:
+        commands, places = timed_sequences(period, samples, FRESH_SEED)
+        scenes = [at(wired(robot), each) for each in (limit, *(PRESETS[name] for name in names))]
+        exact, *swums = swim_all(scenes, commands, period=period)
+        lengths = path_lengths(wired(robot), exact.hub[whole_seconds(period, len(exact.hub))], SLOWEST * SECONDS)
+        for name, swum in zip(names, swums, strict=True):
+            path = errors(swum, exact, lengths).path
+            found[name].append({each: path[place] for each, place in places.items()})
+    certificate = certificate_of(robot)
+    return {
+        name: {each: np.concatenate([of_period[each] for of_period in some])
+               / in_table(name, robot).error(_beside(each, certificate)) for each in TIMED}
+        for name, some in found.items()
+    }  # fmt: skip
+
+
+def _beside(name: str, certificate: Certificate) -> tuple[str, ...]:
+    """Classes that stand behind the same entry of `info` as one class."""
+    gaits = certificate.repeated(certificate.actions)
+    return gaits if name in gaits else tuple(each for each in certificate.actions if each not in gaits)
 
 
 # Tables of pages, from the certificates that come with the package. Every error is one that `info` has: a bound, and in
 # brackets the median.
 
-PERIODS = (0.5, 0.2, 0.1)
-"""Times between decisions [s] that were measured."""
-PERIOD = 0.2
-"""Time between decisions [s] of the column of commands in time."""
 PURPOSES: dict[Fidelity, str] = {
     "fast": "searching, training", "balanced": "doing anything else; it is the default",
     "accurate": "measuring a difference of a few per cent", "reference": "checking one of the above",
     "chapter": "repeating the chapter's figures",
 }  # fmt: skip
-ERRORS = ["random, every 1 s", "repeated, every 1 s", f"random, every {PERIOD:g} s", f"repeated, every {PERIOD:g} s"]
+ERRORS = ["random strokes", "repeated strokes", "random decisions", "held or repeated decisions"]
 
 
-def in_table(name: Fidelity, period: float | None = None) -> Setting:
-    """Errors of a preset in strokes, or with a time between decisions [s]."""
-    certificate = chapters_certificate() if period is None else timed_certificate(period)
-    scene = Scene.preset(name) if period is None else replace(Scene.preset(name), actuator=SmaWires())
-    assert certificate is not None
-    known = certificate.of(scene)
+def in_table(name: Fidelity, robot: str | None = None) -> Setting:
+    """Errors of a preset in strokes, or of one of ROBOTS with commands in time."""
+    scene = Scene.preset(name)
+    if robot is None:
+        known = chapters_certificate().of(scene)
+    else:
+        scene = replace(scene, actuator=SmaWires(), robot=replace(scene.robot, relaxation_time=ROBOTS[robot][0]))
+        known = certificate_of(robot).of(scene)
     assert known is not None
     return known
+
+
+def certificate_of(robot: str) -> Certificate:
+    """Certificate of one of ROBOTS that comes with the package."""
+    found = timed_certificate(0.2, wired(robot))
+    assert found is not None
+    return found
 
 
 def percent(bound: float, typical: float | None = None) -> str:
@@ -566,13 +733,15 @@ def percent(bound: float, typical: float | None = None) -> str:
 
 
 def cells(known: Setting) -> list[str]:
-    """Errors of random and of repeated commands."""
-    return [percent(known.errors[name], known.typical[name]) for name in ("random", "repeated")]
+    """Errors of random and of repeated commands, in strokes or in time."""
+    random = [name for name in known.errors if name in ("random", "pairs")]
+    repeated = [name for name in known.errors if name.startswith(REPEATED)]
+    return [percent(known.error(some), known.typical_error(some)) for some in (random, repeated)]
 
 
 def row_of(name: Fidelity) -> list[str]:
     """Errors of strokes and of commands in time, and the speed."""
-    return [*cells(in_table(name)), *cells(in_table(name, PERIOD)), f"{in_table(name).speed:,.0f}"]
+    return [*cells(in_table(name)), *cells(in_table(name, "wires")), f"{in_table(name).speed:,.0f}"]
 
 
 def readme(_: object) -> str:
@@ -605,13 +774,25 @@ def presets(_: object) -> str:
 
 
 def timed(_: object) -> str:
-    """Errors of all presets for times between decisions [s], of random commands and then of repeated seconds."""
+    """Errors of all presets by class of commands in time, with and without material damping."""
+    rows = [
+        [f"`{name}`", said, *(percent(known.errors[each], known.typical[each]).replace(" %", "") for each in TIMED)]
+        for robot, said in (("wires", "silicone"), ("undamped", "none"))
+        for name in PURPOSES
+        for known in [in_table(name, robot)]
+    ]
+    return markdown(["fidelity", "damping", *(f"{name} [%]" for name in TIMED)], rows, (0, 1))
+
+
+def by_period(_: object) -> str:
+    """Largest errors of all classes of commands in time, by the time between decisions [s]."""
     rows = []
-    for name in PURPOSES:
-        found = [cells(in_table(name, period)) for period in PERIODS]
-        rows.append([f"`{name}`", *(each[k].replace(" %", "") for k in (0, 1) for each in found)])
-    columns = [f"{what}, {period:g} s [%]" for what in ("random", "repeated") for period in PERIODS]
-    return markdown(["fidelity", *columns], rows)
+    for robot, said in (("wires", "silicone"), ("undamped", "none")):
+        of_periods = certificate_of(robot).measured_over["largest and median by period"]
+        for name in PURPOSES:
+            found = [max(of_period[name][0].values()) for of_period in of_periods.values()]
+            rows.append([f"`{name}`", said, *(percent(each).replace(" %", "") for each in found)])
+    return markdown(["fidelity", "damping", *(f"{each} s [%]" for each in of_periods)], rows, (0, 1))
 
 
 @dataclass(frozen=True)
@@ -622,32 +803,44 @@ class Options:
     """Measure fewer settings and swims, in a minute."""
     store: bool = False
     """Write the tables that come with the package, instead of files in --out."""
-    periods: tuple[float, ...] = (1.0, *PERIODS)
-    """Times between decisions [s]; 1 stands for strokes."""
+    only: tuple[str, ...] = ("strokes", *ROBOTS)
+    """What is measured: strokes, commands in time of robots of silicone (wires), and of undamped ones."""
     fresh: int = 0
     """Measure nothing, but hold the package's table against so many fresh sequences of every class."""
 
     def __post_init__(self) -> None:
         if self.quick and self.store:
             raise ValueError("--store needs the whole study, not --quick.")
+        if unknown := {*self.only} - {"strokes", *ROBOTS}:
+            raise ValueError(f"--only is some of strokes, {', '.join(ROBOTS)}, not {', '.join(sorted(unknown))}.")
 
 
 def run(options: Options, results: Results) -> None:
     """Measure and write the certificates, or hold that of the package against fresh sequences."""
     if options.fresh:
-        found = {name: exceeding(name, options.fresh) for name in ("fast", "balanced", "accurate")}
-        rows = [[name, *(f"{100 * share:.1f} %" for share in each.values())] for name, each in found.items()]
-        return show(markdown(["fidelity", *CLASSES], rows), "Sequences that exceed the error of their class")
+        presets: tuple[Fidelity, ...] = ("fast", "balanced", "accurate")
+        for what in options.only:
+            found = (
+                {name: exceeding(name, options.fresh) for name in presets}
+                if what == "strokes"
+                else exceeding_in_time(what, presets, options.fresh)
+            )
+            rows = [
+                [name, *(f"{(each > 1.0).sum()} of {each.size}, {each.max():.2f}" for each in by_class.values())]
+                for name, by_class in found.items()
+            ]
+            show(markdown(["fidelity", *found["fast"]], rows), f"{what}: beyond the promise, and the worst over it")
+        return None
     plan, folder = QUICK if options.quick else Plan(), chapter.FOLDER if options.store else results.folder
-    for period in options.periods:
-        if period == 1.0:
+    for name in options.only:
+        if name == "strokes":
             certificate, doubt = in_strokes(plan)
             print(f"Error of the limit itself: {doubt}")
             if options.store and not max(doubt.values()) <= LARGEST_DOUBT:
                 raise ValueError(f"The limit is in doubt by more than {LARGEST_DOUBT:.0e}: nothing is stored.")
-            file = folder / chapter.STROKES.name
         else:
-            certificate, file = every(period, plan), chapter.file_of(period, folder)
+            certificate = in_time(name, plan)
+        file = folder / f"{name}.json"
         certificate.save(file)
         shown = [
             [name, *map(percent, each.errors.values())]
@@ -659,5 +852,5 @@ def run(options: Options, results: Results) -> None:
 
 STUDY = Study(
     "accuracy", run, Options, out=Path("runs/accuracy"),
-    tables={"errors": readme, "choosing": choosing, "presets": presets, "timed": timed},
+    tables={"errors": readme, "choosing": choosing, "presets": presets, "timed": timed, "periods": by_period},
 )  # fmt: skip

@@ -180,7 +180,7 @@ MOST_SAMPLES = 100_000
 """Most sequences of a class that can be asked for."""
 LEVELS = (0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
 """Errors for which a summary names the fastest setting."""
-REPEATED = ("repeated", "alternating")
+REPEATED = ("repeated", "alternating", "held", "on-off", "policies")
 """Beginnings of the names of classes whose commands are repeated."""
 
 HEADS = ("error", "speed", "fastest setting")
@@ -199,8 +199,8 @@ class Certificate:
     limit_error: Error of the swims that stand for the continuum, estimated from half as many edges. `certify` adds it
         to all errors.
     classes, version, machine: Version of the classes of commands, of the package, and where speeds were measured.
-    decision_period: Time between decisions [s] of wires (`SmaWires`). Errors are then of whole seconds in place of
-        strokes. None means strokes.
+    decision_period: Time between decisions [s] of wires (`SmaWires`). Errors are then of decisions in place of strokes,
+        over paths that are seen at whole seconds. None means strokes.
     measured_over: What else there is to tell of the commands, as plain data.
     """
 

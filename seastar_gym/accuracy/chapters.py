@@ -1,13 +1,21 @@
 """Certificates of the chapter's robot in the chapter's water, which come with the package.
 
 `python -m studies.accuracy --store` measures that of strokes, and those of wires that are commanded several times a
-second, whose settings are the fidelities. Their classes of commands:
+second, whose settings are the fidelities. Classes of strokes:
 
-random      of strokes: also the straight swim, the four pairs of Fig. 13.8 and the pentagon
-repeated    repetitions of a command and alternations of two, with half as much again for those that were not measured;
-            of wires: a second of commands, repeated
+random      also the straight swim, the four pairs of Fig. 13.8 and the pentagon
+repeated    repetitions of a command and alternations of two, with half as much again for those that were not measured
 small       random and repeated commands of a tenth of the amplitude, whose paths are short, with half as much again
 straight    the straight swim alone
+
+Classes of wires, each over times of 0.1 to 0.5 s between decisions:
+
+random, pairs       another command for every decision: of all limbs, of two
+repeated second     a second of random commands, repeated
+held                a command for 1, 2, 5 or 10 s
+on-off              a command for a second, then a second of rest
+policies            what bundled policies, the planner and the greedy rule do
+repeated command    every command of -1, 0 and +1, all the time
 
 Speeds are of `Certificate.machine`. An error bounds 95 % of random sequences with the confidence that `confidence`
 returns, so it is no bound for all: docs/numerics.md says how many of fresh ones exceed it.
@@ -17,25 +25,28 @@ Errors and speed that `info` tells: of the package's own certificates, or of a u
 
 import math
 import warnings
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from os import PathLike
 from pathlib import Path
 
-from seastar_gym.accuracy.certificate import CLASSES_VERSION, Certificate, Setting, as_certificate
+import numpy as np
+
+from seastar_gym.accuracy.certificate import CLASSES_VERSION, Certificate, as_certificate, physics
 from seastar_gym.scene import Scene, Seastar
-from seastar_gym.scene.checks import require_flag, require_number, shown
+from seastar_gym.scene.checks import require_flag, require_kind, require_number, shown
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 
 FOLDER = Path(__file__).with_name("shipped")
 STROKES = FOLDER / "strokes.json"
+SHORT_STEP = 5e-4
+"""Steps [s] that are short enough for the resonances of undamped limbs."""
 
 
-def file_of(decision_period: float, folder: Path = FOLDER) -> Path:
-    """File of the errors for a time between decisions [s]."""
-    return folder / f"wires_{decision_period:g}s.json"
+IN_TIME = tuple(FOLDER / name for name in ("wires.json", "undamped.json"))
+"""Files of wires that are commanded several times a second: of limbs of silicone, as environments have them, and of the
+chapter's, which damp nothing."""
 
 
 @cache
@@ -78,36 +89,27 @@ def scene_for(
     return known.for_error(error, classes, robot)
 
 
-def timed_certificate(decision_period: float) -> Certificate | None:
-    """Errors of the chapter's robot with wires: the larger ones of the measured times around a decision period [s].
+def timed_certificate(decision_period: float, scene: Scene | None = None) -> Certificate | None:
+    """Errors of the chapter's robot with wires, the largest of all measured times between decisions.
 
-    None outside of the measured times.
+    Resonances of limbs lie so near to each other that a time between two measured ones may err more than both.
+
+    decision_period: Time between decisions [s]. scene: The scene, whose limbs have the material damping of silicone, or
+    none. None means the first, as environments have it. Returns None for times and scenes that were not measured.
     """
     require_number("decision_period", decision_period, "s")
-    known = {float(each.decision_period or 0.0): each for each in map(_load, FOLDER.glob("wires_*.json"))}
-    shorter = [period for period in known if period <= decision_period * (1.0 + 1e-9)]
-    longer = [period for period in known if period >= decision_period * (1.0 - 1e-9)]
-    if not shorter or not longer:
-        return None
-    one, other = known[max(shorter)], known[min(longer)]
-    return replace(one, settings=tuple(map(_worst, one.settings, other.settings)))
+    require_kind("scene", scene, Scene | None, "a Scene or None")
+    for known in map(_load, IN_TIME):
+        periods = known.measured_over["periods"]
+        if scene is None or known.scene == physics(scene):
+            measured = min(periods) * (1.0 - 1e-9) <= decision_period <= max(periods) * (1.0 + 1e-9)
+            return replace(known, decision_period=decision_period) if measured else None
+    return None
 
 
-def _worst(one: Setting, other: Setting) -> Setting:
-    """A setting with the larger of two errors of every kind."""
-
-    def larger(some: Mapping[str, float], others: Mapping[str, float]) -> dict[str, float]:
-        return {name: max(error, others[name]) for name, error in some.items()}
-
-    space, in_time = max(one.space_error, other.space_error), max(one.time_error, other.time_error)
-    errors = larger(one.errors, other.errors) | {"random": space + in_time}
-    typical = larger(one.typical, other.typical)
-    return replace(one, errors=errors, typical=typical, space_error=space, time_error=in_time)
-
-
-IN_TIME = ("path_error", "gait_error", "typical_error", "typical_gait_error", "space_error", "time_error")
+ERRORS = ("path_error", "gait_error", "typical_error", "typical_gait_error", "space_error", "time_error")
 """Entries of `info` where decisions are no strokes."""
-NAMES = (*IN_TIME, "batch_real_time_factor")
+NAMES = (*ERRORS, "batch_real_time_factor")
 """Entries of `info` where they are strokes: errors, and the speed of a batch."""
 
 
@@ -119,10 +121,10 @@ def errors_in_info(
     certificate: Where they stand, the package's own if None. decision_period: Time between decisions [s]. None means
     strokes.
     """
-    known = _certificate(certificate, decision_period)
+    known = _certificate(certificate, scene, decision_period)
     setting = None if known is None else known.of(scene)
     if known is None or setting is None:
-        return dict.fromkeys(NAMES if decision_period is None else IN_TIME, math.nan)
+        return dict.fromkeys(NAMES if decision_period is None else ERRORS, math.nan)
     gaits = known.repeated(known.actions)
     others = [name for name in known.actions if name not in gaits]
     found = {
@@ -133,10 +135,10 @@ def errors_in_info(
     return found if known.decision_period is not None else found | {"batch_real_time_factor": setting.speed}
 
 
-def _certificate(certificate: Certificate | None, decision_period: float | None) -> Certificate | None:
+def _certificate(certificate: Certificate | None, scene: Scene, decision_period: float | None) -> Certificate | None:
     if certificate is not None:
         return certificate
-    return chapters_certificate() if decision_period is None else timed_certificate(decision_period)
+    return chapters_certificate() if decision_period is None else timed_certificate(decision_period, scene)
 
 
 def read_certificate(
@@ -163,6 +165,25 @@ def read_certificate(
     return certificate
 
 
+def warn_undamped(scene: Scene, decision_period: float | None) -> None:
+    """Warn of limbs that damp nothing where decisions are no strokes: they resonate with decisions.
+
+    Called two calls below where an environment is made, which the warning names.
+    """
+    relaxation_time = scene.robot.relaxation_time
+    damped = relaxation_time is not None and bool(np.min(relaxation_time) > 0.0)
+    if decision_period is None or damped or scene.numerics.step <= SHORT_STEP:
+        return
+    errors = errors_in_info(scene, None, decision_period)["gait_error"]
+    told = "" if math.isnan(errors) else f", by {100 * errors:.2g} % of the hub's path for the chapter's robot"
+    warnings.warn(
+        f"The limbs of this scene damp nothing, so that decisions every {decision_period:g} s drive their resonances, "
+        f"which steps of {1e3 * scene.numerics.step:g} ms misplace{told}: "
+        "Seastar(relaxation_time=relaxation_time(0.1, 10.0)) damps them as soft silicone does.",
+        stacklevel=4,
+    )
+
+
 def warn_uncertified(
     scene: Scene, fidelity: Fidelity | None, certificate: Certificate | None, decision_period: float | None
 ) -> None:
@@ -172,7 +193,7 @@ def warn_uncertified(
 
     fidelity: None asks for none. decision_period: Time between decisions [s]. None means strokes.
     """
-    known = _certificate(certificate, decision_period)
+    known = _certificate(certificate, scene, decision_period)
     if (certificate is None and fidelity is None) or (known is not None and known.of(scene) is not None):
         return
     if certificate is not None:

@@ -324,13 +324,14 @@ def measure(
     """Errors of a scene at some resolutions, of space and of time, sequence by sequence.
 
     limit: What stands for the continuum. short: Numerics that stand for infinitely short steps with a discretisation
-    and nodes per limb. commands: Shape (strokes, n, n_limbs). period: Time between decisions [s]; errors are then of
-    whole seconds. None means strokes. shortest: Of a path whose errors are fractions of its length [limb lengths].
+    and nodes per limb. commands: Shape (strokes, n, n_limbs). period: Time between decisions [s]; errors are then those
+    after any decision, and paths as long as they are seen at whole seconds. None means strokes. shortest: Of a path
+    whose errors are fractions of its length [limb lengths].
     """
     meshes = [each[:2] for each in resolutions]
     fine = [Resolution(*mesh, short(*mesh)) for mesh in dict.fromkeys(meshes)]
     exact, *swum = swim_all([at(scene, each) for each in (limit, *fine, *resolutions)], commands, progress, period)
-    lengths = path_lengths(scene, exact.hub, shortest)
+    lengths = path_lengths(scene, exact.hub[whole_seconds(period, len(exact.hub))], shortest)
     converged = {each[:2]: found for each, found in zip(fine, swum, strict=False)}
     space = {mesh: errors(found, exact, lengths) for mesh, found in converged.items()}
     swims = swum[len(fine) :]
@@ -371,9 +372,8 @@ def swim_all(
 ) -> list[Swims]:
     """Swims of all sequences with every scene, on all processors, the dearest first.
 
-    period: Time between decisions [s]; swims are then told at whole seconds. None means strokes.
+    period: Time between decisions [s], after each of which swims are told. None means strokes.
     """
-    every = 1 if period is None else round(1.0 / period)
     groups = [commands[:, k : k + GROUP] for k in range(0, commands.shape[1], GROUP)]
     jobs = [(scene, group) for scene in scenes for group in groups]
     cost = [scene.robot.nodes_per_limb * group[0].size / scene.numerics.step for scene, group in jobs]
@@ -382,12 +382,18 @@ def swim_all(
     found: dict[int, Swims] = {}
     with ThreadPoolExecutor(processors()) as pool:
         for k, swum in zip(order, pool.map(lambda k: swim(*jobs[k], period), order), strict=True):
-            found[k] = Swims(*(each[every - 1 :: every] for each in swum))
+            found[k] = swum
             done += cost[k]
             if progress is not None:
                 progress(done / sum(cost))
     parts = [[found[k + each] for each in range(len(groups))] for k in range(0, len(jobs), len(groups))]
     return [Swims(*(np.concatenate(each, axis=1) for each in zip(*some, strict=True))) for some in parts]
+
+
+def whole_seconds(period: float | None, n: int) -> slice:
+    """Which of n decisions end about whole seconds, of all strokes if the period is None."""
+    every = 1 if period is None else round(1.0 / period)
+    return slice((n - 1) % every, None, every)
 
 
 def path_lengths(scene: Scene, hub: Floats, shortest: float = SHORTEST_PATH) -> Floats:

@@ -32,6 +32,7 @@ from seastar_gym.scene import Scene, SmaWires
 from seastar_gym.scene.checks import as_float, is_finite_number, require_flag, require_kind, require_number, shown
 from seastar_gym.scene.number import check_numbers, make_floats, not_negative, within
 from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.scene.robot import SILICONE
 from seastar_gym.scene.scene_file import load_scene
 from seastar_gym.scene.serial import read, register_part
 
@@ -108,14 +109,17 @@ class SwimOptions:
 def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None, decision_period: float | None = None) -> Scene:
     """Scene with the nodes and numerics that it names, otherwise with those of `fidelity`, see `Scene.at`.
 
-    Without a scene, it is the chapter's at the fidelity, with wires for decisions that are not strokes.
+    Without a scene, it is the chapter's at the fidelity; for decisions that are not strokes with wires, and with the
+    material damping of soft silicone, without which steps resonate with decisions (docs/numerics.md, "Resonance").
 
     decision_period: Time between decisions [s]. None means a stroke.
     """
     if scene is None:
         chapters = Scene().at(fidelity)
         in_strokes = decision_period in (None, chapters.actuator.period)
-        return chapters if in_strokes else replace(chapters, actuator=SmaWires())
+        if in_strokes:
+            return chapters
+        return replace(chapters, actuator=SmaWires(), robot=replace(chapters.robot, relaxation_time=SILICONE))
     scene = read(scene, Scene)
     require_kind("scene", scene, Scene, "a Scene")
     return scene.at(fidelity)

@@ -284,9 +284,9 @@ class SeastarSwimEnv(OneRobotEnv):
     | `distance`               | float      | m    | distance of the hub from the current waypoint                    |
     | `cross_track_error`      | float      | m    | distance of the hub from the current leg of the path             |
     | `path_error`             | float      | 1    | largest error of random commands, a fraction of the hub's path   |
-    | `gait_error`             | float      | 1    | largest error of repeated and alternating commands               |
+    | `gait_error`             | float      | 1    | largest error of repeated, held and alternating commands         |
     | `typical_error`          | float      | 1    | median error of random commands                                  |
-    | `typical_gait_error`     | float      | 1    | median error of repeated and alternating commands                |
+    | `typical_gait_error`     | float      | 1    | median error of repeated, held and alternating commands          |
     | `space_error`            | float      | 1    | part of `path_error` that more nodes per limb would remove       |
     | `time_error`             | float      | 1    | part of it that shorter time steps would remove                  |
     | `error_estimate`         | float      | m    | estimate of the hub's error, only with `error_bars`              |
@@ -347,8 +347,8 @@ class SeastarSwimEnv(OneRobotEnv):
     error_bars: Whether `info` has `error_estimate`, from a finer copy of the robot that is simulated alongside. The
         trajectory stays bit-identical; a step takes three to five times as long.
     decision_period: Time between decisions [s]. None means a stroke, the period of the actuator. If no `scene` is given
-        and the time is not 1 s, the robot has `SmaWires`. Actuators without memory refuse a time in which limbs would
-        not come to rest.
+        and the time is not 1 s, the robot has `SmaWires` and limbs that damp as soft silicone does. Actuators without
+        memory refuse a time in which limbs would not come to rest.
     observe_actuators: Whether observations have the memory of the actuators.
     headings: Target headings at the waypoints, a `HeadingTargets`: along the legs, at random, or given angles. None
         means none.

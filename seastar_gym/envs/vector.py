@@ -14,7 +14,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from seastar_gym.accuracy.certificate import Certificate
-from seastar_gym.accuracy.chapters import warn_uncertified
+from seastar_gym.accuracy.chapters import warn_uncertified, warn_undamped
 from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
 from seastar_gym.envs.commands import Actions, as_array, sampling_mask, to_commands
 from seastar_gym.envs.options import HeadingTargets, Plain, RewardWeights, SwimOptions
@@ -470,6 +470,7 @@ def swimmers(
     """
     robots = Robots(chosen_task(task, **waypoints), options, n_robots, threads, split=split)
     if robots.task.tells_errors:
+        warn_undamped(robots.scene, robots.timed)
         warn_uncertified(robots.scene, robots.options.fidelity_of_scene, robots.certificate, robots.timed)
     return robots
 

@@ -19,13 +19,14 @@ from seastar_gym.accuracy import command, measure, timed_certificate
 from seastar_gym.accuracy import measure as commands
 from seastar_gym.accuracy.certificate import _digest, resolved
 from seastar_gym.envs.attributes import RobotsEnv
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.scene_file import load_scene
 
 SMALL_ROBOT = Seastar(limb_length=0.08)
 SCENE = Scene(SMALL_ROBOT)
-WIRED = replace(Scene.preset("fast"), actuator=SmaWires())
+WIRED = make_scene(None, "fast", 0.2)
 REPEATED = ("repeated ternary", "alternating ternary")
 """Classes of a certificate's commands that `gait_error` is of."""
 SAMPLES = 2
@@ -265,7 +266,10 @@ def test_a_certificate_is_of_strokes_or_of_decisions(certificate):
             assert np.all(env.reset(seed=0)[1]["gait_error"] == wired.settings[0].error(REPEATED))
     timed = timed_certificate(0.2)
     info = gym.make("SeastarSwim-v0", scene=WIRED, certificate=timed, decision_period=0.2).reset(seed=0)[1]
-    assert info["gait_error"] == timed.of(WIRED).errors["repeated"] and "batch_real_time_factor" not in info
+    assert (
+        info["gait_error"] == timed.of(WIRED).error(timed.repeated(timed.actions))
+        and "batch_real_time_factor" not in info
+    )
 
 
 @pytest.mark.parametrize(
@@ -304,6 +308,20 @@ def test_where_nothing_is_promised_a_warning_says_what_to_do(certificate):
         warnings.simplefilter("error")
         gym.make("SeastarSwim-v0", fidelity="fast")
         gym.make("SeastarSwim-v0", scene=WIRED, **timed)
+
+
+def test_limbs_that_damp_nothing_are_told_where_decisions_are_no_strokes():
+    wires, damped = replace(Scene.preset("fast"), actuator=SmaWires()), Seastar(relaxation_time=1e-4)
+    with pytest.warns(UserWarning, match=r"damp nothing.* every 0.2 s .*steps of 5 ms .* by \d.* %.*relaxation_time"):
+        env = gym.make("SeastarSwim-v0", scene=wires, decision_period=0.2)
+    known = timed_certificate(0.2, wires).of(wires)
+    assert (
+        env.reset(seed=0)[1]["gait_error"] == known.error(timed_certificate(0.2).repeated(tuple(known.errors))) > 0.01
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gym.make("SeastarSwim-v0", scene=replace(wires, robot=damped), decision_period=0.2)
+        gym.make("SeastarSwim-v0", scene=wires)
 
 
 # The command

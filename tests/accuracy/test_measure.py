@@ -90,15 +90,22 @@ def test_space_and_time_are_errors_against_many_nodes_and_short_steps():
     assert (whole <= found.space[0].path + found.time[0].path + 1e-12).all() and whole.max() > 1e-3
 
 
-def test_decisions_are_told_at_whole_seconds(monkeypatch):
+def test_decisions_are_told_one_by_one_and_paths_at_whole_seconds():
     scene = at(replace(SCENE, actuator=SmaWires()), Resolution("continuum", 5, Numerics("sdirk2", 2e-2, 1e-6)))
     drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (4, 2, 5))
     (swum,) = measure.swim_all([scene], drawn, period=0.5)
-    np.testing.assert_array_equal(swum.hub, measure.swim(scene, drawn, 0.5).hub[[1, 3]])
+    np.testing.assert_array_equal(swum.hub, measure.swim(scene, drawn, 0.5).hub)
+    for period, n, seen in (
+        (None, 3, [0, 1, 2]),
+        (0.5, 4, [1, 3]),
+        (0.3, 33, [*range(2, 33, 3)]),
+        (0.13, 17, [0, 8, 16]),
+    ):
+        assert [*range(n)][measure.whole_seconds(period, n)] == seen
     simulator = Simulator(scene, 2)
     simulator.advance(0.5, drawn[0])
     simulator.advance(0.5, drawn[1])
-    np.testing.assert_array_equal(swum.hub[0], simulator.hub_position())
+    np.testing.assert_array_equal(swum.hub[1], simulator.hub_position())
 
 
 # Long swims: which settings gather energy, told apart from noise, and in any current.

@@ -16,7 +16,7 @@ from seastar_gym import (
     SymmetryReduction,
     ThermalSma,
 )
-from seastar_gym.accuracy.chapters import IN_TIME
+from seastar_gym.accuracy.chapters import ERRORS
 from seastar_gym.envs.commands import action_masks, to_commands
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -53,7 +53,7 @@ def test_other_robots_and_wires_and_times_that_were_not_measured_are_promised_no
     env = SeastarSwimEnv(scene=scene, fidelity=fidelity, decision_period=period)
     batch = SeastarSwimVectorEnv(2, scene=scene, fidelity=fidelity, decision_period=period)
     for info in (env.reset(seed=0)[1], batch.reset(seed=0)[1], batch.step(np.zeros((2, 5), int))[4]):
-        assert all(np.isnan(info[name]).all() for name in IN_TIME) and "batch_real_time_factor" not in info
+        assert all(np.isnan(info[name]).all() for name in ERRORS) and "batch_real_time_factor" not in info
 
 
 # Heat

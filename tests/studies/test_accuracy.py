@@ -1,17 +1,18 @@
 """The accuracy study: its sequences, its promises against errors that cancel, and what it stores."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene
-from seastar_gym.accuracy import Certificate, timed_certificate
-from seastar_gym.accuracy.measure import CLASSES, Errors, path_lengths, swim
+from seastar_gym.accuracy import Certificate
+from seastar_gym.accuracy.measure import Errors, path_lengths, swim
 from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene.numerics import PRESETS, Resolution
 from studies import accuracy as study
-from studies.accuracy import MILLI, PERIODS, Plan, Row, gaits, pentagon, random_gaits, random_sequences
+from studies.accuracy import MILLI, Plan, Row, gaits, pentagon, random_gaits, random_sequences
 from studies.command import main
 
 KINDS = ("path", "straight", "gait", "slow", "heading", "end")
@@ -52,9 +53,23 @@ def test_sequences_are_what_their_names_say_and_half_of_the_random_ones_are_acti
     assert found.kinds == ("gait",) * 3 + ("slow",) * 3 + ("gait",) * 3 and (once == once[0]).all()
     np.testing.assert_array_equal(slow, study.SLOW * once)
     np.testing.assert_array_equal(alternating, np.tile(alternating[:2], (5, 1, 1)))
-    timed = study.timed_sequences(0.2, 2)
-    repeats = (timed[:5] == timed[5:10]).all(axis=(0, 2)).tolist()
-    assert timed.shape == (50, 4, 5) and repeats == [False, False, True, True]
+
+
+@pytest.mark.parametrize("period", [0.1, 0.15, 0.3, 0.5])
+def test_commands_in_time_are_what_their_classes_say(period):
+    commands, places = study.timed_sequences(period, 8)
+    drawn = {name: commands[:, place] for name, place in places.items()}
+    n, a_second = round(study.SECONDS / period), round(1.0 / period)
+    assert sum(each.shape[1] for each in drawn.values()) == commands.shape[1] and np.abs(commands).max() <= 1.0
+    assert all(each.shape == (n, 8, 5) for name, each in drawn.items() if name != "repeated command")
+    repeated = {study.symmetric_form(command) for command in drawn["repeated command"][-1]}
+    assert len(repeated) == drawn["repeated command"].shape[1] == 30 - 2 and study.symmetric_form(STRAIGHT) in repeated
+    assert (np.sort(drawn["pairs"], axis=-1) == study.PAIR).all()
+    np.testing.assert_array_equal(drawn["repeated second"][a_second:], drawn["repeated second"][:-a_second])
+    changes = (np.diff(drawn["held"], axis=0) != 0.0).any(axis=-1).sum(axis=0).reshape(len(study.HELD), 2)
+    most = np.array([math.ceil(study.SECONDS / each) - 1 for each in study.HELD])
+    assert (changes <= most[:, None]).all() and (changes[0] == 0).all() and (changes[-1] >= 6).all()
+    assert (drawn["on-off"] == 0.0).all(axis=(1, 2)).mean() == pytest.approx(0.5, abs=0.05)
 
 
 def test_largest_errors_leave_gaits_and_slow_swims_out_of_the_path_error():
@@ -82,11 +97,12 @@ def test_a_promise_is_the_worst_of_all_that_are_no_coarser_and_sums_space_and_ti
     assert rows[1].promise("path") == pytest.approx(0.011) and rows[1].promise("slow") == pytest.approx(1.5 * 0.011)
 
 
-def test_random_and_repeated_commands_in_time_are_bounded_apart():
-    space, in_time = np.array([0.01, 0.03, 0.02, 0.5, 0.4, 0.1]), np.array([0.02, 0.01, 0.01, 0.1, 0.3, 0.1])
-    found = study.timed_setting(PRESETS["fast"], space, in_time)
+def test_every_class_in_time_is_bounded_by_its_worst_sum_of_space_and_time():
+    space = {"random": np.array([0.01, 0.03, 0.02]), "held": np.array([0.02])}
+    in_time = {"random": np.array([0.02, 0.01, 0.01]), "held": np.array([0.001])}
+    found = study.joint([study.Timed(PRESETS["fast"], space, in_time)] * 2).setting()
     assert (found.space_error, found.time_error) == (0.03, 0.02)
-    assert found.errors == {"random": 0.05, "repeated": 0.8} and found.typical == {"random": 0.03, "repeated": 0.6}
+    assert found.errors == {"random": 0.04, "held": 0.021} and found.typical == {"random": 0.03, "held": 0.021}
 
 
 @pytest.mark.slow
@@ -94,42 +110,47 @@ def test_a_study_stores_every_preset_and_nothing_whose_limit_is_in_doubt(tmp_pat
     monkeypatch.setattr(study, "Plan", lambda: TINY)
     (tmp_path / "shipped").mkdir()
     monkeypatch.setattr(study.chapter, "FOLDER", tmp_path / "shipped")
-    assert main(["accuracy", "--store", "--periods", "1"]) == 2
+    assert main(["accuracy", "--store", "--only", "strokes"]) == 2
     assert "nothing is stored" in capsys.readouterr().err and not [*(tmp_path / "shipped").iterdir()]
     monkeypatch.setattr(study, "LARGEST_DOUBT", 1.0)
-    assert main(["accuracy", "--store", "--periods", "1", "0.5"]) == 0
-    strokes, timed = (Certificate.load(tmp_path / "shipped" / name) for name in ("strokes.json", "wires_0.5s.json"))
+    assert main(["accuracy", "--store", "--only", "strokes", "wires"]) == 0
+    strokes, timed = (Certificate.load(tmp_path / "shipped" / name) for name in ("strokes.json", "wires.json"))
     assert [each.resolution for each in strokes.settings[: len(PRESETS)]] == [*PRESETS.values()]
-    assert strokes.limit_error >= strokes.settings[3].space_error / 3.0 and timed.decision_period == 0.5
+    assert strokes.limit_error >= strokes.settings[3].space_error / 3.0 and timed.measured_over["periods"] == [0.2, 0.5]
     for each in strokes.settings:
         assert each.errors["random"] == pytest.approx(each.space_error + each.time_error, rel=1e-5)
         assert 0.0 < each.typical["random"] <= 1.11 * each.errors["random"] and each.speed > 0.0
     assert [each.resolution for each in timed.settings] == [*PRESETS.values()]
     assert 0.0 < timed.settings[1].space_error < timed.settings[0].space_error < 0.2
-    with pytest.raises(ValueError, match="--store needs the whole study"):
-        study.Options(quick=True, store=True)
+    for wrong, words in (({"quick": True, "store": True}, "needs the whole study"), ({"only": ("air",)}, "not air")):
+        with pytest.raises(ValueError, match=words):
+            study.Options(**wrong)
 
 
-def test_fresh_sequences_that_exceed_a_promise_are_counted(monkeypatch):
+def test_errors_of_fresh_sequences_are_told_over_the_promise(monkeypatch):
     monkeypatch.setattr(study.measuring, "SHORT", Numerics("implicit-midpoint", 1e-3, 1e-7))
     known = study.in_table("fast")
-    assert max(study.exceeding("fast", 2).values()) == 0.0
-    monkeypatch.setattr(study, "in_table", lambda _: replace(known, errors=dict.fromkeys(known.errors, 0.0)))
-    assert study.exceeding("fast", 2) == dict.fromkeys(CLASSES, 1.0)
+    found = study.exceeding("fast", 2)
+    assert 0.0 < max(map(np.max, found.values())) < 1.0
+    half = replace(known, errors={name: 0.5 * each for name, each in known.errors.items()})
+    monkeypatch.setattr(study, "in_table", lambda _: half)
+    for name, each in study.exceeding("fast", 2).items():
+        np.testing.assert_allclose(each, 2.0 * found[name])
 
 
 # What comes with the package
 
 
-@pytest.mark.parametrize("period", PERIODS)
-def test_certificates_in_time_are_of_the_whole_study_and_dearer_presets_err_less(period):
-    stored = timed_certificate(period)
-    assert stored.decision_period == period and stored.samples == stored.measured_over["random"] == Plan().timed
+@pytest.mark.parametrize("robot", study.ROBOTS)
+def test_certificates_in_time_are_of_the_whole_study_and_dearer_presets_err_less(robot):
+    stored, plan = study.certificate_of(robot), Plan()
+    n = study.timed_limit(robot, plan)[1]
+    assert stored.measured_over["periods"] == [*plan.periods] and stored.samples == n * len(plan.periods)
     assert [each.resolution for each in stored.settings] == [*PRESETS.values()]
-    for column in ("errors", "typical"):
-        for kind in ("random", "repeated"):
-            found = [getattr(each, column)[kind] for each in stored.settings[:4]]
-            assert found == sorted(found, reverse=True), (column, kind)
+    for of_periods in zip(*stored.measured_over["largest and median by period"].values(), strict=False):
+        assert set(of_periods) <= set(PRESETS)
+    worst = [each.error(stored.actions) for each in stored.settings[:4]]
+    assert worst[0] > worst[2] > worst[3] and worst[1] > worst[2]
 
 
 def test_a_path_that_goes_nowhere_counts_as_a_slow_one():
