@@ -513,6 +513,7 @@ def paired(rng: np.random.Generator, n: int, period: float) -> Floats:
 
 
 PAIR = [-1.0, 0.0, 0.0, 0.0, 1.0]
+"""Numbers of a command of "pairs", sorted."""
 DRIVERS = {"SeastarSwimTimed-v0": ("learned", "planner"), "SeastarSwimTimedModerate-v0": ("learned", "greedy")}
 """Ids, and the bundled agents whose commands are swum again."""
 
@@ -627,7 +628,7 @@ def joint(some: Sequence[Timed]) -> Timed:
 
 
 def in_time(robot: str, plan: Plan) -> Certificate:
-    """Errors of all presets of one of ROBOTS, each the largest of all PERIODS."""
+    """Errors of all presets of one of ROBOTS, each the largest of all periods of the plan."""
     began = time.process_time()
     of_periods = [every(robot, period, plan) for period in plan.periods]
     settings = tuple(joint(some).setting() for some in zip(*of_periods, strict=True))

@@ -166,13 +166,14 @@ def read_certificate(
 
 
 def warn_undamped(scene: Scene, decision_period: float | None) -> None:
-    """Warn of limbs that damp nothing where decisions are no strokes: they resonate with decisions.
+    """Warn of limbs that damp nothing where decisions are shorter than strokes: they resonate with decisions.
 
     Called two calls below where an environment is made, which the warning names.
     """
     relaxation_time = scene.robot.relaxation_time
     damped = relaxation_time is not None and bool(np.min(relaxation_time) > 0.0)
-    if decision_period is None or damped or scene.numerics.step <= SHORT_STEP:
+    in_strokes = decision_period is None or decision_period >= scene.actuator.period
+    if in_strokes or damped or scene.numerics.step <= SHORT_STEP:
         return
     errors = errors_in_info(scene, None, decision_period)["gait_error"]
     told = "" if math.isnan(errors) else f", by {100 * errors:.2g} % of the hub's path for the chapter's robot"

@@ -147,8 +147,6 @@ def test_certificates_in_time_are_of_the_whole_study_and_dearer_presets_err_less
     n = study.timed_limit(robot, plan)[1]
     assert stored.measured_over["periods"] == [*plan.periods] and stored.samples == n * len(plan.periods)
     assert [each.resolution for each in stored.settings] == [*PRESETS.values()]
-    for of_periods in zip(*stored.measured_over["largest and median by period"].values(), strict=False):
-        assert set(of_periods) <= set(PRESETS)
     worst = [each.error(stored.actions) for each in stored.settings[:4]]
     assert worst[0] > worst[2] > worst[3] and worst[1] > worst[2]
 
