@@ -1,26 +1,14 @@
 """Certificates of the chapter's robot in the chapter's water, which come with the package.
 
 `python -m studies.accuracy --store` measures that of strokes, and those of wires that are commanded several times a
-second, whose settings are the fidelities. Classes of strokes:
+second. Classes of commands are those of commands.py, and
 
-random      also the straight swim, the four pairs of Fig. 13.8 and the pentagon
-repeated    repetitions of a command and alternations of two, with half as much again for those that were not measured
-small       random and repeated commands of a tenth of the amplitude, whose paths are short, with half as much again
-straight    the straight swim alone
+chapter's               of strokes: the straight swim, the four pairs of Fig. 13.8 and the pentagon
+repeated command        every command of -1, 0 and +1, all the time, in strokes, too ("repeated ternary")
+policies                of decisions: what bundled policies, the planner and the greedy rule do
 
-Classes of wires, each over times of 0.1 to 0.5 s between decisions:
-
-random, pairs       another command for every decision: of all limbs, of two
-repeated second     a second of random commands, repeated
-held                a command for 1, 2, 5 or 10 s
-on-off              a command for a second, then a second of rest
-policies            what bundled policies, the planner and the greedy rule do
-repeated command    every command of -1, 0 and +1, all the time
-
-Speeds are of `Certificate.machine`. An error bounds 95 % of random sequences with the confidence that `confidence`
-returns, so it is no bound for all: docs/numerics.md says how many of fresh ones exceed it.
-
-Errors and speed that `info` tells: of the package's own certificates, or of a user's.
+Speeds are of `Certificate.machine`. Errors and speed that `info` tells are of the package's own certificates, or of a
+user's: `path_error` and `gait_error` are promises, `typical_error` and `typical_gait_error` medians.
 """
 
 import math
@@ -34,7 +22,7 @@ import numpy as np
 
 from seastar_gym.accuracy.certificate import CLASSES_VERSION, Certificate, as_certificate, physics
 from seastar_gym.scene import Scene, Seastar
-from seastar_gym.scene.checks import require_flag, require_kind, require_number, shown
+from seastar_gym.scene.checks import require_flag, require_kind, require_number, require_period, shown
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 
@@ -65,8 +53,9 @@ def scene_for(
     any_gait: bool = False,
     robot: Seastar | None = None,
     certificate: Certificate | str | PathLike[str] | None = None,
+    decision_period: float | None = None,
 ) -> Scene:
-    """Scene at the fastest measured setting whose path error is at most `error`.
+    """Scene at the fastest measured setting that promises a path error of at most `error`.
 
     The error is that of the hub's path against infinitely many nodes and infinitely short steps, as a fraction of the
     path's length. ValueError if no measured setting keeps it, or if the robot was not measured.
@@ -76,17 +65,33 @@ def scene_for(
     certificate: `Certificate` of the scene, or the file of one, whose errors are those of any gait. It lapses where the
         robot or the version of the package differs. None means the package's own, which is of the chapter's robot and
         water.
+    decision_period: Time between decisions [s] that are shorter than a stroke. None means strokes, or what a
+        certificate has.
 
-    >>> scene_for(0.002).robot.nodes_per_limb
+    >>> scene_for(0.005).robot.nodes_per_limb
     28
+    >>> scene_for(0.005, decision_period=0.2).robot.nodes_per_limb
+    12
     >>> scene_for(1e-6)
     Traceback (most recent call last):
     ValueError: No measured setting keeps the path error below 0.0001 %: the best, ...
     """
     require_flag("any_gait", any_gait)
-    known = chapters_certificate() if certificate is None else as_certificate(certificate)
+    known = _of_period(decision_period) if certificate is None else as_certificate(certificate)
     classes = known.promised + known.repeated(tuple(known.settings[0].errors)) if any_gait else known.promised
     return known.for_error(error, classes, robot)
+
+
+def _of_period(decision_period: float | None) -> Certificate:
+    """The package's certificate for a time between decisions [s]; ValueError where it has none."""
+    require_period(decision_period)
+    stroke = Scene().actuator.period
+    if decision_period is None or decision_period == stroke:
+        return chapters_certificate()
+    known = timed_certificate(decision_period)
+    if known is None:
+        raise ValueError(f"No errors of decisions every {decision_period:g} s were measured: seastar certify does.")
+    return known
 
 
 def timed_certificate(decision_period: float, scene: Scene | None = None) -> Certificate | None:
@@ -128,7 +133,7 @@ def errors_in_info(
     gaits = known.repeated(known.actions)
     others = [name for name in known.actions if name not in gaits]
     found = {
-        "path_error": setting.error(others), "gait_error": setting.error(gaits),
+        "path_error": setting.promise(others), "gait_error": setting.promise(gaits),
         "typical_error": setting.typical_error(others), "typical_gait_error": setting.typical_error(gaits),
         "space_error": setting.space_error, "time_error": setting.time_error,
     }  # fmt: skip
@@ -170,17 +175,18 @@ def warn_undamped(scene: Scene, decision_period: float | None) -> None:
 
     Called two calls below where an environment is made, which the warning names.
     """
-    relaxation_time = scene.robot.relaxation_time
+    relaxation_time, stroke = scene.robot.relaxation_time, scene.actuator.period
     damped = relaxation_time is not None and bool(np.min(relaxation_time) > 0.0)
-    in_strokes = decision_period is None or decision_period >= scene.actuator.period
-    if in_strokes or damped or scene.numerics.step <= SHORT_STEP:
+    if decision_period is None or decision_period >= stroke or damped or scene.numerics.step <= SHORT_STEP:
         return
+    from seastar_gym.accuracy.resonance import resonances, told  # simulates, and most scenes are damped
+
     errors = errors_in_info(scene, None, decision_period)["gait_error"]
-    told = "" if math.isnan(errors) else f", by {100 * errors:.2g} % of the hub's path for the chapter's robot"
+    of_chapters = "" if math.isnan(errors) else f", by up to {100 * errors:.2g} % of the hub's path"
     warnings.warn(
-        f"The limbs of this scene damp nothing, so that decisions every {decision_period:g} s drive their resonances, "
-        f"which steps of {1e3 * scene.numerics.step:g} ms misplace{told}: "
-        "Seastar(relaxation_time=relaxation_time(0.1, 10.0)) damps them as soft silicone does.",
+        f"The limbs of this scene damp nothing, so that decisions drive their resonances, which steps of "
+        f"{1e3 * scene.numerics.step:g} ms misplace{of_chapters}: Seastar(relaxation_time=relaxation_time(0.1, 10.0)) "
+        f"damps them as soft silicone does.{told(resonances(scene, decision_period), decision_period)}",
         stacklevel=4,
     )
 

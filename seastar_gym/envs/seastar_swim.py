@@ -334,7 +334,8 @@ class SeastarSwimEnv(OneRobotEnv):
         `seastar_gym.envs.paths.register_path` added - or waypoints [m], shape (n, 2), from the origin.
         `reset(options={"path": ...})` chooses another path for one episode.
     actions: How commands are written: "limbs", "joint", "pairs" or "continuous", see above.
-    fidelity: Accuracy of the simulation: "fast", "balanced" (default), "accurate", "reference" or "chapter". It chooses
+    fidelity: Accuracy of the simulation: "rapid", "fast", "balanced" (default), "accurate", "reference" or
+        "chapter". It chooses
         nodes per limb, discretisation and numerics, as far as `scene` names none, see `Scene.at`. It is refused if
         it contradicts the numerics that `scene` names.
     scene: Robot, actuators, fluid and numerics; by default the chapter's robot in water.

@@ -14,7 +14,7 @@ from seastar_gym.scene.summary import html_table, short_repr
 SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
 SCHEME_NAMES: list[str] = [*get_args(SchemeName)]
 """Schemes that a scene may name: those of the package, and what `register_scheme` adds."""
-Fidelity = Literal["fast", "balanced", "accurate", "reference", "chapter"]
+Fidelity = Literal["rapid", "fast", "balanced", "accurate", "reference", "chapter"]
 
 MAX_STEPS = 10_000_000
 """Largest number of time steps in a stroke. More would take minutes even for one robot."""
@@ -81,7 +81,7 @@ class Numerics:
 
     @classmethod
     def preset(cls, fidelity: Fidelity) -> Numerics:
-        """Numerics of a fidelity: "fast", "balanced", "accurate", "reference", or "chapter" for those of the chapter.
+        """Numerics of a fidelity: "rapid", "fast", "balanced", "accurate", "reference", or "chapter" for the chapter's.
 
         What a fidelity promises holds with its nodes per limb and its discretisation: `Scene.preset` chooses them, too.
         """
@@ -106,19 +106,20 @@ DAMPING = 0.003
 grow (docs/numerics.md, "Long-run energy drift")."""
 
 
-def _midpoint(step: float, newton_tolerance: float) -> Numerics:
-    return Numerics("implicit-midpoint", step, newton_tolerance, damping=DAMPING)
+def _midpoint(step: float, newton_tolerance: float, damping: float = DAMPING) -> Numerics:
+    return Numerics("implicit-midpoint", step, newton_tolerance, damping=damping)
 
 
 PRESETS: dict[Fidelity, Resolution] = {
+    "rapid": Resolution("continuum", 7, _midpoint(10e-3, 1e-4, 0.05)),
     "fast": Resolution("continuum", 7, _midpoint(5e-3, 1e-5)),
     "balanced": Resolution("continuum", NODES["continuum"], _midpoint(5e-3, 1e-5)),
     "accurate": Resolution("continuum", 19, _midpoint(1e-3, 1e-6)),
     "reference": Resolution("continuum", 37, _midpoint(0.3e-3, 1e-8)),
     "chapter": Resolution("chapter", NODES["chapter"], Numerics("implicit-euler", 3e-3)),
 }
-"""`fast` and `balanced` lie on or near the front that `python -m studies.accuracy` measures. `accurate` and `reference`
-have steps so short that longer ones on finer meshes reach their errors faster, see `scene_for`."""
+"""They lie on or near the front of strokes that `python -m studies.front` finds. For decisions, `scene_for` knows
+settings that reach the errors of `accurate` and `reference` faster."""
 
 DEFAULT_FIDELITY: Fidelity = "balanced"
 DEFAULT = PRESETS[DEFAULT_FIDELITY].numerics

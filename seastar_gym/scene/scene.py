@@ -338,7 +338,8 @@ class Scene:
     def preset(cls, fidelity: Fidelity) -> Scene:
         """The chapter's robot and water with the nodes per limb, discretisation and numerics of a fidelity.
 
-        "fast", "balanced", "accurate" and "reference" are of the continuum, "chapter" is the chapter's discretisation.
+        "chapter" is the chapter's discretisation, the others are of the continuum: "rapid", "fast", "balanced",
+        "accurate" and "reference".
         `seastar_gym.accuracy.chapters_certificate().of(scene)` returns the measured errors and speed of each.
 
         >>> Scene.preset("fast")
