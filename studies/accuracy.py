@@ -150,9 +150,14 @@ class Table:
 
     def settings(self) -> list[Resolution]:
         """Resolutions that are measured, presets first."""
-        return list(dict.fromkeys([*PRESETS.values(), *(front.chosen(self.front) if self.front else ())]))
+        more = [*TRAINED_AT, *front.chosen(self.front)] if self.front else []
+        return list(dict.fromkeys([*PRESETS.values(), *more]))
 
 
+TRAINED_AT = [
+    each._replace(numerics=replace(each.numerics, damping=0.0)) for each in (PRESETS["fast"], PRESETS["balanced"])
+]
+"""Settings that bundled policies were trained at, without numerical damping."""
 MANY = 37
 """Nodes per limb of the preset with the shortest steps."""
 PERIODS = (0.1, 0.125, 0.15, 0.2, 0.25, 0.3, 0.5)
@@ -178,7 +183,7 @@ def worst(settings: Sequence[Setting]) -> Setting:
         return {key: max(each[key] for each in found) for key in found[0]}
 
     names = ("space_error", "time_error", "energy_growth", "heading_error", "end_error")
-    numbers = {name: float(np.fmax.reduce([getattr(each, name) for each in settings])) for name in names}
+    numbers: Any = {name: float(np.fmax.reduce([getattr(each, name) for each in settings])) for name in names}
     slowest = min(each.speed for each in settings)
     return replace(settings[0], errors=largest("errors"), typical=largest("typical"), speed=slowest, **numbers)
 

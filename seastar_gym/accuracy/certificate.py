@@ -135,7 +135,8 @@ class Setting:
 
     def __str__(self) -> str:
         adapted = "" if self.path_tolerance is None else f" adapted to {100 * self.path_tolerance:g} %"
-        return f'"{self.scheme}" at {1e3 * self.step:g} ms{adapted} with {self.nodes_per_limb} nodes per limb'
+        damped = "" if self.damping == 0.0 else f", damping {self.damping:g},"
+        return f'"{self.scheme}" at {1e3 * self.step:.4g} ms{adapted}{damped} with {self.nodes_per_limb} nodes per limb'
 
 
 def is_measured(number: object) -> bool:

@@ -186,7 +186,7 @@ def warn_undamped(scene: Scene, decision_period: float | None) -> None:
     warnings.warn(
         f"The limbs of this scene damp nothing, so that decisions drive their resonances, which steps of "
         f"{1e3 * scene.numerics.step:g} ms misplace{of_chapters}: Seastar(relaxation_time=relaxation_time(0.1, 10.0)) "
-        f"damps them as soft silicone does.{told(resonances(scene, decision_period), decision_period)}",
+        f"damps them as soft silicone does. {told(resonances(scene, decision_period), decision_period)}".strip(),
         stacklevel=4,
     )
 

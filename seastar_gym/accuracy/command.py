@@ -1,9 +1,10 @@
 """Measures what speed costs a scene in accuracy: `seastar certify my_scene.py --error 0.01`.
 
 The scene is a Python file that defines `scene`, a JSON file as `Scene.to_dict` writes it, or none for the chapter's. A
-file of Python is executed. Errors are those of the hub's path in space, in time and in sum, over classes of commands
-that are listed in seastar_gym/accuracy/measure.py, against swims with 37 nodes per limb and steps of 0.25 ms:
-the largest of a class, and the typical one, which is the median.
+file of Python is executed. Errors are those of the hub's path in space, in time and in sum, against swims with 37 nodes
+per limb and steps of 0.25 ms, over the classes of commands of seastar_gym/accuracy/commands.py: the largest of a class,
+the typical one, which is the median, and what is promised, 1.5 times the largest. With --decision-period, commands are
+given several times a stroke, and the modes of limbs that they drive are named.
 
 Writes a certificate (JSON), and a picture of error over speed where matplotlib is installed. `Certificate.load(file)`
 reads it, `certificate.for_error(0.01)` is the scene at the fastest setting that keeps 1 %, and
@@ -15,8 +16,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from seastar_gym.accuracy.certificate import Certificate
+from seastar_gym.accuracy.certificate import MARGIN, Certificate
 from seastar_gym.accuracy.measure import SAMPLES, Progress, certify
+from seastar_gym.accuracy.resonance import told as told_of
 from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.files import require_extra, save_figure, write_json
 from seastar_gym.scene.checks import require_error
@@ -25,21 +27,24 @@ from seastar_gym.scene.scene_file import load_scene
 
 def as_text(certificate: Certificate) -> str:
     """Table of the certificate, fastest settings first."""
-    bounds = {"sum": certificate.promised, "actions": certificate.actions, "small": ("small",)}
-    lines = [f"{'setting':44} {'space':>8} {'time':>8}" + "".join(f" {name + ' (typical)':>17}" for name in bounds)]
-    lines[0] += f" {'x real time':>12}"
+    repeated = certificate.repeated(certificate.promised)
+    classes = {"random": [each for each in certificate.promised if each not in repeated], "repeated": repeated}
+    heads = "".join(f" {name + ' (typical)':>18}" for name, some in classes.items() if some)
+    lines = [f"{'setting':52} {'space':>8} {'time':>8}{heads} {'promise':>8} {'x real time':>12}"]
     for each in sorted(certificate.settings, key=lambda each: -each.speed):
-        shares = " ".join(_percent(error, 6) for error in (each.space_error, each.time_error))
-        for some in bounds.values():
-            shares += f" {_percent(each.error(some), 6)} ({_percent(each.typical_error(some))})".ljust(18)
+        told = " ".join(_percent(error, 6) for error in (each.space_error, each.time_error))
+        for some in filter(None, classes.values()):
+            told += f" {_percent(each.error(some), 6)} ({_percent(each.typical_error(some))})".ljust(19)
         gathers = "" if each.is_energy_stable else "  gathers energy over long swims, not chosen"
-        lines.append(f"{each!s:44} {shares} {each.speed:>12,.0f}{gathers}")
+        promise = _percent(each.promise(certificate.promised), 6)
+        lines.append(f"{each!s:52} {told} {promise} {each.speed:>12,.0f}{gathers}")
     lines.append(
-        f"With {100 * certificate.confidence():.0f} % confidence, at most 5 % of the sequences of a class exceed its "
-        f"error ({certificate.samples} of each were measured); half of them exceed the typical one. The limit errs by "
-        f"{_percent(certificate.limit_error)}."
+        f"Errors are the largest of {certificate.samples} sequences of a class, and the median, of the class "
+        f"where it is largest. {MARGIN:g} times the largest is promised. The limit errs by {_percent(certificate.limit_error)}."
     )
-    return "\n".join(lines)
+    if (period := certificate.decision_period) is not None:
+        lines.append(told_of(certificate.measured_over.get("resonances", ()), period))
+    return "\n".join(filter(None, lines))
 
 
 def _percent(share: float, width: int = 0) -> str:
@@ -53,9 +58,9 @@ def draw(certificate: Certificate, file: Path) -> None:
     figure, axes = plt.subplots(figsize=(6.4, 4.4), layout="constrained")
     for nodes in sorted({each.nodes_per_limb for each in certificate.settings}):
         some = sorted((each for each in certificate.settings if each.nodes_per_limb == nodes), key=lambda x: x.speed)
-        errors = [100 * each.error(certificate.promised) for each in some]
+        errors = [100 * each.promise(certificate.promised) for each in some]
         axes.loglog([each.speed for each in some], errors, "o-", label=f"{nodes} nodes per limb")
-    axes.set(xlabel="x real time, batch on one core", ylabel="largest error of the hub's path [%]")
+    axes.set(xlabel="x real time, batch on one core", ylabel="promised error of the hub's path [%]")
     axes.grid(True, which="major", color="0.9")
     axes.legend(frameon=False)
     save_figure(figure, file, dpi=130)
@@ -100,7 +105,7 @@ def certify_as_asked(options: argparse.Namespace) -> None:
     if options.out.suffix == ".png":
         raise ValueError(f"{options.out} is where the picture goes: give --out a file such as certificate.json.")
     with progress_bar() as progress:
-        certificate = certify(scene, options.samples, options.seed, progress)
+        certificate = certify(scene, options.samples, options.seed, progress, options.decision_period)
     certificate.save(options.out)
     print(as_text(certificate))
     print(f"Written: {options.out}")
@@ -124,6 +129,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--error", type=float, help="print the fastest setting that keeps this error, such as 0.01")
     parser.add_argument("--samples", type=int, default=SAMPLES, help=f"sequences per class {DEFAULT}")
     parser.add_argument("--seed", type=int, default=0, help=f"seed of the sequences {DEFAULT}")
+    period = "time between decisions that are shorter than a stroke [s], of a scene with wires"
+    parser.add_argument("--decision-period", type=float, help=period)
     parser.add_argument("--out", type=Path, default=Path("certificate.json"), help=f"file to write {DEFAULT}")
     file = "JSON file for the scene at the setting that --error chooses, which train.py --scene takes"
     parser.add_argument("--chosen", type=Path, help=file)

@@ -97,6 +97,6 @@ def resonances(scene: Scene, decision_period: float) -> list[dict[str, float]]:
 
 
 def told(resonances: Sequence[Mapping[str, float]], decision_period: float) -> str:
-    """Sentence about some resonances, which follows another; empty for none."""
+    """Sentence about some resonances; empty for none."""
     modes = [f"{each['frequency']:.4g} Hz (near {each['multiple'] / decision_period:.4g} Hz)" for each in resonances]
-    return (modes and f"Decisions every {decision_period:g} s drive the robot's modes at {', '.join(modes)}.") or ""
+    return f"Decisions every {decision_period:g} s drive its modes at {', '.join(modes)}." if modes else ""

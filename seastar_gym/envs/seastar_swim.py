@@ -283,12 +283,12 @@ class SeastarSwimEnv(OneRobotEnv):
     | `waypoint_index`         | int        | 1    | number of waypoints reached so far                               |
     | `distance`               | float      | m    | distance of the hub from the current waypoint                    |
     | `cross_track_error`      | float      | m    | distance of the hub from the current leg of the path             |
-    | `path_error`             | float      | 1    | largest error of random commands, a fraction of the hub's path   |
-    | `gait_error`             | float      | 1    | largest error of repeated, held and alternating commands         |
+    | `path_error`             | float      | 1    | promised for random commands, as a fraction of the hub's path    |
+    | `gait_error`             | float      | 1    | promised for repeated, held and alternating commands             |
     | `typical_error`          | float      | 1    | median error of random commands                                  |
     | `typical_gait_error`     | float      | 1    | median error of repeated, held and alternating commands          |
-    | `space_error`            | float      | 1    | part of `path_error` that more nodes per limb would remove       |
-    | `time_error`             | float      | 1    | part of it that shorter time steps would remove                  |
+    | `space_error`            | float      | 1    | largest measured part of these that more nodes would remove      |
+    | `time_error`             | float      | 1    | largest measured part that shorter time steps would remove       |
     | `error_estimate`         | float      | m    | estimate of the hub's error, only with `error_bars`              |
     | `energy_growth`          | float      | 1    | of the kinetic energy since the first 20 strokes, see below      |
     | `batch_real_time_factor` | float      | 1    | simulated time per computing time, of a large batch on one core  |
@@ -312,9 +312,9 @@ class SeastarSwimEnv(OneRobotEnv):
     `energy_per_metre` is infinite where the route has not become shorter; heat and energy are NaN for actuators without
     a heating power.
     Errors from `path_error` to `time_error` are those of docs/accuracy.md for the chapter's robot at a fidelity. They
-    are NaN for other robots and scenes, unless a `certificate` has them, and for what was not measured. For timed
-    environments, errors are measured once a second, for decisions of 0.1 to 0.5 s; these have no
-    `batch_real_time_factor`. One robot alone is slower than a batch (docs/speed.md).
+    are NaN for other robots and scenes, unless a `certificate` has them, and for what was not measured. Decisions
+    within a stroke have errors every 0.1 to 0.5 s, and no `batch_real_time_factor`. One robot alone is slower than a
+    batch (docs/speed.md).
     `error_estimate` is of the current run, of any robot: the true error since the reset, of space and time, lies below
     it in about 95 % of strokes (docs/numerics.md); NaN after a failure.
     `energy_growth` is 1 in the first 20 strokes; a value well above 1 means that the time stepping adds energy
@@ -335,9 +335,8 @@ class SeastarSwimEnv(OneRobotEnv):
         `reset(options={"path": ...})` chooses another path for one episode.
     actions: How commands are written: "limbs", "joint", "pairs" or "continuous", see above.
     fidelity: Accuracy of the simulation: "rapid", "fast", "balanced" (default), "accurate", "reference" or
-        "chapter". It chooses
-        nodes per limb, discretisation and numerics, as far as `scene` names none, see `Scene.at`. It is refused if
-        it contradicts the numerics that `scene` names.
+        "chapter". It chooses nodes per limb, discretisation and numerics, as far as `scene` names none, see `Scene.at`.
+        It is refused if it contradicts the numerics that `scene` names.
     scene: Robot, actuators, fluid and numerics; by default the chapter's robot in water.
     reward: Weights of the reward's terms.
     waypoint_radius: Distance of the hub [m] within which a waypoint is reached.

@@ -15,13 +15,13 @@ from drawn import drawn
 from odd_values import taken
 from refusals import assert_refused, assert_told
 from seastar_gym import Body, Certificate, Contact, Numerics, Scene, Seastar, SmaPulse, SmaWires, scene_for
-from seastar_gym.accuracy import command, measure, timed_certificate
-from seastar_gym.accuracy import measure as commands
-from seastar_gym.accuracy.certificate import _digest, resolved
+from seastar_gym.accuracy import command, commands, measure, timed_certificate
+from seastar_gym.accuracy.certificate import MARGIN, _digest, resolved
 from seastar_gym.envs.attributes import RobotsEnv
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.scene.numerics import PRESETS
 from seastar_gym.scene.scene_file import load_scene
 
 SMALL_ROBOT = Seastar(limb_length=0.08)
@@ -78,11 +78,44 @@ def test_errors_of_every_class_bound_those_of_its_sequences_and_fall_with_the_no
     assert 0.0 < certificate.limit_error < fine.space_error < 0.6 * coarse.space_error
 
 
-def test_a_typical_error_is_the_median_of_a_class():
-    errors = np.zeros((len(commands.CLASSES), 5))
-    errors[1] = [0.05, 0.011, 0.9, 0.012, 0.04]
-    assert measure.by_class(errors.ravel(), 5)["random continuous"] == 0.9
-    assert measure.by_class(errors.ravel(), 5, np.median)["random continuous"] == 0.04
+def test_classes_of_several_batches_are_told_together_by_their_largest_and_median(monkeypatch):
+    """A typical error is the median of all sequences of a class; small commands count in no error of all."""
+    space = iter([[0.05, 0.9, 0.011], [0.012, 0.04, 7.0]])
+
+    def measured(scene, resolutions, limit, short, drawn, *_):
+        path = np.array(next(space))
+        off = measure.Errors(path, 0.5 * path, np.radians(path))
+        none = measure.Errors(*[np.zeros(3)] * 3)
+        return measure.Measured(None, 0.1 * path, [], [off], [none])
+
+    monkeypatch.setattr(measure, "measure", measured)
+    monkeypatch.setattr(measure, "real_time_factors", lambda *_: [3.0])
+    strokes = np.zeros((10, 3, 5))
+    batches = [commands.Batch({"a": strokes}), commands.Batch({"a": strokes[:, :2], "small": strokes[:, :1]})]
+    (found,), of_limit = measure.measure_settings(
+        SCENE, [PRESETS["fast"]], PRESETS["reference"], lambda *_: measure.SHORT, batches
+    )
+    assert found.errors == {"a": 0.9, "small": 7.0} and found.typical == {"a": 0.04, "small": 7.0}
+    assert (found.space_error, found.time_error, found.end_error, found.heading_error) == (0.9, 0.0, 0.45, 0.9)
+    assert found.speed == 3.0 and of_limit == 0.09 and found.promise("a") == MARGIN * 0.9
+
+
+def test_a_certificate_of_decisions_is_told_in_the_environment_of_that_period(few_settings, tmp_path):
+    scene = replace(SCENE, actuator=SmaWires())
+    certificate = seastar_gym.certify(scene, SAMPLES, decision_period=0.25)
+    assert set(certificate.settings[0].errors) == set(commands.DECISIONS) and certificate.decision_period == 0.25
+    assert all(0.0 < each.promise(certificate.promised) < np.inf for each in certificate.settings)
+    assert isinstance(certificate.measured_over["resonances"], list)
+    certificate.save(tmp_path / "mine.json")
+    chosen = scene_for(0.99, certificate=tmp_path / "mine.json")
+    timed = {"scene": chosen, "certificate": tmp_path / "mine.json"}
+    info = gym.make("SeastarSwim-v0", decision_period=0.25, **timed).reset(seed=0)[1]
+    assert info["gait_error"] == certificate.of(chosen).promise(certificate.repeated(certificate.promised))
+    with assert_refused("errors of decisions every 0.25 s, none of decisions every 0.2 s"):
+        gym.make("SeastarSwim-v0", decision_period=0.2, **timed)
+    for wrong, period in ((SCENE, 0.25), (scene, 1e-3), (scene, 1.5)):
+        with assert_refused("need wires"):
+            seastar_gym.certify(wrong, decision_period=period)
 
 
 @pytest.mark.slow
@@ -93,7 +126,7 @@ def test_a_robot_with_a_body_has_a_certificate_of_its_own(few_settings, tmp_path
     assert 0.0 < fine.space_error < 0.6 * coarse.space_error and all(each.speed > 0.0 for each in certificate.settings)
     certificate.save(tmp_path / "mine.json")
     read = Certificate.load(tmp_path / "mine.json")
-    best = read.for_error(max(each.error(certificate.promised) for each in certificate.settings))
+    best = read.for_error(max(each.promise(certificate.promised) for each in certificate.settings))
     assert read.of(best) is not None
     with assert_refused("another scene"):
         read.require_valid(replace(best, robot=replace(best.robot, body=Body(radius=0.02, mass=0.03))))
@@ -121,7 +154,7 @@ def test_a_scene_that_has_no_certificate_is_refused(scene, words):
 
 def test_for_error_is_the_fastest_setting_that_keeps_it_and_gathers_no_energy(certificate, file):
     assert all(each.energy_growth < 1.5 for each in certificate.settings)
-    errors = {each.error(certificate.promised): each for each in certificate.settings}
+    errors = {each.promise(certificate.promised): each for each in certificate.settings}
     fastest, best = max(certificate.settings, key=lambda each: each.speed), errors[min(errors)]
 
     def chosen(certificate, error):
@@ -245,8 +278,8 @@ def test_the_environment_tells_the_errors_of_a_certified_scene(certificate, file
     for given in (certificate, file, str(file)):
         env = gym.make("SeastarSwim-v0", scene=certificate.at(setting), certificate=given)
         info = env.reset(seed=0)[1]
-        assert max(info["path_error"], info["gait_error"]) == setting.error(certificate.actions)
-        assert info["gait_error"] == setting.error(REPEATED)
+        assert max(info["path_error"], info["gait_error"]) == setting.promise(certificate.actions)
+        assert info["gait_error"] == setting.promise(REPEATED)
         assert info["typical_gait_error"] == setting.typical_error(REPEATED)
         assert info["typical_error"] == setting.typical_error(tuple({*certificate.actions} - {*REPEATED}))
         assert (info["space_error"], info["time_error"]) == (setting.space_error, setting.time_error)
@@ -263,11 +296,11 @@ def test_a_certificate_is_of_strokes_or_of_decisions(certificate):
     for made in BOTH:
         for period in (None, 1.0):
             env = made(scene=wired.at(wired.settings[0]), certificate=wired, decision_period=period)
-            assert np.all(env.reset(seed=0)[1]["gait_error"] == wired.settings[0].error(REPEATED))
+            assert np.all(env.reset(seed=0)[1]["gait_error"] == wired.settings[0].promise(REPEATED))
     timed = timed_certificate(0.2)
     info = gym.make("SeastarSwim-v0", scene=WIRED, certificate=timed, decision_period=0.2).reset(seed=0)[1]
     assert (
-        info["gait_error"] == timed.of(WIRED).error(timed.repeated(timed.actions))
+        info["gait_error"] == timed.of(WIRED).promise(timed.repeated(timed.actions))
         and "batch_real_time_factor" not in info
     )
 
@@ -312,11 +345,13 @@ def test_where_nothing_is_promised_a_warning_says_what_to_do(certificate):
 
 def test_limbs_that_damp_nothing_are_told_where_decisions_are_no_strokes():
     wires, damped = replace(Scene.preset("fast"), actuator=SmaWires()), Seastar(relaxation_time=1e-4)
-    with pytest.warns(UserWarning, match=r"damp nothing.* every 0.2 s .*steps of 5 ms .* by \d.* %.*relaxation_time"):
+    with pytest.warns(
+    with pytest.warns(UserWarning, match=r"damp nothing.* 5 ms .* \d.* %.*relaxation_time.* 24.* Hz \(near 25 Hz\)"):
+    ):
         env = gym.make("SeastarSwim-v0", scene=wires, decision_period=0.2)
     known = timed_certificate(0.2, wires).of(wires)
     assert (
-        env.reset(seed=0)[1]["gait_error"] == known.error(timed_certificate(0.2).repeated(tuple(known.errors))) > 0.01
+        env.reset(seed=0)[1]["gait_error"] == known.promise(timed_certificate(0.2).repeated(tuple(known.errors))) > 0.01
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -1,5 +1,6 @@
 """The measurer of errors: commands, swims, errors of space and of time, and speeds."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -8,12 +9,12 @@ import pytest
 
 from currents import CURRENTS, velocity
 from seastar_gym import Body, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires, UniformCurrent
-from seastar_gym.accuracy import measure
-from seastar_gym.accuracy import measure as commands
+from seastar_gym.accuracy import commands, measure, resonance
 from seastar_gym.accuracy import measure as endurance
 from seastar_gym.accuracy import measure as water
 from seastar_gym.accuracy.certificate import Setting, at, resolved
 from seastar_gym.scene.numerics import Resolution
+from seastar_gym.scene.robot import SILICONE
 
 SCENE = Scene(Seastar(limb_length=0.08))
 
@@ -34,11 +35,33 @@ def test_classes_are_drawn_for_any_number_of_limbs(n_limbs):
     assert np.abs(classes["small"]).max() <= 0.1
 
 
-def test_a_speed_is_the_simulated_time_of_all_robots_over_processor_time_the_best_of_three_strokes(monkeypatch):
+@pytest.mark.parametrize("period", [0.1, 0.15, 0.3, 0.5])
+@pytest.mark.parametrize("n_limbs", [1, 2, 3, 5])
+def test_decisions_are_what_their_classes_say(n_limbs, period):
+    batch = commands.draw_batch(8, n_limbs, 0, period)
+    drawn, n, a_second = batch.commands, round(commands.SECONDS / period), round(1.0 / period)
+    assert all(each.shape == (n, 8, n_limbs) for each in drawn.values()) and np.abs(batch.joined).max() <= 1.0
+    two = [-1.0, *[0.0] * (n_limbs - 2), 1.0] if n_limbs > 1 else [1.0]
+    assert (np.sort(drawn["pairs"], axis=-1) == two).all()
+    np.testing.assert_array_equal(drawn["repeated second"][a_second:], drawn["repeated second"][:-a_second])
+    changes = (np.diff(drawn["held"], axis=0) != 0.0).any(axis=-1).sum(axis=0).reshape(len(commands.HELD), 2)
+    most = np.array([math.ceil(commands.SECONDS / each) - 1 for each in commands.HELD])
+    assert (changes <= most[:, None]).all() and (changes[0] == 0).all()
+    assert (drawn["on-off"] == 0.0).all(axis=(1, 2)).mean() == pytest.approx(0.5, abs=0.05)
+    assert (drawn["repeated command"] == drawn["repeated command"][0]).all()
+    numbers = batch.of_classes(np.arange(8 * len(drawn)))
+    assert list(numbers) == list(drawn) and numbers["pairs"].tolist() == [*range(8, 16)]
+
+
+@pytest.mark.parametrize("period", [None, 0.5])
+def test_a_speed_is_the_simulated_time_of_all_robots_over_processor_time_the_best_of_three_rounds(monkeypatch, period):
+    """Of two strokes, or of two seconds of decisions, after the first."""
     times = iter([0.0, 3.0, 3.0, 5.0, 5.0, 9.0])
     monkeypatch.setattr(measure.time, "thread_time", lambda: next(times))
-    scene = resolved(replace(SCENE, actuator=SmaPulse(0.3, 0.1, 0.4)), 5, Numerics("sdirk2", 2e-2, 1e-6))
-    assert measure.speed(scene, np.zeros((commands.STROKES, 6, scene.robot.n_limbs))) == 6 * 0.5 / 2.0
+    actuator = SmaPulse(0.3, 0.1, 0.4) if period is None else SmaWires()
+    scene = resolved(replace(SCENE, actuator=actuator), 5, Numerics("sdirk2", 2e-2, 1e-6))
+    factors = measure.real_time_factors([scene], np.zeros((commands.STROKES, 6, 5)), period)
+    assert factors == [6 * (2 * 0.5 if period is None else 2.0) / 2.0]
 
 
 def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):
@@ -78,14 +101,17 @@ def test_errors_of_paths_and_ends_are_over_the_length_of_the_converged_path_and_
 
 
 def test_space_and_time_are_errors_against_many_nodes_and_short_steps():
-    """Settings with one mesh have one error of space; the limit has none, nor has a setting of short steps in time."""
+    """Settings with one mesh have one error of space; that of the limit is what half its edges tell, and is in all."""
     short, coarse = Numerics("implicit-midpoint", 5e-3, 1e-8), Numerics("sdirk2", 2e-2, 1e-6)
     some = [Resolution("continuum", n, each) for n, each in ((5, coarse), (9, coarse), (5, short))]
     drawn = commands.draw_classes(1, 5, 3)
     found = measure.measure(SCENE, some, Resolution("continuum", 9, short), lambda *_: short, drawn)
     np.testing.assert_array_equal(found.space[0].path, found.space[2].path)
-    assert not found.space[1].path.any() and not found.time[2].path.any()
     lengths = measure.path_lengths(SCENE, found.limit.hub)
+    half = measure.swim(at(SCENE, some[2]), drawn)
+    np.testing.assert_allclose(found.of_limit, measure.errors(half, found.limit, lengths).path / 3.0)
+    np.testing.assert_array_equal(found.space[1].path, found.of_limit)
+    assert not found.time[2].path.any()
     whole = measure.errors(found.swims[0], found.limit, lengths).path
     assert (whole <= found.space[0].path + found.time[0].path + 1e-12).all() and whole.max() > 1e-3
 
@@ -106,6 +132,28 @@ def test_decisions_are_told_one_by_one_and_paths_at_whole_seconds():
     simulator.advance(0.5, drawn[0])
     simulator.advance(0.5, drawn[1])
     np.testing.assert_array_equal(swum.hub[1], simulator.hub_position())
+
+
+@pytest.mark.parametrize("n_limbs", [5, 3])
+def test_natural_frequencies_of_limbs_on_a_heavy_body_are_those_of_cantilevers(n_limbs):
+    """f = beta^2 / (2 pi L^2) sqrt(E I / (rho A)) with cos(beta) cosh(beta) = -1."""
+    robot = Seastar(n_limbs, 25, body=Body(radius=0.02, mass=1e3))
+    stiffness = np.sqrt(robot.youngs_modulus / robot.density) * robot.rod_radius / 2.0
+    exact = np.array([1.8751041, 4.6940911, 7.8547574]) ** 2 / (2.0 * np.pi * robot.limb_length**2) * stiffness
+    np.testing.assert_allclose(resonance.natural_frequencies(Scene(robot))[:3], exact, rtol=0.01)
+
+
+def test_modes_near_a_multiple_of_the_decisions_frequency_are_named_where_nothing_damps_them():
+    modes = resonance.natural_frequencies(Scene())
+    assert min(abs(each - 24.65) for each in modes) < 0.1  # docs/numerics.md, "Resonance"
+    found = resonance.resonances(Scene(), 0.2)
+    assert {"frequency": pytest.approx(24.65, abs=0.1), "multiple": 5} in found
+    for each in found:
+        assert any(mode == pytest.approx(each["frequency"], rel=1e-3) for mode in modes)
+        assert each["frequency"] == pytest.approx(each["multiple"] / 0.2, rel=resonance.NEAR)
+    assert "24.6" in resonance.told(found, 0.2) and "(near 25 Hz)" in resonance.told(found, 0.2)
+    damped = Scene(Seastar(relaxation_time=SILICONE))
+    assert resonance.resonances(damped, 0.2) == [] and resonance.told([], 0.2) == ""
 
 
 # Long swims: which settings gather energy, told apart from noise, and in any current.
