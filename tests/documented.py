@@ -185,6 +185,8 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "timed": dict(strokes=np.zeros((2, 5)), decision_period=0.5),
         "load_scene": dict(file=None),
         "timed_certificate": dict(decision_period=0.2),
+        "natural_frequencies": dict(scene=FAST),
+        "resonances": dict(scene=FAST, decision_period=0.2),
         "make_path": dict(path="random", rng=rng(0)),
         "SimulatedPlant": dict(simulator=Simulator(WIRES), sight=Sight()),
         "PlantSwim": dict(plant=named("SimulatedPlant")(Simulator(WIRES)), limits=named("Limits")(),

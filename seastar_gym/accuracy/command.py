@@ -38,9 +38,10 @@ def as_text(certificate: Certificate) -> str:
         gathers = "" if each.is_energy_stable else "  gathers energy over long swims, not chosen"
         promise = _percent(each.promise(certificate.promised), 6)
         lines.append(f"{each!s:52} {told} {promise} {each.speed:>12,.0f}{gathers}")
+    limit = _percent(certificate.limit_error)
     lines.append(
-        f"Errors are the largest of {certificate.samples} sequences of a class, and the median, of the class "
-        f"where it is largest. {MARGIN:g} times the largest is promised. The limit errs by {_percent(certificate.limit_error)}."
+        f"Errors are the largest of {certificate.samples} sequences of a class, and the median, of the class where it "
+        f"is largest. {MARGIN:g} times the largest is promised. The limit errs by {limit}."
     )
     if (period := certificate.decision_period) is not None:
         lines.append(told_of(certificate.measured_over.get("resonances", ()), period))

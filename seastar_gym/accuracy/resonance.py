@@ -85,11 +85,12 @@ def resonances(scene: Scene, decision_period: float) -> list[dict[str, float]]:
 
     None where limbs damp them. decision_period: Time between decisions [s].
     """
+    require_kind("scene", scene, Scene, "a Scene")
     require_number("decision_period", decision_period, "s")
     relaxation_time = 0.0 if scene.robot.relaxation_time is None else float(np.min(scene.robot.relaxation_time))
     found = []
     for frequency in natural_frequencies(scene):
-        multiple = round(frequency * decision_period)
+        multiple = round(min(frequency * decision_period, MOST + 1.0))
         near = 1 <= multiple <= MOST and abs(frequency * decision_period / multiple - 1.0) <= NEAR
         if near and 2.0 * math.pi * frequency * relaxation_time < DAMPED:
             found.append({"frequency": float(f"{frequency:.4g}"), "multiple": multiple})
