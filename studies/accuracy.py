@@ -163,7 +163,7 @@ MANY = 37
 PERIODS = (0.1, 0.125, 0.15, 0.2, 0.25, 0.3, 0.5)
 TABLES = {
     "strokes": Table(front.SCENES["strokes"], 32, front="strokes"),
-    "wires": Table(front.SCENES["decisions"], 16, PERIODS, (73, 0.2 * MILLI), 0.2 * MILLI, front="decisions"),
+    "wires": Table(front.SCENES["decisions"], 12, PERIODS, (73, 0.2 * MILLI), 0.4 * MILLI, front="decisions"),
     "undamped": Table(Scene(actuator=SmaWires()), 8, PERIODS),
 }
 """What is measured, by the names of the files."""
