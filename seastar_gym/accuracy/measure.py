@@ -1,7 +1,7 @@
 """Errors of space and time of any scene, over classes of commands, and whether its settings gather energy.
 
-Sequences of all classes of commands are swum with every resolution and numerics of SETTINGS, with the same nodes and
-very short steps, and with many nodes and very short steps: the last stand for the continuum. The error of space is that
+Sequences of all classes of commands are swum with every setting, of NODES and NUMERICS, with the same nodes and very
+short steps, and with many nodes and very short steps: the last stand for the continuum. The error of space is that
 of few nodes with short steps against many nodes, and what is left of the latter's own; that of time is that of a
 setting against short steps with the same nodes; both are largest distances of the hub at ends of strokes or decisions,
 as fractions of the length of the hub's path through the water. The sum of the two bounds the whole error, also where
