@@ -47,8 +47,8 @@ LIMIT = 37
 SCENES = {"strokes": Scene(), "decisions": Scene(Seastar(relaxation_time=SILICONE), actuator=SmaWires())}
 SHORT = {"strokes": 0.2e-3, "decisions": 0.4e-3}
 """Time steps of the swims that stand for the continuum [s]. Undamped limbs need shorter ones."""
-NOTICEABLE = 0.03
-"""A dearer setting joins the front if it reduces an error by at least this fraction."""
+NOTICEABLE, SHOWN = 0.03, 0.2
+"""A dearer setting joins the front, and stands in tables, if it reduces an error by at least this fraction."""
 FILE = "accuracy/front.json"
 
 
@@ -171,11 +171,11 @@ def points(results: Mapping[str, Any], kind: str) -> list[Point]:
     return sorted(found, key=lambda each: each.cost)
 
 
-def front(points: Iterable[Point], error: Callable[[Point], float]) -> list[Point]:
+def front(points: Iterable[Point], error: Callable[[Point], float], least: float = NOTICEABLE) -> list[Point]:
     """Pareto front of cost and error, cheapest first; a dearer setting needs a noticeably smaller error."""
     chosen: list[Point] = []
     for point in points:
-        if not chosen or error(point) < (1.0 - NOTICEABLE) * error(chosen[-1]):
+        if not chosen or error(point) < (1.0 - least) * error(chosen[-1]):
             chosen.append(point)
     return chosen
 
@@ -226,13 +226,14 @@ def picture(results: Mapping[str, Any], file: Path) -> None:
         some = points(results, kind)
         for begin, (name, colour) in SCHEMES.items():
             axes.plot(
-                *drawn(each for each in some if each.scheme.startswith(begin)), ".", ms=4, color=colour, label=name
+                *drawn(each for each in some if each.scheme.startswith(begin)), ".", ms=3, color=colour, label=name
             )
         axes.plot(*drawn(front(some, of_any)), color=CYCLE[0], lw=1.2, label="front")
         for fidelity in NAMES:
             x, y = drawn(each for each in some if keys_of(each.resolution) == keys_of(PRESETS[fidelity]))
-            axes.plot(x, y, "o", ms=5, color=INK)
-            axes.annotate(fidelity, (x[0], y[0]), (5, 5), textcoords="offset points", fontsize=8)
+            axes.plot(x, y, "o", ms=5, color=INK, zorder=3)
+            box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
+            axes.annotate(fidelity, (x[0], y[0]), (6, 5), textcoords="offset points", fontsize=8, bbox=box)
         axes.set(xscale="log", yscale="log", xlabel="speed over that of fast", title=title)
     both[0].set_ylabel("worst error of the hub's path [%]")
     both[0].legend(loc="upper left", fontsize=7)
@@ -246,9 +247,9 @@ def drawn(points: Iterable[Point]) -> tuple[list[float], list[float]]:
 
 
 def table(results: Mapping[str, Any], kind: str) -> str:
-    """The front of any command, and the presets."""
+    """Some of the front of any command, and the presets."""
     some = points(results, kind)
-    best, names = front(some, of_any), {keys_of(PRESETS[name]): name for name in NAMES}
+    best, names = front(some, of_any, SHOWN), {keys_of(PRESETS[name]): name for name in NAMES}
     rows = []
     for each in some:
         name = names.get(keys_of(each.resolution))
