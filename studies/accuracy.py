@@ -4,7 +4,7 @@
 decisions every 0.1 to 0.5 s, for robots with `SmaWires` whose limbs damp as soft silicone does, and whose limbs damp
 nothing. Settings are the presets, and those of the front that `studies.front` finds. Errors are against the continuum:
 infinitely many nodes per limb and infinitely short steps; seastar_gym/accuracy/measure.py defines them. `--store`
-writes the tables of `seastar_gym.accuracy.chapters`.
+writes the tables of `seastar_gym.accuracy.chapters`, and `--store --speeds` only their speeds.
 
 `--fresh` swims sequences and decision periods that no table used, and keeps how many err more than is promised.
 """
@@ -26,7 +26,15 @@ from seastar_gym.accuracy import measure as measuring
 from seastar_gym.accuracy.certificate import CLASSES_VERSION, REPEATED, at, physics
 from seastar_gym.accuracy.command import progress_bar
 from seastar_gym.accuracy.commands import SECONDS, SLOWEST, SMALL_COMMANDS, STROKES, Batch, decisions, draw_batch
-from seastar_gym.accuracy.measure import errors, machine, measure_settings, path_lengths, swim_all, whole_seconds
+from seastar_gym.accuracy.measure import (
+    errors,
+    machine,
+    measure_settings,
+    path_lengths,
+    real_time_factors,
+    swim_all,
+    whole_seconds,
+)
 from seastar_gym.controllers.contract import actions_of
 from seastar_gym.controllers.registry import load_agent
 from seastar_gym.envs.commands import to_commands
@@ -227,6 +235,15 @@ def measured(name: str, table: Table) -> Certificate:
     )  # fmt: skip
 
 
+def timed_again(name: str) -> Certificate:
+    """Certificate of one of TABLES that comes with the package, with the speeds of this machine."""
+    known, table = certificate_of(name), TABLES[name]
+    (batch, *_), *_ = table.batches(0, table.samples, (OF_ENERGY,))
+    factors = real_time_factors([known.at(each) for each in known.settings], batch.joined, batch.period)
+    settings = tuple(replace(each, speed=factor) for each, factor in zip(known.settings, factors, strict=True))
+    return replace(known, settings=settings, machine=machine(), decision_period=max(table.periods, default=None))
+
+
 # Sequences that no table used
 
 OF_ENERGY = 0.2
@@ -403,10 +420,14 @@ class Options:
     """What is measured: strokes, decisions of robots of silicone (wires), and of undamped ones."""
     fresh: int = 0
     """Measure nothing, but hold the package's tables against so many fresh sequences of every class."""
+    speeds: bool = False
+    """Measure nothing but the speeds of the package's tables again, on a machine that does nothing else."""
 
     def __post_init__(self) -> None:
         if self.quick and self.store:
             raise ValueError("--store needs the whole study, not --quick.")
+        if self.speeds and not self.store:
+            raise ValueError("--speeds are those that --store writes: give both.")
         require_known("table", self.only, TABLES)
 
 
@@ -418,7 +439,8 @@ def run(options: Options, results: Results) -> None:
     folder = chapter.FOLDER if options.store else Path("runs/accuracy")
     folder.mkdir(parents=True, exist_ok=True)
     for name in options.only:
-        certificate = measured(name, quick(TABLES[name]) if options.quick else TABLES[name])
+        table = quick(TABLES[name]) if options.quick else TABLES[name]
+        certificate = timed_again(name) if options.speeds else measured(name, table)
         file = folder / f"{name}.json"
         certificate.save(file)
         shown = [[fidelity, *map(percent, each.errors.values())]
