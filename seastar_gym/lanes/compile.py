@@ -30,6 +30,7 @@ from numba.core import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache, UserWideCacheLocator
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
+from numba.core.runtime import rtsys
 
 from seastar_gym.interrupts import held_back, let_through
 from seastar_gym.lanes.pipeline import EntryCompiler, KernelCompiler, compiler_of
@@ -250,11 +251,17 @@ class _DigestCache(FunctionCache):
         return _alone(Path(self._cache_path) / f"{name}.lock")
 
     def load_overload(self, sig, target_context):
-        found = super().load_overload(sig, target_context)
+        found = self._kept(sig, target_context)
         if found is None:
             self._turn.enter_context(self._lock(self.kind(sig)))
-            found = super().load_overload(sig, target_context)  # another process may have left it meanwhile
+            found = self._kept(sig, target_context)  # another process may have left it meanwhile
         return found or _say_that_it_compiles("once: later runs find the code")
+
+    def _kept(self, sig, target_context):
+        """Code on the disk. numba's own method registers what only compiling needs first, for a quarter of a second."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
     def save_overload(self, sig, data):
         # The disk is full, or the folder is gone or no longer ours.
