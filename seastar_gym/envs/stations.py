@@ -80,7 +80,7 @@ def _spline_weights(n: int, m: int) -> Floats:
     degree, knots = min(3, n - 1), np.linspace(0.0, 1.0, n)[2:-2]
     knots = np.concatenate([np.zeros(degree + 1), knots, np.ones(degree + 1)])
     at_points, at_values = (b_splines(np.linspace(0.0, 1.0, k), knots, degree) for k in (n, m))
-    return np.linalg.solve(at_points.T, at_values.T).T
+    return np.asarray(np.linalg.solve(at_points.T, at_values.T).T)
 
 
 def b_splines(x: Floats, knots: Floats, degree: int) -> Floats:
