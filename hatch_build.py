@@ -58,7 +58,7 @@ class CustomMetadataHook(MetadataHookInterface):
         metadata["urls"] = addresses(repository, version)
 
 
-class CustomBuildHook(BuildHookInterface):
+class CustomBuildHook(BuildHookInterface[Any]):
     """Compiles the kinds of code that the registered ids ask for, for processors of x86-64-v4 and v3."""
 
     LEVELS = ("x86-64-v4", "x86-64-v3")

@@ -1,9 +1,9 @@
 """Compiles the kinds of code that a wheel may carry, for a level of x86-64. Nothing of it runs on this processor.
 
-    python -m seastar_gym.lanes.shipped x86-64-v4 FOLDER
+    python -m seastar_gym.lanes.shipped x86-64-v4 FOLDER [ID ...]
 
 The build hook calls it (`HATCH_BUILD_HOOK_ENABLE_CUSTOM=true python -m build --wheel`). Kinds are those that all
-registered ids ask for, one robot and batches.
+registered ids ask for, or some, one robot and batches.
 """
 
 import contextlib
@@ -48,8 +48,8 @@ def keep(level: str, entry: Any, *args: Any) -> None:
     file.save(key, (library, *data, "", reload_init, environments))
 
 
-def main(level: str, folder: str) -> None:
-    """Compile all kinds for a level into a folder."""
+def main(level: str, folder: str, *ids: str) -> None:
+    """Compile all kinds that ids ask for, all registered ones if none are named, for a level into a folder."""
     os.environ["SEASTAR_LANES"] = LANES[level]  # before the package is imported
     import gymnasium as gym
     import numba
@@ -64,7 +64,7 @@ def main(level: str, folder: str) -> None:
     (compiling.SHIPPED / compiling.shipped_digest()).mkdir(parents=True, exist_ok=True)
     dispatch.KnownCode.call = lambda _, kind, entry, *args: keep(level, entry, *args)  # type: ignore[method-assign]
     compiling.EntryPoint.__call__ = lambda entry, *args: keep(level, entry, *args)
-    for id in sorted(each for each in gym.registry if each.startswith("Seastar")):
+    for id in ids or sorted(each for each in gym.registry if each.startswith("Seastar")):
         for env in (gym.make(id), gym.make_vec(id, 2, vectorization_mode="vector_entry_point")):
             robots: Any = env.unwrapped
             with contextlib.suppress(Exception):  # nothing has run, so that anything may be wrong
