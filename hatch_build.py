@@ -4,12 +4,20 @@ README's links are relative, so that they lead somewhere in a checkout. A packag
 description of a wheel gets absolute ones, once `repository` in pyproject.toml (`[tool.hatch.metadata.hooks.custom]`) is
 the address on GitHub. Until then it is empty, links stay as they are, and `python .ci/contents.py dist --release` says
 so.
+
+A wheel may carry machine code, so that nothing is compiled at the first start: with HATCH_BUILD_HOOK_ENABLE_CUSTOM=true
+in the environment it is one of this Python on x86-64 Linux. All other builds are as they were.
 """
 
+import os
 import re
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 RELATIVE = re.compile(r"(!?)(\[[^\]]*\])\((?!\w+:|#)([^)\s]+)\)")
@@ -48,3 +56,29 @@ class CustomMetadataHook(MetadataHookInterface):
         text = with_absolute_links(text, repository, version)
         metadata["readme"] = {"content-type": "text/markdown", "text": text}
         metadata["urls"] = addresses(repository, version)
+
+
+class CustomBuildHook(BuildHookInterface[Any]):
+    """Compiles the kinds of code that the registered ids ask for, for processors of x86-64-v4 and v3."""
+
+    LEVELS = ("x86-64-v4", "x86-64-v3")
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Compile, and have the files included."""
+        if version == "editable":
+            return
+        self._folder = tempfile.TemporaryDirectory()
+        for level in self.LEVELS:
+            with tempfile.TemporaryDirectory() as nothing:
+                own = {"PYTHONPATH": self.root, "NUMBA_CACHE_DIR": nothing, "PYTHONHASHSEED": "0"}
+                command = [sys.executable, "-m", "seastar_gym.lanes.shipped", level, self._folder.name]
+                subprocess.run(command, env=os.environ | own, cwd=nothing, check=True)
+        build_data["force_include"][self._folder.name] = "seastar_gym/compiled"
+        build_data["pure_python"] = False
+        python = f"cp{sys.version_info[0]}{sys.version_info[1]}"
+        build_data["tag"] = f"{python}-{python}-manylinux_2_28_x86_64"
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """Remove the files."""
+        if version != "editable":
+            self._folder.cleanup()

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.layout import N_STATIONS
-from seastar_gym.interrupts import held_back
 from seastar_gym.scene import Seastar
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.state import best_fit_heading, root_places
@@ -78,15 +77,27 @@ def weights(n: int, m: int) -> Floats:
 
 def _spline_weights(n: int, m: int) -> Floats:
     """Weights, shape (m, n), of all points for all values: values = at_values at_points^-1 points."""
-    # These take half a second to import, and robots whose nodes stand at all stations do without.
-    with held_back():
-        from scipy.interpolate import BSpline
-        from scipy.sparse.linalg import splu
-
     degree, knots = min(3, n - 1), np.linspace(0.0, 1.0, n)[2:-2]
     knots = np.concatenate([np.zeros(degree + 1), knots, np.ones(degree + 1)])
-    at_points, at_values = (BSpline.design_matrix(np.linspace(0.0, 1.0, k), knots, degree) for k in (n, m))
-    return np.asarray(splu(at_points.T.tocsc()).solve(at_values.T.toarray()).T)
+    at_points, at_values = (b_splines(np.linspace(0.0, 1.0, k), knots, degree) for k in (n, m))
+    return np.asarray(np.linalg.solve(at_points.T, at_values.T).T)
+
+
+def b_splines(x: Floats, knots: Floats, degree: int) -> Floats:
+    """Values of all B-splines at x, shape (len(x), len(knots) - degree - 1), by de Boor's recursion.
+
+    As scipy.interpolate.BSpline.design_matrix, which takes half a second to import: every start would.
+    """
+    last = np.searchsorted(knots, knots[-1]) - 1
+    interval = np.minimum(np.searchsorted(knots, x, "right") - 1, last)
+    found = (np.arange(len(knots) - 1) == interval[:, None]).astype(np.float64)
+    for k in range(1, degree + 1):
+        rise, fall = knots[k:-1] - knots[: -k - 1], knots[k + 1 :] - knots[1:-k]
+        none = np.zeros((len(x), len(rise)))
+        up = np.divide(x[:, None] - knots[: -k - 1], rise, out=none.copy(), where=rise > 0.0)
+        down = np.divide(knots[k + 1 :] - x[:, None], fall, out=none.copy(), where=fall > 0.0)
+        found = up * found[:, :-1] + down * found[:, 1:]
+    return found
 
 
 def node_weights(nodes_per_limb: int) -> Floats:

@@ -27,9 +27,10 @@ import llvmlite
 import numba
 import numpy as np
 from numba.core import types
-from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache, UserWideCacheLocator
+from numba.core.caching import FunctionCache, IndexDataCacheFile, UserWideCacheLocator
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
+from numba.core.runtime import rtsys
 
 from seastar_gym.interrupts import held_back, let_through
 from seastar_gym.lanes.pipeline import EntryCompiler, KernelCompiler, compiler_of
@@ -87,9 +88,9 @@ def kernel_sources(package: Path = PACKAGE) -> list[Path]:
     ]
 
 
-def source_digest(package: Path = PACKAGE) -> str:
+def source_digest(package: Path = PACKAGE, numpy_version: str = np.__version__) -> str:
     """Hexadecimal digest of everything that the machine code depends on."""
-    versions = f"numba {numba.__version__} llvmlite {llvmlite.__version__} numpy {np.__version__} lanes {N_LANES}"
+    versions = f"numba {numba.__version__} llvmlite {llvmlite.__version__} numpy {numpy_version} lanes {N_LANES}"
     digest = hashlib.sha256(versions.encode())
     for source in kernel_sources(package):
         digest.update(str(source.relative_to(package)).encode() + b"\0" + source.read_bytes())
@@ -195,7 +196,7 @@ class _SoundFile(IndexDataCacheFile):
         self._save(self._data_path(name), data)
 
     def _load(self, path):
-        content = _sound(Path(path))
+        content = self._sound(Path(path))
         try:
             return None if content is None else pickle.loads(content)
         except ImportError:  # another signature's code may name modules that are not here
@@ -203,6 +204,51 @@ class _SoundFile(IndexDataCacheFile):
 
     def _save(self, path, value):
         _leave(Path(path), self._dump(value))
+
+    def _sound(self, path):
+        return _sound(path)
+
+
+# Code that a wheel may bring, for a level of x86-64 instead of a processor: shipped.py compiles it. What a processor of
+# a level can do is in LLVM's words, the highest level first.
+SHIPPED = PACKAGE / "compiled"
+_V2 = "cmov crc32 cx16 cx8 fxsr mmx popcnt sahf sse sse2 sse3 sse4.1 sse4.2 ssse3"
+_V3 = f"{_V2} avx avx2 bmi bmi2 f16c fma lzcnt movbe xsave"
+LEVELS = {
+    "x86-64-v4": frozenset(f"{_V3} avx512bw avx512cd avx512dq avx512f avx512vl".split()),
+    "x86-64-v3": frozenset(_V3.split()),
+}
+
+
+def levels_of(codegen) -> list[tuple[str, str]]:
+    """Triple and levels whose code runs where that of `codegen` does; none where numba is told to compile otherwise."""
+    triple, _, features = codegen.magic_tuple()
+    config = numba.config
+    otherwise = config.BOUNDSCHECK or config.DEBUGINFO_DEFAULT or config.ENABLE_PROFILING or config.OPT != 3
+    able = {each[1:] for each in features.split(",") if each.startswith("+")}
+    return [] if otherwise else [(triple, level) for level, needed in LEVELS.items() if needed <= able]
+
+
+@functools.cache
+def shipped_digest() -> str:
+    """Name of the folder of shipped code: as `source_digest`, but arrays are the same in all of numpy 2."""
+    return source_digest(numpy_version=np.__version__.split(".")[0])
+
+
+class ShippedFile(_SoundFile):
+    """Code of one entry point that came with the package, and is only read. It is as safe as the sources beside it."""
+
+    def __init__(self, py_func, filename_base):
+        source = hashlib.sha256(Path(py_func.__code__.co_filename).read_bytes()).hexdigest()
+        super().__init__(str(SHIPPED / shipped_digest()), filename_base, (shipped_digest(), source))
+
+    def _sound(self, path):
+        return _sound(path, is_shipped=True)
+
+
+def shipped_key(sig, index_key, target):
+    """Key of shipped code: numba's, with triple and level in the place of a processor and its features."""
+    return sig, target, index_key[2]
 
 
 @contextlib.contextmanager
@@ -250,11 +296,27 @@ class _DigestCache(FunctionCache):
         return _alone(Path(self._cache_path) / f"{name}.lock")
 
     def load_overload(self, sig, target_context):
-        found = super().load_overload(sig, target_context)
+        found = self._kept(sig, target_context)
         if found is None:
             self._turn.enter_context(self._lock(self.kind(sig)))
-            found = super().load_overload(sig, target_context)  # another process may have left it meanwhile
+            found = self._kept(sig, target_context)  # another process may have left it meanwhile
         return found or _say_that_it_compiles("once: later runs find the code")
+
+    def _kept(self, sig, target_context):
+        """Code on the disk. numba's own method registers what only compiling needs first, for a quarter of a second."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context) or self._shipped(sig, target_context)
+
+    def _shipped(self, sig, target_context):
+        """Code that came with the package for the best level that this processor has; None without."""
+        if not self._enabled or not SHIPPED.is_dir():
+            return None
+        codegen = target_context.codegen()
+        file, index_key = ShippedFile(self._py_func, self._impl.filename_base), self._index_key(sig, codegen)
+        found = (file.load(shipped_key(sig, index_key, target)) for target in levels_of(codegen))
+        data = next(filter(None, found), None)
+        return None if data is None else self._impl.rebuild(target_context, data)
 
     def save_overload(self, sig, data):
         # The disk is full, or the folder is gone or no longer ours.
@@ -266,12 +328,27 @@ class _DigestCache(FunctionCache):
         self._turn.close()
 
 
-class _NoCache(NullCache):
-    def __init__(self, reason):
+class _Nowhere(_DigestLocator):
+    def ensure_cache_path(self):
+        """Nothing is written."""
+
+
+class _NoCache(_DigestCache):
+    """Where no folder can be written: code that came with the package, or what every process compiles for itself."""
+
+    class _impl_class(_DigestCache._impl_class):  # noqa: N801 - numba's own name
+        _locator_classes = (_Nowhere,)
+
+    def __init__(self, py_func, reason):
+        super().__init__(py_func)
         self._reason = reason
 
     def load_overload(self, sig, target_context):
-        return _say_that_it_compiles(self._reason)
+        rtsys.initialize(target_context)
+        return self._shipped(sig, target_context) or _say_that_it_compiles(self._reason)
+
+    def save_overload(self, sig, data):
+        pass
 
 
 UNWRITTEN = "in every process, as no folder for the code can be written: set NUMBA_CACHE_DIR"
@@ -322,11 +399,14 @@ def kept_code(name: str, make: Callable[[], bytes]) -> bytes:
     return code
 
 
-def _sound(path: Path) -> bytes | None:
-    """Content of a file that begins with its digest; None if it is damaged, not there, or may be another user's."""
+def _sound(path: Path, is_shipped: bool = False) -> bytes | None:
+    """Content of a file that begins with its digest; None if it is damaged, not there, or may be another user's.
+
+    is_shipped: Whether it came with the package, so that its owner is asked as little as that of the sources.
+    """
     try:
         with open(path, "rb") as file:
-            if not is_own(os.fstat(file.fileno())):
+            if not is_shipped and not is_own(os.fstat(file.fileno())):
                 return _say_that_some_are_foreign(path.parent)
             kept = file.read()
     except OSError:
@@ -391,7 +471,7 @@ def _entry_point(function, form):
     try:
         compiled._cache = _DigestCache(function)
     except ForeignFolderError as refused:
-        compiled._cache = _NoCache(_foreign(refused))
+        compiled._cache = _NoCache(function, _foreign(refused))
     except RuntimeError:  # no folder can be written (a read-only home)
-        compiled._cache = _NoCache(UNWRITTEN)
+        compiled._cache = _NoCache(function, UNWRITTEN)
     return compiled

@@ -1,0 +1,20 @@
+"""Asserts that a wheel with machine code compiles nothing: every registered id, one robot and a batch."""
+
+import os
+import tempfile
+from pathlib import Path
+
+with tempfile.TemporaryDirectory() as folder:
+    os.environ["NUMBA_CACHE_DIR"] = folder
+    import gymnasium as gym
+
+    import seastar_gym  # noqa: F401
+
+    for id in sorted(each for each in gym.registry if each.startswith("Seastar")):
+        for env in (gym.make(id), gym.make_vec(id, 2, vectorization_mode="vector_entry_point")):
+            env.reset(seed=0)
+            env.step(env.action_space.sample())
+            env.close()
+    compiled = [each.name for each in Path(folder).rglob("*.nbc")]
+assert not compiled, f"{compiled} had to be compiled: build with the numba of constraints.txt, see pyproject.toml."
+print("Nothing was compiled.")

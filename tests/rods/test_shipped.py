@@ -1,0 +1,104 @@
+"""Machine code that a wheel carries: found where nothing was compiled, with the same bits, and never where unfit."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import gymnasium as gym
+import pytest
+
+from seastar_gym.lanes import compile as compiling
+from seastar_gym.lanes.registers import N_LANES
+
+ID = "SeastarSwim-v0"
+NATIVE = {8: "x86-64-v4", 4: "x86-64-v3"}
+START = f"""
+import sys
+from pathlib import Path
+from seastar_gym.lanes import compile as compiling
+compiling.SHIPPED = Path(sys.argv[1])
+import gymnasium as gym
+env = gym.make("{ID}")
+env.reset(seed=0)
+print(env.step([1, 0, 2, 0, 1])[0].tobytes().hex())
+"""
+V3, V4 = (",".join(f"+{each}" for each in sorted(compiling.LEVELS[level])) for level in ("x86-64-v3", "x86-64-v4"))
+
+
+def codegen(features, triple="x86_64-unknown-linux-gnu"):
+    return SimpleNamespace(magic_tuple=lambda: (triple, "znver3", features))
+
+
+@pytest.mark.parametrize(
+    "features, levels",
+    [(V4, ["x86-64-v4", "x86-64-v3"]), (V3, ["x86-64-v3"]), (V3.replace("+movbe", "-movbe"), []),
+     (V4.replace("+avx512vl", "-avx512vl"), ["x86-64-v3"]), ("", [])],
+)  # fmt: skip
+def test_code_is_of_levels_whose_every_feature_the_processor_has(features, levels, monkeypatch):
+    triple = "x86_64-unknown-linux-gnu"
+    assert compiling.levels_of(codegen(features)) == [(triple, level) for level in levels]
+    monkeypatch.setattr(compiling.numba.config, "BOUNDSCHECK", 1)
+    assert compiling.levels_of(codegen(features)) == []
+
+
+@pytest.fixture(scope="module")
+def shipped(tmp_path_factory):
+    """Folder of the code that one id asks for."""
+    if N_LANES not in NATIVE:
+        pytest.skip("a processor of neither level")
+    folder = tmp_path_factory.mktemp("shipped")
+    command = [sys.executable, "-m", "seastar_gym.lanes.shipped", NATIVE[N_LANES], str(folder / "code"), ID]
+    own = {"NUMBA_CACHE_DIR": str(folder / "builders"), "PYTHONPATH": str(compiling.PACKAGE.parent)}
+    subprocess.run(command, env=os.environ | own, check=True, capture_output=True)
+    return folder / "code"
+
+
+def test_nothing_is_compiled_or_written_where_code_came_with_the_package_and_bits_are_the_same(shipped, tmp_path):
+    own = {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(compiling.PACKAGE.parent)}
+    run = subprocess.run(
+        [sys.executable, "-c", START, str(shipped)], env=os.environ | own, check=True, capture_output=True, text=True
+    )
+    assert "compiles" not in run.stderr and not [each for each in tmp_path.rglob("*") if each.suffix == ".nbc"]
+    env = gym.make(ID)
+    env.reset(seed=0)
+    assert run.stdout.strip() == env.step([1, 0, 2, 0, 1])[0].tobytes().hex()
+
+
+def cut(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+
+
+def flip(file: Path) -> None:
+    content = bytearray(file.read_bytes())
+    content[-1] ^= 1
+    file.write_bytes(bytes(content))
+
+
+def other(file: Path) -> None:
+    """Sound code, of another function."""
+    (other,) = list(file.parent.glob("observation.observe*.1.nbc"))
+    file.write_bytes(other.read_bytes())
+
+
+@pytest.mark.parametrize("damage", [cut, flip, other, Path.unlink])
+@pytest.mark.parametrize("what", ["nbc", "nbi"])
+def test_damaged_swapped_and_missing_files_count_as_none(damage, what, shipped, tmp_path, monkeypatch):
+    from seastar_gym.rods.interval import advance
+
+    def load():
+        file = compiling.ShippedFile(advance.py_func, advance._cache._impl.filename_base)
+        return [file.load(key) for key in keys]
+
+    monkeypatch.setattr(compiling, "SHIPPED", tmp_path)
+    folder = tmp_path / compiling.shipped_digest()
+    folder.mkdir()
+    for each in (shipped / folder.name).iterdir():
+        (folder / each.name).write_bytes(each.read_bytes())
+    index = compiling.ShippedFile(advance.py_func, advance._cache._impl.filename_base)._load_index()
+    keys = [*index]
+    assert keys and all(load())
+    for each in folder.glob(f"interval.advance*.{what}"):
+        damage(each)
+    assert not any(load())
