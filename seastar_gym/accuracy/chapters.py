@@ -78,8 +78,8 @@ def scene_for(
     """
     require_flag("any_gait", any_gait)
     known = _of_period(decision_period) if certificate is None else as_certificate(certificate)
-    classes = known.promised + known.repeated(tuple(known.settings[0].errors)) if any_gait else known.promised
-    return known.for_error(error, classes, robot)
+    repeated = known.repeated(known.promised) if certificate is None and not any_gait else ()
+    return known.for_error(error, tuple(each for each in known.promised if each not in repeated), robot)
 
 
 def _of_period(decision_period: float | None) -> Certificate:
