@@ -38,7 +38,7 @@ TRIANGLE = ((0.03, -0.01), (-0.01, 0.02), (-0.02, -0.02))
 DISC, STRIP = Body(radius=0.02), Strip(2e-3, 8e-3)
 CHAPTERS = partial(Seastar, discretisation="chapter")
 PAIR, THREE = np.array([0.1, 0.2]), np.ones(3)
-FIDELITIES = tuple(map(repr, ("fast", "balanced", "accurate", "reference", "chapter")))
+FIDELITIES = tuple(map(repr, ("rapid", "fast", "balanced", "accurate", "reference", "chapter")))
 SCHEMES = "'implicit-euler', 'sdirk2', 'sdirk3', 'implicit-midpoint'"
 
 

@@ -10,7 +10,7 @@ import pytest
 from oracle import Star
 from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Vortex, Water
 
-FIDELITIES = ("fast", "balanced", "accurate", "reference", "chapter")
+FIDELITIES = ("rapid", "fast", "balanced", "accurate", "reference", "chapter")
 
 
 # The chapter's values
