@@ -17,12 +17,12 @@ from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar
 from seastar_gym.controllers import checkpoint
 from seastar_gym.controllers import registry as third_party
-from seastar_gym.controllers.contract import actions_in, actions_of, observed, require_fit, require_policy, starts
+from seastar_gym.controllers.contract import actions_of, observed, require_fit, require_policy, starts
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.learned import BUNDLED, bundled_file, by_name, of_task, pretrained
 from seastar_gym.controllers.open_loop import OpenLoopPolicy, RandomPolicy, scripted
-from seastar_gym.controllers.planner import TIMED_BUDGETS, Budget, Planner, budget_for
+from seastar_gym.controllers.planner import Planner
 from seastar_gym.controllers.registry import AGENTS, default_agents, files_of, load_agent, load_agents
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.swim import swim, swim_many
@@ -111,22 +111,6 @@ REFUSED = [
 def test_what_no_controller_could_use_is_refused_in_a_sentence(call, words):
     with assert_refused(*words.split("|")):
         call()
-
-
-def test_what_is_just_allowed_is_taken():
-    fitting(agent(decision_period=1.0 + 1e-12, observation_space=Box(-1.0, 1.0, (186,)), action_space=Discrete(21)))
-    require_policy(agent())
-    assert observed(np.zeros(4), 4).shape == (4,) and observed(np.zeros((0, 4)), 4).shape == (0, 4)
-    assert starts(None, 2).tolist() == [False] * 2 and starts(True, 2).tolist() == starts([1], 2).tolist() == [True] * 2
-    assert starts([0, 1], 2).tolist() == [False, True]
-    assert actions_of(agent(action_space=Discrete(73)), 9) == "pairs" and actions_of(agent(), 9) == "limbs"
-    says = agent(action_space=None), agent(action_space=Discrete(21)), agent(actions="joint")
-    assert [actions_in(policy, "continuous", 5) for policy in says] == ["continuous", "pairs", "joint"]
-    of_periods = [budget_for(seconds) for seconds in (None, 1.0, 0.5, 0.4, 0.2, 0.15, 0.1, 0.05)]
-    longer = [TIMED_BUDGETS[known] for known in (0.5, 0.5, 0.2, 0.2, 0.1, 0.1)]  # the next longer decision's
-    assert of_periods == [Budget(), Budget(), *longer]
-    cost = [budget.beam * (budget.depth - 1) for _, budget in sorted(TIMED_BUDGETS.items())]
-    assert cost == sorted(cost)
 
 
 # Agents by name: one line adds one.

@@ -57,30 +57,6 @@ def test_actions_become_commands():
         np.testing.assert_array_equal(to_commands(actions, 5, np.array([3, 0]), 2), command_table(actions, 5)[[3, 0]])
 
 
-@pytest.mark.parametrize("actions", ["limbs", "joint", "pairs", "continuous"])
-def test_every_sampled_action_is_accepted_whatever_type_its_whole_numbers_have(actions):
-    space = action_space(actions, 4)
-    space.seed(0)
-    for _ in range(50):
-        commands = to_commands(actions, 4, np.asarray(space.sample())[None], 1)
-        assert commands.shape == (1, 4) and np.abs(commands).max() <= 1.0
-    given = np.zeros((1, 4)) if actions == "continuous" else np.zeros_like(space.sample(), np.uint8)[None]
-    assert not to_commands(actions, 4, given, 1).any() and not np.shares_memory(
-        to_commands(actions, 4, given, 1), given
-    )
-
-
-@pytest.mark.parametrize("actions, largest", [("limbs", 2), ("joint", 242), ("pairs", 20)])
-def test_actions_beyond_the_last_are_refused_with_a_sentence(actions, largest):
-    for bad in (largest + 1, -1, 10**12):
-        action = np.zeros((2, 5) if actions == "limbs" else 2, int)
-        action[1] = bad
-        with assert_refused(f'With actions="{actions}" an action is from 0 to {largest}, '):
-            to_commands(actions, 5, action, 2)
-    with assert_refused(f'With actions="{actions}" the actions of 2 robot'):
-        to_commands(actions, 5, np.zeros((3, 5), int), 2)
-
-
 # The rewarded route keeps to the aim of the weights, which are checked and have a plain form.
 
 

@@ -32,7 +32,7 @@ from seastar_gym.envs.frame import Frame
 from seastar_gym.envs.goal import GoalForm
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import HeadingTargets, RewardWeights
-from seastar_gym.envs.paths import FARTHEST, PATHS, make_path, register_path
+from seastar_gym.envs.paths import PATHS, make_path, register_path
 from seastar_gym.envs.randomization import LogUniform, Normal
 from seastar_gym.envs.rendering import Renderer
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -229,30 +229,6 @@ def test_what_nobody_could_use_is_refused_in_a_sentence(case):
     make, *words = REFUSED[case]
     with assert_refused(*words):
         make()
-
-
-def test_what_is_just_allowed_is_taken():
-    for actuator in (SmaPulse(), CURVE, Limited(SmaPulse(), 0.3)):
-        assert SeastarSwimEnv(scene=Scene(actuator=actuator), decision_period=1.0).decision_period == 1.0
-    assert SeastarSwimEnv(scene=WIRED, decision_period=1.01 * SHORTEST_DECISION).decision_period < 0.01
-    assert goals(np.zeros((3, 2)), np.zeros((3, 2))).tolist() == [0.0] * 3
-    near = [[0.1 - 1e-9, 0.0], [0.1 + 1e-9, 0.0]]  # the radius of waypoints in limb lengths
-    assert goals(near, np.zeros((2, 2))).tolist() == [0.0, -1.0]
-    assert make_path([[FARTHEST, -FARTHEST]], np.random.default_rng(0)).tolist() == [[1e6, -1e6]]
-    assert AlongPath(waypoint_radius=FARTHEST).waypoint_radius == 1e6
-    assert command_table("joint", 8).shape == (6561, 8) and command_table("pairs", 1).tolist() == [[0.0]]
-    assert to_commands("continuous", 2, [[1.0, -1.0]], 1).tolist() == [[1.0, -1.0]]
-    assert to_commands("pairs", 5, [20, 0], 2)[:, 4].tolist() == [1.0, 0.0]
-    assert Uniform(1.0, 1.0).draw(np.random.default_rng(0)) == 1.0 and Normal(2.0, 0.0).bounds == (2.0, 2.0)
-    assert HeadingTargets((1e6, -1e6)).target == (1e6, -1e6) and HeadingTargets(tolerance=np.pi).tolerance == np.pi
-    assert RewardWeights(aim=1.0).aim == 1.0 and ObstTrap(distance=(0.45, 0.6)).distance == (0.45, 0.6)
-    assert Symmetry(5, ((0, -1),), Layout(5, 1)).mirror == ((0, -1),)
-    assert LIMBS.restore(np.ones((2, 5), int), [0, 9]).shape == (2, 5)
-    assert checked_seeds([1, None], 2) == [1, None] and checked_seeds(3, 2) == [3, 4]
-    assert checked_seeds(None, 2) == [None, None]
-    assert checked_options(None, {"path"}) == {}
-    assert HeadingTargets((0.1, 0.2)).of_path(np.ones((2, 2)), np.random.default_rng(0)).tolist() == [0.1, 0.2]
-    assert DomainRandomization({"limb_strengths": Uniform(0.0, 1.0)}).distributions
 
 
 SCENE = Scene(Seastar(nodes_per_limb=4), actuator=SmaPulse(0.5), numerics=Numerics.preset("fast"))

@@ -10,7 +10,7 @@ from seastar_gym.lanes.plain import Lanes
 from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.model import make_rods
 from seastar_gym.rods.bundles import make_work
-from seastar_gym.rods.terms.along import add_moved_energy, hyperbolic_tangent, stiffening
+from seastar_gym.rods.terms.along import add_moved_energy, hyperbolic_tangent
 from seastar_gym.rods.terms.hub import Actuation, set_natural_hub_angles
 from slopes import plain
 
@@ -26,8 +26,6 @@ STAR = Bent(
     moduli=((1e6,) * 2,) * 3, curvatures=CURVATURES, share=0.8, ratio=RATIO, middle=0.4, width=0.1, peak=PEAK,
     profile=lambda s: np.interp(s, (0.0, 0.5, 1.0), PROFILE),
 )  # fmt: skip
-RNG = np.random.default_rng(0)
-SHAPE = STAR.rest + 1e-4 * RNG.standard_normal(STAR.rest.shape)
 BEGIN, END = np.array([0.2, -1.0, 0.0]), np.array([0.9, -0.4, 0.5])
 
 
@@ -47,16 +45,6 @@ def memory(turns: np.ndarray):
 def test_the_hyperbolic_tangent_is_numpys():
     x = np.concatenate([np.linspace(-25.0, 25.0, 2001), [0.0, 1e-9, -1e-9]])
     np.testing.assert_allclose(plain(hyperbolic_tangent(Lanes(x))), np.tanh(x), rtol=2e-15, atol=0.0)
-
-
-def test_stiffening_goes_from_one_to_its_ratio_by_the_logistic_function():
-    """It is 1 at rest, and at every rotation without a ratio, to the last bit."""
-    turns = np.linspace(-PEAK, PEAK, 9)
-    found = plain(stiffening(RODS.along, Lanes(turns)))
-    np.testing.assert_allclose(found, [STAR.at([delta, 0.0, 0.0]).factors[0] for delta in turns], rtol=1e-13)
-    assert found[4] == 1.0 and found[0] == pytest.approx(RATIO, rel=1e-14)
-    rods = make_rods(Scene(Seastar(3, 5, stiffening=Stiffening(1.0)), actuator=SmaPulse(PEAK)))
-    np.testing.assert_array_equal(plain(stiffening(rods.along, Lanes(turns))), 1.0)
 
 
 # Profiles

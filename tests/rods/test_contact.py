@@ -11,10 +11,9 @@ from seastar_gym.lanes.plain import Lanes, Mask
 from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.model import make_rods
 from seastar_gym.rods.bundles import make_work
-from seastar_gym.rods.contact import coupled
 from seastar_gym.rods.contact.coupled import add_contact_product, solve_again_coupled, solve_coupled, solver_iterations
 from seastar_gym.rods.contact.forces import SLOT_ROWS, STIFFNESS, add_contact, add_contact_energy, members, n_listed
-from seastar_gym.rods.contact.pairs import edges_cross, freeze_contact, on_their_sides, without_new_crossings
+from seastar_gym.rods.contact.pairs import freeze_contact, without_new_crossings
 from seastar_gym.rods.guard import add_held_energy
 from seastar_gym.rods.linear import solve_again, substitute_star
 from seastar_gym.rods.potential import factorise
@@ -190,31 +189,6 @@ def test_limbs_that_crossed_before_may_part_again_and_robots_whose_pairs_were_no
     np.testing.assert_array_equal(found(REST, REST, missed=ODD), ~ODD)
 
 
-def test_limbs_are_on_their_sides_of_a_line_across_the_difference_of_their_roots():
-    """Of bent robots away from the origin, some with limbs that come near to each other."""
-    q_0 = REST + 0.2 + 2e-3 * RNG.standard_normal((N_LANES, *REST.shape))
-    q_1 = q_0 + 0.02 * RNG.standard_normal(q_0.shape)
-    seen = plain(on_their_sides(RODS, rows(q_1), rows(q_0), 1, 2))
-    for lane in range(N_LANES):
-        a, b = (root / np.linalg.norm(root) for root in q_0[lane, [4, 7]] - q_0[lane, 0])
-        across = b - a + rotated(a + b, 0.5 * np.pi)
-        right, left = ((q_1[lane, 3 * limb + 1 : 3 * limb + 4] - q_1[lane, 0]) @ across for limb in (1, 2))
-        assert seen[lane] == (right.max() < 0.0 < left.min())
-    assert 0 < seen.sum() < N_LANES
-
-
-def test_edges_cross_where_the_lines_through_them_meet_within_both():
-    """And not at their ends."""
-    q = RNG.standard_normal((40, N_LANES, ROBOT.n_nodes, 2))
-    q[0, :, [1, 2, 5, 6]] = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0], [0.5, 0.0]])[:, None]
-    for each in q:
-        seen = plain(edges_cross(RODS, rows(each), 1, 5))
-        for lane in range(N_LANES):
-            (i, k), (j, m) = each[lane, [1, 2]], each[lane, [5, 6]]
-            shares = np.linalg.solve(np.stack([k - i, j - m], axis=1), j - i)
-            assert seen[lane] == np.all((shares > 0.0) & (shares < 1.0))
-
-
 # The Newton step where limbs touch solves the star's matrix plus that of contact.
 
 
@@ -244,19 +218,3 @@ def test_the_step_solves_the_star_and_contact_together_and_derivatives_do_to_rou
         np.testing.assert_allclose(found - star, moved, rtol=0.0, atol=close * np.abs(moved).max())
     assert not work.contact.missed.any()
     np.testing.assert_array_equal(plain(solver_iterations(work)), iterations)
-
-
-def test_whoever_does_not_arrive_in_200_iterations_is_missed(monkeypatch):
-    touching, iterations = touching_limbs(), []
-    rods, work = touching.rods, touching.work
-    _, alone, _ = factorise(rods, work, touching.stage, None)
-
-    def never_less(rods, a, b):
-        if a is work.contact.r:
-            iterations.append(1.0)
-        return Lanes(1.0)
-
-    monkeypatch.setattr(coupled, "dot", never_less)
-    solve_coupled(rods, work, EVERYONE, alone)
-    assert work.contact.missed.all() and len(iterations) == 1 + 200
-    assert np.all(plain(solver_iterations(work)) == 200.0)

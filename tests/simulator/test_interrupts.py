@@ -250,17 +250,6 @@ def test_a_change_that_was_broken_off_asks_for_a_reset_or_a_state_which_cures_it
     assert_not_begun(simulator, swimmers())
 
 
-def test_robots_that_were_put_elsewhere_meanwhile_stay_there(monkeypatch):
-    def reset_and_fail():
-        simulator.reset()
-        raise MemoryError
-
-    simulator = swimmers()
-    with interrupted(simulator, Kernel(monkeypatch, before=reset_and_fail, nth=1), MemoryError):
-        simulator.stroke(COMMANDS[1])
-    assert_not_begun(simulator, Simulator(Scene(numerics=FAST), N_ROBOTS, 1))
-
-
 SWIM_UNTIL_INTERRUPTED = """
 import sys, numpy as np
 from seastar_gym import Numerics, Scene, Simulator

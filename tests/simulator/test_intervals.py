@@ -58,22 +58,6 @@ def test_an_interval_pauses_at_the_ends_of_the_steps_in_which_times_lie():
     np.testing.assert_allclose(paused, 1e-28 * np.arange(1, 11), rtol=1e-9, atol=0.0)
 
 
-def test_pauses_ask_actuators_no_more_often_than_a_whole_interval_does(monkeypatch):
-    asked = [0]
-    respond = SmaWires.respond
-
-    def counted(self, t, commands, state):
-        asked[-1] += 1
-        return respond(self, t, commands, state)
-
-    monkeypatch.setattr(SmaWires, "respond", counted)
-    simulator = Simulator(scene_with(SmaWires()))
-    for parts in (1, 40):
-        asked.append(0)
-        finished(simulator.advance_in_parts(0.2, LEFT_RIGHT, parts))
-    assert asked[2] == asked[1]
-
-
 def test_the_report_of_pieces_counts_what_the_whole_does():
     pieces = Simulator(scene_with(SmaWires()), 2)
     commands = np.repeat(LEFT_RIGHT, 2, axis=0)

@@ -103,16 +103,6 @@ def test_what_cannot_be_made_is_refused(refused):
         make()
 
 
-def test_what_just_can_be_made_is_taken():
-    assert AlongLimb(profile=(3.0, -2.0)).profile == (3.0, -2.0)
-    assert Scene(Seastar(along=AlongLimb()), actuator=SmaPulse(7.0)).actuator.peak_angle == 7.0
-    assert not Simulator(TURNING, 2).stroke([[0.0] * 5, [0.0, -1.0, 1.0, 0.0, 0.0]]).status.any()
-    # Limbs 3.2 mm thick that end 4.5 mm from each other do not touch at rest.
-    facing = Attachment(0.03, 0.015, math.pi - 0.3), Attachment(-0.03, 0.015, 0.3)
-    body = Body.rectangle(0.06, 0.03, attachments=facing)
-    assert Scene(Seastar(2, 5, (0.03 - 0.00225) / math.cos(0.3), body=body), contact=Contact()).contact
-
-
 # What two robots are asked that have swum, and estimate their errors.
 
 STRAIGHT = np.array([[0.0, 1.0, 0.0, 0.0, -1.0]] * 2)
