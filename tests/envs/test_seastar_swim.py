@@ -31,7 +31,6 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 
 STRAIGHT = np.array([0, 1, 0, 0, 2])
-REST = np.zeros(5, int)
 
 
 def fast(**arguments) -> SeastarSwimEnv:

@@ -72,23 +72,6 @@ def test_a_reset_takes_seeds_and_paths_as_single_environments_do():
 # What a vector environment of Gymnasium offers
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["waypoints", "action_space", "observation_space", "actions", "scene", "np_random_seed", "render_mode",
-     "action_masks"],
-)  # fmt: skip
-def test_attributes_are_those_of_single_environments(name):
-    batch, singles = both(ID, 3, path="random", fidelity="fast")
-    for env in (batch, singles):
-        env.reset(seed=4)
-    found, expected = batch.call(name), singles.call(name)
-    assert type(found) is type(expected) is tuple and len(found) == len(expected) == 3
-    for one, other in zip(found, expected, strict=True):
-        np.testing.assert_equal(one, other)
-    if name != "action_masks":
-        np.testing.assert_equal(batch.get_attr(name), found)
-
-
 def test_attributes_are_set_as_in_single_environments_and_what_is_common_is_refused():
     batch, singles = both(ID, 3, fidelity="fast")
     for env in (batch, singles):

@@ -1,5 +1,7 @@
 """Contact between limbs: energy, forces and step are the oracle's; who touches whom, and who came to cross whom."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -18,9 +20,10 @@ from seastar_gym.rods.guard import add_held_energy
 from seastar_gym.rods.linear import solve_again, substitute_star
 from seastar_gym.rods.potential import factorise
 from seastar_gym.rods.step import SCHEMES, Stage
+from seastar_gym.rods.terms.hub import Actuation, set_natural_hub_angles
+from seastar_gym.scene.robot import Discretisation
 from slopes import nodes, plain, rotated, rows
 from stages import EVERYONE, RandomStages, robot_and_star
-from touching import touching_limbs
 
 ANGLE = 0.3
 
@@ -153,7 +156,6 @@ def test_limbs_that_press_each_other_store_the_same_where_a_stage_asks_and_where
 ROBOT = Seastar(5, 4)
 RODS = make_rods(Scene(ROBOT, actuator=SmaPulse(0.1), contact=Contact()))
 REST = ROBOT.nodes()
-RNG = np.random.default_rng(0)
 ODD = np.arange(N_LANES) % 2 == 1
 
 
@@ -218,3 +220,28 @@ def test_the_step_solves_the_star_and_contact_together_and_derivatives_do_to_rou
         np.testing.assert_allclose(found - star, moved, rtol=0.0, atol=close * np.abs(moved).max())
     assert not work.contact.missed.any()
     np.testing.assert_array_equal(plain(solver_iterations(work)), iterations)
+
+
+# Touching limbs
+
+
+GAMMA = 2e-4
+
+
+def touching_limbs(discretisation: Discretisation = "continuum") -> SimpleNamespace:
+    """Limbs 1 and 2 of five lie along each other."""
+    robot, star = Seastar(5, 4, discretisation=discretisation), Star(5, 4)
+    rods = make_rods(Scene(robot, actuator=SmaPulse(0.1), contact=Contact()))
+    q_0, rng = np.tile(star.rest, (N_LANES, 1, 1)), np.random.default_rng(0)
+    q = q_0.copy()
+    for limb, turn in ((0, 0.62), (1, -0.62)):
+        own = slice(3 * limb + 1, 3 * limb + 4)
+        q[:, own] = rotated(q[:, own], turn)
+    q += 2e-4 * rng.standard_normal(q.shape)
+    work = make_work(rods, 1)
+    work.q[:], work.q_hat[:], work.v_hat[:] = rows(q), rows(q - 1e-4), 0.1 * rng.standard_normal(work.q.shape)
+    still = np.zeros((5, N_LANES))
+    set_natural_hub_angles(rods, work, Actuation(still, still), Lanes(1.0))
+    stage = Stage(work.q_hat, work.v_hat, Lanes(GAMMA), Lanes(1.0 / GAMMA), False)
+    freeze_contact(rods, work, stage, rows(q_0))
+    return SimpleNamespace(rods=rods, work=work, stage=stage, q_0=rows(q_0))

@@ -22,13 +22,7 @@ from seastar_gym import (
     Vortex,
     Water,
 )
-from seastar_gym.envs.observation import body_axis
-from seastar_gym.envs.stations import stations
-from seastar_gym.lanes import plain as numpy_lanes
-from seastar_gym.lanes.plain import Lanes
 from seastar_gym.lanes.registers import N_LANES
-from seastar_gym.rods import star as motion
-from slopes import NO_WORK, plain
 
 ROOT = Path(__file__).resolve().parents[2]
 COMPILED = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
@@ -111,16 +105,3 @@ def test_strokes_in_plain_python_stay_within_their_rows_and_are_those_of_the_mac
     assert expected["implicit-euler counts"][1].sum() > 0  # steps were halved
     assert expected["bent along counts"][2].sum() > 0  # energy was cut
     assert np.abs(expected["contact"] - expected["no contact"]).max() > 1e-5  # limbs have met
-
-
-# One kernel
-
-
-def test_a_kernel_that_python_calls_runs_step_by_step_with_all_that_it_calls(monkeypatch):
-    loaded, load = [], numpy_lanes.load
-    monkeypatch.setattr(numpy_lanes, "load", lambda rows, row: loaded.append(row) or load(rows, row))
-    motion.relative(NO_WORK._replace(current=np.zeros((4, 1))), 1, Lanes(1.0), Lanes(2.0))
-    assert loaded == [2, 3]
-    square = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0])[:, None]
-    turned = np.array([0.0, 0.0, 0.0, 1.0, -1.0, 0.0])[:, None]
-    np.testing.assert_allclose(plain(body_axis(square, turned, stations(2), 2)), [[0.0], [1.0]], atol=1e-15)

@@ -31,13 +31,11 @@ from seastar_gym.envs.randomization import LogUniform
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks import NAMED
 from seastar_gym.scene.checks import (
-    LONGEST_SHOWN,
     require_count,
     require_finite,
     require_number,
     require_range,
     require_within,
-    shown,
 )
 from seastar_gym.scene.number import PerRobot, declared, unit_of
 from seastar_gym.scene.serial import KINDS
@@ -204,25 +202,3 @@ def test_numbers_of_environments_and_of_each_robot_are_floats_too():
         assert repr(env.waypoint_radius) == repr(float(number)) and repr(env.decision_period) == "1.0"
     for robots in (np.array([1, 2]), np.array([1, 2], np.uint8), np.array([1, 2], np.float32), PerRobot((1, 2))):
         assert repr(Seastar(density=robots)) == repr(Seastar(density=np.array([1.0, 2.0])))
-
-
-# Values in sentences are short and on one line, whatever they are; arrays are made of numbers.
-
-
-def nested(depth: int) -> list:
-    return [nested(depth - 1)] if depth else []
-
-
-SMALL = 0.1, -3, True, None, "text", (1, 2.0), [[1]], {"a": 1}
-LARGE = [
-    "x" * 10_000, [0.1] * 10_000, nested(900), [10**5000], Seastar(limb_length=np.linspace(0.1, 0.2, 1000)),
-    np.zeros((100, 100)), "two\nlines",
-]  # fmt: skip
-
-
-def test_values_are_shown_as_python_writes_them_but_cut_and_on_one_line():
-    assert [shown(value) for value in SMALL] == [repr(value) for value in SMALL]
-    for value in LARGE:
-        text = shown(value)
-        assert 0 < len(text) <= LONGEST_SHOWN + 3 and "\n" not in text
-    assert {shown(value) for value in (10**400, -(10**5000))} == {"a number beyond all floats"}

@@ -227,11 +227,10 @@ NO_SCENES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("refused", NO_SCENES, ids=lambda refused: " ".join(refused[1:]))
-def test_what_is_no_scene_is_refused(refused):
-    data, *words = refused
-    with assert_refused(*words):
-        Scene.from_dict(data)
+def test_what_is_no_scene_is_refused(subtests):
+    for data, *words in NO_SCENES:
+        with subtests.test(words=words), assert_refused(*words):
+            Scene.from_dict(data)
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from hubs import TEN
 from seastar_gym import (
     Contact,
-    Limb,
     Numerics,
     Scene,
     Seastar,
@@ -95,29 +93,6 @@ def test_added_mass_lowers_the_frequency_as_a_heavier_limb_would():
     plain = frequency_and_decrement(*ring(VACUUM, robot, 1.0))[0]
     loaded = frequency_and_decrement(*ring(Water(900.0, 0.0, 0.0, UniformCurrent(), 0.7), robot, 1.0))[0]
     assert loaded / plain == pytest.approx(np.sqrt(1200.0 / (1200.0 + 0.7 * 900.0)), rel=2e-3)
-
-
-# Gravity less buoyancy
-
-G = (1.5, -9.81)
-MIDPOINT = Numerics("implicit-midpoint", 0.01, newton_tolerance=1e-10)
-
-
-def test_a_robot_in_vacuum_falls_freely_with_whatever_density_and_taper():
-    limbs = (Limb(radius=(2e-3, 1e-3)), Limb(), Limb(length=0.05), Limb(), Limb())
-    robot = Seastar(nodes_per_limb=10, density=1300.0, limbs=limbs)
-    simulator = Simulator(Scene(robot, None, numerics=MIDPOINT, gravity=G))
-    at_rest = simulator.positions[0]
-    simulator.stroke(np.zeros((1, 5)))
-    np.testing.assert_allclose(simulator.velocities[0], np.tile(G, (46, 1)), rtol=1e-9)
-    np.testing.assert_allclose(simulator.positions[0] - at_rest, np.tile(0.5 * np.array(G), (46, 1)), rtol=1e-9)
-
-
-def test_limbs_as_dense_as_the_water_feel_no_gravity():
-    simulator, floating = Simulator(Scene(TEN)), Simulator(Scene(TEN, gravity=G))
-    for each in (simulator, floating):
-        each.stroke([[0, 1, 0, 0, -1]])
-    np.testing.assert_allclose(floating.positions, simulator.positions, rtol=0.0, atol=1e-15)
 
 
 # A robot that is seen from a moving frame, in a current that moves likewise, moves as it does at home.

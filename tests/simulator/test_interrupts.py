@@ -358,25 +358,6 @@ def test_ctrl_c_waits_for_the_end_of_what_holds_it_back_and_goes_to_whoever_hand
         signal.raise_signal(signal.SIGINT)
 
 
-def test_what_another_thread_compiles_holds_back_no_ctrl_c_of_the_main_one():
-    begun, go_on, done = threading.Event(), threading.Event(), threading.Event()
-
-    def compile_there():
-        with held_back():
-            begun.set()
-            assert go_on.wait(60.0)
-        done.set()
-
-    thread = threading.Thread(target=compile_there)
-    thread.start()
-    assert begun.wait(60.0)
-    with pytest.raises(KeyboardInterrupt):
-        signal.raise_signal(signal.SIGINT)
-    go_on.set()
-    thread.join()
-    assert done.is_set()
-
-
 INTERRUPTED_AT_FIRST = """
 import time
 import gymnasium as gym, seastar_gym
