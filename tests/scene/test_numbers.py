@@ -61,8 +61,8 @@ OTHERS = [
     HeadingTargets(0.5), HeadingTargets((0.5, 1.0)), Uniform(0.5, 1.0), LogUniform(0.5, 1.0), Normal(0.5, 1.0),
     RewardWeights(), Sight(delay=Uniform(0.5, 1.0)), Sight(), *NAMED.values(),
 ]  # fmt: skip
-FOUND = {repr(part): part for part in parts_of((*SCENES, *OTHERS))}
-EXAMPLES = {type(part): part for part in reversed(FOUND.values())}
+FOUND = [*dict.fromkeys(parts_of((*SCENES, *OTHERS)))]
+EXAMPLES = {type(part): part for part in reversed(FOUND)}
 """A part of every kind."""
 DECLARED = [(kind, name, each) for kind in EXAMPLES for name, each in declared(kind).items()]
 
@@ -150,7 +150,7 @@ def test_a_number_has_the_unit_of_the_part_in_which_it_stands():
 
 
 KINDS_OF_NUMBERS = float, int, np.int64, np.uint8, np.float32, np.float64, np.longdouble
-NUMBERS = [(part, field.name) for part in FOUND.values() for field in fields(part) if field.init]
+NUMBERS = [(part, field.name) for part in FOUND for field in fields(part) if field.init]
 
 
 def with_floats(value, make):
@@ -175,9 +175,9 @@ def accepted(part, name, value):
     return None
 
 
-@pytest.mark.parametrize("kind", sorted({type(part).__name__ for part in FOUND.values()}))
+@pytest.mark.parametrize("kind", sorted({type(part).__name__ for part in FOUND}))
 def test_parts_are_frozen_equal_by_value_hashable_and_travel(kind):
-    for part in (part for part in FOUND.values() if type(part).__name__ == kind):
+    for part in (part for part in FOUND if type(part).__name__ == kind):
         name = fields(part)[0].name
         with pytest.raises(FrozenInstanceError):
             setattr(part, name, getattr(part, name))

@@ -4,7 +4,6 @@ import copy
 import dataclasses
 import math
 
-import numpy as np
 import pytest
 
 from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Vortex, Water
@@ -81,13 +80,3 @@ def test_notebooks_show_every_part_of_a_scene_with_its_units(golden):
 
 
 # Swims at their limits
-
-
-@pytest.mark.parametrize("discretisation, share", [("chapter", 0.3), ("continuum", 0.3), ("continuum", 1.0)])
-def test_the_largest_allowed_peak_still_swims(discretisation, share):
-    pulse = SmaPulse(peak_angle=0.999 * share * math.pi)
-    scene = Scene(Seastar(discretisation=discretisation), actuator=pulse, numerics=Numerics(step=0.01))
-    commands = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 5)).reshape(5, -1).T
-    simulator = Simulator(scene, len(commands))
-    report = simulator.stroke(commands)
-    assert not report.status.any() and np.isfinite(simulator.positions).all()

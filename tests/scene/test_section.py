@@ -9,7 +9,7 @@ from scipy.special import ellipe, ellipk, ellipkm1
 
 import oracle
 from exact.solutions import let_pass, pause
-from seastar_gym import Contact, Disc, Limb, Numerics, Scene, Seastar, Section, Simulator, SmaPulse, Strip, Tube, Water
+from seastar_gym import Disc, Limb, Numerics, Scene, Seastar, Section, Simulator, SmaPulse, Strip, Tube, Water
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.model import make_mesh, make_rods
 from seastar_gym.scene.number import numbers_of, unit_of, with_numbers
@@ -148,11 +148,6 @@ def test_a_limb_sinks_or_rises_with_the_speed_at_which_drag_holds_its_weight(sec
     weight = (density * found.inert - 1000.0 * found.displaced) * 9.81
     speed = -math.copysign(math.sqrt(abs(weight) / (0.5 * 1000.0 * water.drag_coefficient * found.width)), weight)
     np.testing.assert_allclose(simulator.velocities[0, :, 1], speed, rtol=1e-5)
-
-
-def test_strips_touch_at_half_their_width():
-    rods = make_rods(Scene(star(STRIP), contact=Contact()))
-    assert rods.contact.thickness.max() == 0.5 * WIDTH
 
 
 # Robots of other shapes: one limb to twelve, uneven, tapered, curved; against the oracle and closed forms.
