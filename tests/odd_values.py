@@ -6,6 +6,7 @@ import traceback
 from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,17 @@ ARRAYS: dict[str, Callable[[], Any]] = {
     "array of objects": lambda: np.array([None, 1.0], object), "array of strings": lambda: np.array(["a", "b"]),
     "array of complex": lambda: np.ones(2, complex), "records": lambda: np.zeros(2, "i,f"),
 }  # fmt: skip
-ODD = {**NUMBERS, **THINGS, **ARRAYS}
+
+
+def masked(shape: tuple[int, ...]) -> Any:
+    """Numbers of which the first is masked: what a mask hides is no value of the caller's."""
+    numbers = np.ma.array(np.zeros(shape), mask=np.zeros(shape, bool))
+    numbers.ravel()[:1] = np.ma.masked
+    return numbers
+
+
+SHAPES = (), (2,), (5,), (2, 2), (2, 5), (2, 2, 2), (1, 2), (1, 1, 2)
+ODD = {**NUMBERS, **THINGS, **ARRAYS, **{f"masked {shape}": partial(masked, shape) for shape in SHAPES}}
 """All of them by name."""
 
 

@@ -1,7 +1,6 @@
 """Files are written all at once and never through a link, and JSON that is damaged is refused in a sentence."""
 
 import os
-import re
 import stat
 import subprocess
 import sys
@@ -159,24 +158,6 @@ def test_no_writer_writes_through_a_link(name, tmp_path, somebodys):
     assert somebodys.read_text() == "work"
     assert place.is_file() and not place.is_symlink() and place.stat().st_size > 0
     assert not [file for file in place.parent.iterdir() if file.name.startswith(".")]
-
-
-CALLS = re.compile(
-    r"""(\S*)\.(?:write_text|write_bytes)\(|(\S*)\.open\(["'](?:[wx]|a(?!b))|(?:savefig|savez\w*|savetxt)\((\w*)
-    |\b(?:FileIO|open)\((\w*),\s*["'](?:[wx]|a(?!b))""",
-    re.VERBOSE,
-)
-
-
-@pytest.mark.parametrize("room", ["seastar_gym", "agents", "train.py"])
-def test_all_writers_write_beside_their_file(room):
-    """What writes by itself writes to the place that `beside` gives. Locks, "ab", hold nothing."""
-    files = [ROOT / room] if room.endswith(".py") else (ROOT / room).rglob("*.py")
-    for file in files:
-        for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), start=1):
-            for call in CALLS.finditer(line):
-                place = next(filter(None, call.groups()), "")
-                assert place in ("part", "stream"), f"{file}, line {number}: {line}"
 
 
 DAMAGED = {

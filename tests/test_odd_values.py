@@ -8,7 +8,7 @@ import pytest
 
 import documented
 from fuzz import odd
-from odd_values import ODD, REFUSED, outcome, taken
+from odd_values import ODD, taken
 from refusals import assert_refused
 from seastar_gym import AlongLimb, Body, Limb, MeasuredCurve, Scene, Seastar, Strip
 from seastar_gym.controllers.open_loop import OpenLoopPolicy
@@ -19,9 +19,6 @@ from seastar_gym.scene.serial import from_dict
 
 FUNCTIONS = ("watch", "on_step", "make", "function")
 """Arguments that are functions of the caller's: what they raise is theirs."""
-UNUSED = ("state", "episode_start", "deterministic", "info")
-"""Arguments that are there for the form alone, at most of the calls."""
-SHAPES = ((), (2,), (5,), (2, 2), (2, 5), (2, 2, 2), (1, 2), (1, 1, 2))
 
 
 TOP_LEVEL = odd.PARTS | odd.SIMULATOR_CALLS | odd.ENV_CALLS
@@ -84,30 +81,6 @@ def test_a_million_robots_are_read_and_long_gaits_known_without_a_table_for_each
     actions = OpenLoopPolicy(gait, "joint").predict(np.zeros(1))[0]
     assert time.process_time() - begin < 4.0
     np.testing.assert_array_equal(to_commands("joint", 5, [actions], 1)[0], gait[0])
-
-
-@pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("name", [*TOP_LEVEL, *DOCUMENTED])
-def test_masked_entries_are_refused(name):
-    """What a mask hides is no value of the caller's."""
-    assert not [each for call, arguments in calls_of(name) for each in taken_masked(call, arguments)]
-
-
-def taken_masked(call, arguments):
-    return [
-        f"{parameter}: {shape}"
-        for parameter in arguments
-        if parameter not in UNUSED
-        for shape in SHAPES
-        if outcome(call, {**arguments, parameter: masked(shape)}) is not REFUSED
-    ]
-
-
-def masked(shape):
-    """Numbers of which the first is masked."""
-    numbers = np.ma.array(np.zeros(shape), mask=np.zeros(shape, bool))
-    numbers.ravel()[:1] = np.ma.masked
-    return numbers
 
 
 # Whatever a simulator or an environment is given, it is taken or refused in one sentence, and loses nothing.

@@ -22,10 +22,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from agents.training import run as efficiency
-from agents.training import run as filming
-from agents.training.options import Options, read_options, saved_options
-from agents.training.run import Efficiency, robot_of
 from evaluation.made_up import made_up_swim
 from later import Later
 from refusals import assert_told
@@ -37,6 +33,7 @@ from seastar_gym.files import part_name
 
 train = Later("train")
 publishing = Later("agents.training.publishing")
+training = Later("agents.training.options")
 run_folder = Later("agents.training.run")
 
 REPOSITORY = Path(__file__).parents[1]
@@ -74,17 +71,17 @@ def test_a_robot_of_a_file_is_trained_compared_and_continued(tmp_path, capsys, s
     assert train.main([*TINY, *own, "--strokes", "256"]) == 0
     file.unlink()
     intervals.unlink()
-    robot = robot_of(saved_options(folder), folder)
+    robot = run_folder.robot_of(training.saved_options(folder), folder)
     assert robot.scene == Scene(Seastar(nodes_per_limb=7, youngs_modulus=1.1e6), numerics=Numerics.preset("fast"))
     assert robot.draws == DomainRandomization({"robot.youngs_modulus": Uniform(9e5, 1.2e6)})
-    with contextlib.closing(train.training_env(saved_options(folder), robot)) as env:
+    with contextlib.closing(train.training_env(training.saved_options(folder), robot)) as env:
         assert env.env.unwrapped.randomization == robot.draws
     assert policies.load(folder / "policy.safetensors").description.scene.robot == robot.scene.robot
     report = html.unescape((folder / "evaluation" / "report.html").read_text())
     assert f"Swum by the robot of {file}." in report
     assert f"--agents {folder / 'policy.safetensors'} pentagon --scene {folder / 'scene.json'} --report" in report
     assert train.main(["--resume", str(folder), "--strokes", "384"]) == 0
-    assert robot_of(saved_options(folder), folder) == robot
+    assert run_folder.robot_of(training.saved_options(folder), folder) == robot
     capsys.readouterr()
     assert train.main(["--resume", str(folder), "--scene", "another.py"]) == 2
     assert "cannot continue with another scene" in capsys.readouterr().err
@@ -147,7 +144,9 @@ def test_the_config_says_which_command_made_it_and_logs_have_the_customary_names
     config = json.loads((finished / "config.json").read_text())
     (command,) = config["commands"]
     assert shlex.split(command)[:2] == ["python", "train.py"] and config["versions"]["stable_baselines3"]
-    assert read_options(shlex.split(command)[2:]) == Options(**{**saved_options(finished).__dict__, "resume": None})
+    assert training.read_options(shlex.split(command)[2:]) == training.Options(
+        **{**training.saved_options(finished).__dict__, "resume": None}
+    )
     logs = scalars(finished)
     for tag in ("rollout/ep_rew_mean", "rollout/success_rate", "time/fps", "eval/pentagon_strokes", "train/loss"):
         assert logs[tag], tag
@@ -169,7 +168,7 @@ def test_a_finished_run_can_be_trained_for_more_strokes(finished, tmp_path, caps
     assert (folder / "checkpoints" / "model_000000768.zip").is_file()
     config = json.loads((folder / "config.json").read_text())
     assert len(config["commands"]) == 2
-    assert saved_options(folder).ppo == saved_options(finished).ppo
+    assert training.saved_options(folder).ppo == training.saved_options(finished).ppo
     steps = [step for step, _ in scalars(folder)["time/fps"]]
     assert steps == sorted(steps) and steps[-1] == 768
     trained = np.loadtxt(folder / "progress.csv", delimiter=",")[:, 0]
@@ -435,7 +434,7 @@ def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_pa
 
 def test_only_a_policy_no_worse_than_a_readable_one_in_the_box_needs_no_second_word(finished, box, monkeypatch):
     monkeypatch.setattr("agents.training.publishing.HELD_OUT_PATHS", 2)
-    policy, options = policies.load(finished / "policy.safetensors"), saved_options(finished)
+    policy, options = policies.load(finished / "policy.safetensors"), training.saved_options(finished)
     policies.save(policy, box)
     assert publishing.why_not(policy, options) is None
     box.write_bytes(b"")
@@ -443,11 +442,11 @@ def test_only_a_policy_no_worse_than_a_readable_one_in_the_box_needs_no_second_w
 
 
 def test_a_quick_run_is_short_and_fast_and_published_only_when_asked_twice(tmp_path, capsys):
-    options = read_options(["--quick"])
-    assert options.length < Options().length / 2 and options.fidelity == "fast"
+    options = training.read_options(["--quick"])
+    assert options.length < training.Options().length / 2 and options.fidelity == "fast"
     in_time = ["--decision-period", "0.5"]
-    assert read_options([]).length < read_options(in_time).length
-    assert read_options([*in_time, "--strokes", "7"]).length == 7
+    assert training.read_options([]).length < training.read_options(in_time).length
+    assert training.read_options([*in_time, "--strokes", "7"]).length == 7
     for asked, words in (("--quick --publish", "only with --publish-anyway"), ("--publish-anyway", "give both")):
         assert train.main([*asked.split(), "--out", str(tmp_path / "run")]) == 2
         assert_told(capsys, words)
@@ -455,7 +454,7 @@ def test_a_quick_run_is_short_and_fast_and_published_only_when_asked_twice(tmp_p
 
 
 def test_a_run_says_how_long_it_took_to_round_the_pentagon_in_time(finished):
-    found = efficiency.read(finished)
+    found = run_folder.read(finished)
     assert found.strokes == 512 and found.seconds > 0.0
     pentagon, waypoints = run_folder.recorded(finished)[-1][1:]
     assert (found.strokes_to_target is not None) == (waypoints == 5 and pentagon <= 170)
@@ -470,12 +469,12 @@ def test_the_first_swim_in_time_counts():
         made_up_swim(np.zeros((2, 2)), [0, reached], np.zeros((5, 2)), time=np.array([0.0, seconds]))
         for seconds, reached in ((171, 5), (170, 5), (100, 4))
     )
-    found = Efficiency()
+    found = run_folder.Efficiency()
     for strokes, pentagon in ((1, lost), (2, slow), (3, fast), (4, slow), (5, fast)):
         found = found.after(strokes, 0.5 * strokes, pentagon)
-    assert found == Efficiency(5, 2.5, 3, 1.5)
+    assert found == run_folder.Efficiency(5, 2.5, 3, 1.5)
     assert str(found) == "The pentagon took 170 s or less after 3 strokes and 1.5 s of training."
-    assert str(Efficiency().after(2, 1.0, slow)) == "The pentagon was not rounded in 170 s yet."
+    assert str(run_folder.Efficiency().after(2, 1.0, slow)) == "The pentagon was not rounded in 170 s yet."
 
 
 def test_several_seeds_are_runs_of_their_own(tmp_path, capsys, short_swims):
@@ -524,7 +523,7 @@ def test_the_script_is_filmed_beside_the_training_and_else_afterwards(tmp_path, 
     beside = filmed(tmp_path / "beside", "--decision-period", "0.5")
     assert there[tmp_path / "beside"] is not None
     for name, popen in {"none": no_process, "lost": lost_process}.items():
-        monkeypatch.setattr(filming, "subprocess", SimpleNamespace(DEVNULL=subprocess.DEVNULL, Popen=popen))
+        monkeypatch.setattr("agents.training.run.subprocess", SimpleNamespace(DEVNULL=subprocess.DEVNULL, Popen=popen))
         assert filmed(tmp_path / name, "--decision-period", "0.5") == beside
     monkeypatch.setattr("agents.training.run.processors", lambda: 1)
     assert filmed(tmp_path / "alone", "--decision-period", "0.5") == beside
@@ -535,8 +534,10 @@ def test_the_script_is_filmed_beside_the_training_and_else_afterwards(tmp_path, 
 def test_a_training_that_is_stopped_ends_the_process_that_films(tmp_path, monkeypatch):
     monkeypatch.setattr("agents.training.run.processors", lambda: 2)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    begun, begin = [], filming._begun
-    monkeypatch.setattr(filming, "_begun", lambda words: begun.append(begin(words)) or begun[-1])
+    from agents.training.run import _begun as begin
+
+    begun = []
+    monkeypatch.setattr("agents.training.run._begun", lambda words: begun.append(begin(words)) or begun[-1])
     monkeypatch.setattr("train.train", lambda *given: (_ for _ in ()).throw(KeyboardInterrupt))
     options = [word for word in TINY if word != "--no-video"]
     assert train.main([*options, "--out", str(tmp_path / "run")]) == 130
@@ -557,13 +558,13 @@ def test_a_timed_training_is_evaluated_and_kept_in_its_own_decisions(tmp_path, m
     assert float(rows["script"]["simulated_time_s"]) < 120 < 2 * int(rows["script"]["strokes_to_finish"])
     assert float(rows["learned"]["simulated_time_s"]) <= 400.0
     assert "--decision-period 0.5" in (folder / "evaluation" / "report.html").read_text()
-    assert saved_options(folder).ppo.decision_period == 0.5
+    assert training.saved_options(folder).ppo.decision_period == 0.5
     monkeypatch.setattr("agents.training.publishing.BUNDLED", tmp_path / "box" / "strokes.safetensors")
     monkeypatch.setattr("agents.training.publishing.HELD_OUT_PATHS", 2)
     assert train.main(["--resume", str(folder), "--publish"]) == 0
     shipped = policies.bundled_file(0.5, tmp_path / "box" / "strokes.safetensors")
     assert policies.load(shipped).decision_period == 0.5
-    assert publishing.why_not(policy, saved_options(folder)) is None
+    assert publishing.why_not(policy, training.saved_options(folder)) is None
     assert train.rivals(0.3) == {} and train.rivals(None)["script"].decision_period is None  # 0.3 s is of no gait
 
 

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from agents import ppo as coasting
-from agents.ppo import CoastingProgress, Hyperparameters, fit_coasting
 from later import Later
 from seastar_gym.envs.options import RewardWeights, make_scene
 from seastar_gym.envs.stations import body_heading
@@ -22,8 +20,8 @@ SCENE = make_scene(None, "fast", PERIOD)
 def fitted():
     """Fitted to fewer swims than a training's."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(coasting, "ROBOTS", 128)
-        yield fit_coasting(SCENE, PERIOD, np.random.default_rng(0))
+        patch.setattr("agents.ppo.ROBOTS", 128)
+        yield ppo.fit_coasting(SCENE, PERIOD, np.random.default_rng(0))
 
 
 def batch(n_robots, **arguments):
@@ -53,7 +51,7 @@ def test_it_foretells_where_other_robots_come_to_rest(fitted):
 
 def test_what_is_added_is_the_change_of_the_way_saved(fitted):
     actions = [3, 3, 0, 7, 7, 0, 0, 0, 0, 0, 0]
-    plain, shaped = batch(8), CoastingProgress(batch(8), fitted, RewardWeights())
+    plain, shaped = batch(8), ppo.CoastingProgress(batch(8), fitted, RewardWeights())
     before, _ = plain.reset(seed=1)
     shaped.reset(seed=1)
     added = np.zeros(8)
@@ -70,7 +68,7 @@ def test_what_is_added_is_the_change_of_the_way_saved(fitted):
 
 def test_progress_counts_before_the_way_is_swum(fitted):
     """At the end of a pulse towards the waypoint, most of its way is still to come or to be lost."""
-    env = CoastingProgress(batch(20, path=[[0.0, 0.3]]), fitted, RewardWeights())
+    env = ppo.CoastingProgress(batch(20, path=[[0.0, 0.3]]), fitted, RewardWeights())
     env.reset(seed=1)
     observations, *_ = env.step(np.arange(1, 21))
     now = env.gain(observations)
@@ -84,7 +82,7 @@ def test_progress_counts_before_the_way_is_swum(fitted):
 
 def test_the_last_step_of_an_episode_has_the_environment_s_own_reward(fitted):
     arguments = {"path": [[0.0, 0.0105]], "max_episode_steps": 2}
-    plain, shaped = batch(4, **arguments), CoastingProgress(batch(4, **arguments), fitted, RewardWeights())
+    plain, shaped = batch(4, **arguments), ppo.CoastingProgress(batch(4, **arguments), fitted, RewardWeights())
     plain.reset(seed=3)
     shaped.reset(seed=3)
     for step in range(2):
@@ -98,10 +96,10 @@ def test_the_last_step_of_an_episode_has_the_environment_s_own_reward(fitted):
 
 @pytest.mark.parametrize("asked", [False, True])
 def test_a_training_has_it_where_it_is_asked_for(asked, monkeypatch):
-    monkeypatch.setattr(coasting, "ROBOTS", 32)
-    hyperparameters = Hyperparameters(num_envs=8, rollout=8, batch_size=32, decision_period=PERIOD, coasting=asked)
+    monkeypatch.setattr("agents.ppo.ROBOTS", 32)
+    hyperparameters = ppo.Hyperparameters(num_envs=8, rollout=8, batch_size=32, decision_period=PERIOD, coasting=asked)
     env = ppo.make_training_env(hyperparameters, "random", True, "fast", threads=1)
-    assert env.env_is_wrapped(CoastingProgress)[0] == asked
+    assert env.env_is_wrapped(ppo.CoastingProgress)[0] == asked
     env.reset()
     _, rewards, _, infos = env.step(np.arange(8))
     own = [sum(value for name, value in info.items() if name.startswith("reward_")) for info in infos]

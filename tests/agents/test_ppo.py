@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from agents.ppo import Hyperparameters
 from later import Later
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar, Sight, SmaWires, Water
@@ -27,17 +26,19 @@ ppo = Later("agents.ppo")
 torch = Later("torch")
 
 FAST = Numerics.preset("fast")
-SMALL = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=2, hidden=(16, 8), max_episode_time=10.0)
-OTHER = Hyperparameters(
-    actions="limbs", symmetry=False, num_envs=4, rollout=4, batch_size=16, epochs=1, hidden=(12,), max_episode_time=5.0
-)
+SMALL = {"num_envs": 8, "rollout": 8, "batch_size": 32, "epochs": 2, "hidden": (16, 8), "max_episode_time": 10.0}
+OTHER = {
+    "actions": "limbs", "symmetry": False, "num_envs": 4, "rollout": 4, "batch_size": 16, "epochs": 1, "hidden": (12,),
+    "max_episode_time": 5.0,
+}  # fmt: skip
+"""Hyperparameters."""
 POLICY, FACTS, TENSORS = checkpoint.DESCRIPTION, "learner.json", checkpoint.LEARNER
 """Entries of a file: the description, the learner's facts, and its tensors."""
 OTHER_SCENE = Scene(robot=Seastar(n_limbs=4, nodes_per_limb=4), fluid=Water(drag_coefficient=1.5), numerics=FAST)
 
 
-def make_learner(hyperparameters=SMALL, scene=None, seed=0):
-    scene = Scene(numerics=FAST) if scene is None else scene
+def make_learner(given=SMALL, scene=None, seed=0):
+    hyperparameters, scene = ppo.Hyperparameters(**given), Scene(numerics=FAST) if scene is None else scene
     env = ppo.make_training_env(hyperparameters, "random", random_heading=True, scene=scene)
     return ppo.make_model(env, hyperparameters, seed)
 
@@ -57,13 +58,12 @@ def file(learner, tmp_path):
 # A policy on disk
 
 
-@pytest.mark.parametrize("hyperparameters, scene", [(SMALL, None), (OTHER, OTHER_SCENE)])
-def test_a_loaded_policy_is_the_learner_s(hyperparameters, scene, tmp_path):
-    learner = make_learner(hyperparameters, scene)
-    learner.learn(hyperparameters.num_envs * hyperparameters.rollout)
+@pytest.mark.parametrize("given, scene", [(SMALL, None), (OTHER, OTHER_SCENE)])
+def test_a_loaded_policy_is_the_learner_s(given, scene, tmp_path):
+    learner = make_learner(given, scene).learn(given["num_envs"] * given["rollout"])
     learner_file.save(learner, tmp_path / "model.zip")
     loaded, own = load(tmp_path / "model.zip"), ppo.policy_of(learner)
-    assert loaded.description == own.description and loaded.actions == hyperparameters.actions
+    assert loaded.description == own.description and loaded.actions == given.get("actions", "pairs")
     for name, weights in own.weights.items():
         np.testing.assert_array_equal(loaded.weights[name], weights)
     with zipfile.ZipFile(tmp_path / "model.zip") as archive:
@@ -83,7 +83,7 @@ def test_loading_unpickles_nothing_of_a_file_that_stable_baselines_reads_as_its_
             new.writestr(name, old.read(name))
         for name in set(old.namelist()) - set(new.namelist()):
             new.writestr(name, pickle.dumps(Bomb(tmp_path / "exploded")))
-    assert load(without).actions == Hyperparameters().actions
+    assert load(without).actions == "pairs"
     assert learner_file.resume(without, make_learner().get_env()).num_timesteps == 3 * 64
     assert not (tmp_path / "exploded").exists()
     with zipfile.ZipFile(without) as archive:
@@ -197,7 +197,7 @@ def test_a_resumed_learner_is_where_it_was(tmp_path):
     assert list(resumed.ep_info_buffer) == list(learner.ep_info_buffer) != []
     resumed.learn(64, reset_num_timesteps=False)
     assert resumed.num_timesteps == 192
-    assert resumed.lr_schedule(1.0) == SMALL.learning_rate
+    assert resumed.lr_schedule(1.0) == ppo.Hyperparameters().learning_rate
 
 
 def test_the_same_seed_and_the_same_file_train_the_same_policy(file):
@@ -249,7 +249,7 @@ WIRES = Scene(actuator=SmaWires()).at("fast")
 def test_advice_is_the_teachers_own_action_whatever_the_student_turns(actions, symmetry):
     about, rng = Description(actions, symmetry, WIRES, (8,), 0.2), np.random.default_rng(0)
     weights = {name: rng.normal(size=shape).astype(np.float32) for name, shape in about.shapes().items()}
-    teacher, hyperparameters = LearnedPolicy(about, weights), Hyperparameters(actions=actions, decision_period=0.2)
+    teacher, hyperparameters = LearnedPolicy(about, weights), ppo.Hyperparameters(actions=actions, decision_period=0.2)
     given = {"fidelity": "fast", "threads": 1, "num_envs": 16, "sight": Sight(delay=0.1)}
     robots = VectorFrameStack(ppo.make_training_batch(hyperparameters, "random", True, **given), 2)
     robots.reset(seed=0)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from agents.ppo import Hyperparameters
 from later import Later
 from refusals import assert_refused
 from seastar_gym import Simulator
@@ -86,17 +85,17 @@ def test_the_planner_swims_faster_in_time_than_the_lagged_script():
 
 
 def test_discount_and_time_limit_are_those_of_seconds():
-    strokes, half = Hyperparameters(), Hyperparameters(decision_period=0.5)
+    strokes, half = ppo.Hyperparameters(), ppo.Hyperparameters(decision_period=0.5)
     assert strokes.discount_per_decision == 0.8 and strokes.max_episode_steps == 400
     assert half.discount_per_decision == pytest.approx(0.8**0.5) and half.max_episode_steps == 800
-    assert Hyperparameters(decision_period=1.0).discount_per_decision == 0.8
-    small = Hyperparameters(decision_period=0.5, num_envs=4, rollout=4, batch_size=16, max_episode_time=5.0)
+    assert ppo.Hyperparameters(decision_period=1.0).discount_per_decision == 0.8
+    small = ppo.Hyperparameters(decision_period=0.5, num_envs=4, rollout=4, batch_size=16, max_episode_time=5.0)
     env = ppo.make_training_env(small, "random", random_heading=True, fidelity="fast", threads=1)
     assert env.get_attr("max_episode_steps")[0] == 10
     assert ppo.make_model(env, small, seed=0).gamma == pytest.approx(0.8**0.5)
     for wrong in ({"actions": "continuous"}, {"batch_size": 7}, {"hidden": ()}, {"hidden": (2**20,) * 3}):
         with assert_refused(next(iter(wrong))):
-            Hyperparameters(**wrong)
+            ppo.Hyperparameters(**wrong)
 
 
 def test_a_timed_policy_behind_the_symmetry_is_equivariant():

@@ -10,7 +10,9 @@ import pytest
 import yaml
 
 import seastar_gym
-from agents.ppo import Hyperparameters
+from later import Later
+
+ppo = Later("agents.ppo")
 
 FILE = Path(__file__).parents[2] / "agents" / "rl_zoo3" / "ppo.yml"
 SETTINGS = yaml.safe_load(FILE.read_text(encoding="utf-8"))
@@ -23,12 +25,12 @@ def ours(id):
 
     row = seastar_gym.IDS[id]
     if row.task is not None:
-        return Hyperparameters(**{"decision_period": row.decision_period, **OWN[row.task]})
+        return ppo.Hyperparameters(**{"decision_period": row.decision_period, **OWN[row.task]})
     if row.decision_period < 1.0:  # the trainings of docs/training.md
-        return Hyperparameters(
+        return ppo.Hyperparameters(
             decision_period=row.decision_period, discount=0.9, rollout=32, num_envs=64, gae_lambda=0.95
         )
-    return Hyperparameters()
+    return ppo.Hyperparameters()
 
 
 @pytest.mark.parametrize("id", IDS)

@@ -316,13 +316,6 @@ def test_training_runs_the_checkout_s_own_script_and_says_where_there_is_none(fo
     assert "['--quick']" in capsys.readouterr().out
 
 
-def test_pictures_of_a_decision_keep_the_speed():
-    assert screen.rate(None, 1.0, 4.0) == (8, 32.0)
-    number, fps = screen.rate(Path("a.gif"), 0.2, 2.0)
-    assert number == 2 and fps == pytest.approx(20.0)
-    assert screen.rate(None, 0.1, 30.0) == (1, 300.0)
-
-
 # Keys mean the commands that the help says.
 
 

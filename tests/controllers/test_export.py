@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import Body, Limb, Numerics, Scene, Seastar, Simulator, SmaWires
+from seastar_gym import Body, Limb, Numerics, Scene, Seastar, SmaWires
 from seastar_gym.cli.export import load_policy
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.description import Description
@@ -360,32 +360,6 @@ def test_a_policy_that_does_not_see_its_limbs_needs_a_pose_alone(tmp_path):
         limbs, further = expected[layout.actuators].astype(float), expected[layout.further].astype(float)
         found = compiled.observe_pose(np.array([*hub, theta]), limbs, further, np.ascontiguousarray(target))
         np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
-
-
-@needs_compiler
-def test_a_robot_swims_by_c_from_what_a_camera_sees(tmp_path):
-    """By pictures at 30 Hz and differences it reaches two waypoints as fast as Python does by states."""
-    policy = policy_of("learned")
-    scene = replace(policy.scene, numerics=Numerics.preset("fast"))
-    compiled, waypoints = Compiled(policy, tmp_path), np.array([[0.08, 0.03], [0.1, 0.12]])
-    env = gym.make("SeastarSwim-v0", actions=policy.actions, scene=scene, path=waypoints)
-    observation, _ = env.reset(seed=0)
-    by_python, done = 0, False
-    while not done:
-        observation, _, done, truncated, _ = env.step(policy.predict(observation, deterministic=True)[0])
-        by_python += 1
-        assert not truncated
-    simulator, (robot,) = Simulator(scene), compiled.robots(1)
-    reached, strokes, radius = 0, 0, env.unwrapped.waypoint_radius
-    pictures = [simulator.positions[0]] * 3
-    while reached < 2 and strokes < 2 * by_python:
-        targets = waypoints[[reached, 1]]
-        seen = compiled.observe(np.stack(pictures[:-4:-1]), 3, 1.0 / 30.0, None, None, targets)
-        for _ in simulator.stroke_in_parts(compiled.act(robot, seen)[1].astype(float)[None], 30):
-            pictures.append(simulator.positions[0])
-        reached += int(np.linalg.norm(simulator.hub_position()[0] - waypoints[reached]) <= radius)
-        strokes += 1
-    assert reached == 2 and abs(strokes - by_python) <= 3
 
 
 @needs_compiler

@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 import safetensors.numpy
 
-from agents.ppo import Hyperparameters
 from every_part import ACTUATORS, PARTS
 from later import Later
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar, Sight, SmaPulse, SmaWires, Water
-from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, camera_of, load, save
 from seastar_gym.envs.commands import command_table
@@ -25,11 +23,13 @@ from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.evaluation.swim import swim
 from symmetries import assert_equivariant, symmetry_for
 
+adapter = Later("seastar_gym.adapters.stable_baselines3")
 ppo = Later("agents.ppo")
 torch = Later("torch")
 
 FAST = Numerics.preset("fast")
-SMALL = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=2, hidden=(16, 8), max_episode_time=10.0)
+SMALL = {"num_envs": 8, "rollout": 8, "batch_size": 32, "epochs": 2, "hidden": (16, 8), "max_episode_time": 10.0}
+"""Hyperparameters."""
 WIRES = Scene(actuator=SmaWires(), numerics=FAST)
 TASK = Description(
     "joint", True, WIRES, (8,), 0.5, "miswired", ((0, -1),), ("vector", "pseudoscalar"), shows_limbs=True, past=2
@@ -55,7 +55,7 @@ def observations(scene=Scene(), n=2000, seed=0):
 @pytest.mark.parametrize("reduced", [True, False])
 @pytest.mark.parametrize("scene", [Scene(numerics=FAST), FOUR_LIMBS])
 def test_a_saved_policy_acts_as_stable_baselines_does(actions, reduced, scene, tmp_path):
-    hyperparameters = replace(SMALL, actions=actions, symmetry=reduced)
+    hyperparameters = ppo.Hyperparameters(**SMALL, actions=actions, symmetry=reduced)
     env = ppo.make_training_env(hyperparameters, "random", True, scene=scene)
     learner = ppo.make_model(env, hyperparameters, seed=0).learn(64)
     save(ppo.policy_of(learner), tmp_path / "policy.safetensors")
@@ -246,8 +246,10 @@ SEEN = {
 @pytest.mark.parametrize("trained", SEEN)
 def test_a_policy_knows_its_camera_and_swims_in_what_shows_the_same(trained, given, tmp_path):
     options = {"num_envs": 1, "scene": WIRES, "decision_period": 0.2}
-    batch = VectorSymmetryReduction(ppo.make_training_batch(SMALL, "line", True, **options, **SEEN[trained]))
-    save(random_policy(ppo.describe(BatchVecEnv(batch), (4,))), tmp_path / "policy.safetensors")
+    batch = VectorSymmetryReduction(
+        ppo.make_training_batch(ppo.Hyperparameters(**SMALL), "line", True, **options, **SEEN[trained])
+    )
+    save(random_policy(ppo.describe(adapter.BatchVecEnv(batch), (4,))), tmp_path / "policy.safetensors")
     policy = load(tmp_path / "policy.safetensors")
     assert camera_of(policy).get("sight") == SEEN[trained].get("sight") and policy.description.path == "line"
     env = SeastarSwimEnv("line", scene=WIRES, decision_period=0.2, actions="pairs", **SEEN[given])

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from every_part import ACTUATORS
-from seastar_gym import Body, HeadingTargets, Numerics, RewardWeights, Scene, Seastar, Simulator
+from seastar_gym import Body, HeadingTargets, Numerics, Scene, Seastar, Simulator
 from seastar_gym.controllers.greedy import waypoints_of
-from seastar_gym.controllers.planner import TIMED_BUDGETS, Budget, Planner, Targets, gait_planner, state_of
+from seastar_gym.controllers.planner import Budget, Planner, Targets, gait_planner, state_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import transform_commands
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -72,25 +72,6 @@ def test_an_observation_is_the_whole_state(scene, allowed):
     np.testing.assert_allclose(np.linalg.norm(twin.hub_position(), axis=1), moved, rtol=allowed)
 
 
-@pytest.mark.parametrize("headings", [None, HeadingTargets(tolerance=0.2)])
-def test_a_planner_of_strokes_and_one_in_time_know_their_scene_reward_and_targets(headings):
-    strokes, timed = Planner(headings=headings), Planner(decision_period=0.5, headings=headings)
-    own = RewardWeights(progress=1.0)
-    assert Planner(FAST, reward=own).reward is own and strokes.reward == RewardWeights()
-    assert strokes.scene == Scene.preset("fast") and timed.scene.actuator.has_memory
-    assert (strokes.budget, timed.budget) == (Budget(), TIMED_BUDGETS[0.5])
-    seen = np.random.default_rng(0).normal(size=(2, timed._layout.size)).astype(np.float32)
-    targets, at = timed._targets(seen), timed._layout
-    np.testing.assert_allclose(targets.current, 0.1 * seen[:, at.current_waypoint])
-    np.testing.assert_allclose(targets.after, 0.1 * seen[:, at.next_waypoint])
-    if headings is None:
-        assert targets.turn is targets.turn_after is None
-        return
-    for turn, (c, s) in zip((targets.turn, targets.turn_after), ((0, 1), (2, 3)), strict=True):
-        c, s = seen[:, at.headings][:, [c, s]].T.astype(float)
-        np.testing.assert_allclose(turn, np.arctan2(s, c))
-
-
 def test_a_search_in_time_compares_robots_that_have_coasted():
     """Without commands they swim on; the one that ends nearest counts, not the one that is nearest now."""
     planner = Planner(decision_period=0.5, budget=Budget(1, 1, 0.5), threads=1)
@@ -137,19 +118,6 @@ def test_who_can_arrive_at_the_last_waypoint_arrives_by_the_fewest_decisions():
     for robot in (2, 3):  # by the command that the goal is made of, or another one from which it is in reach
         assert np.hypot(*(twice[robot, chosen[robot]] - goals[robot]).T).min() <= 0.0004
         assert np.hypot(*(first[robot] - goals[robot]).T).min() > 0.0004
-
-
-def test_what_is_left_to_turn_lengthens_the_way_at_its_price_in_the_reward():
-    nodes, passed = FAST.robot.nodes()[None], np.zeros((1, 1), bool)
-    price = RewardWeights().heading / RewardWeights().progress
-    for near, turn, passes in ((0.05, 0.5, False), (0.005, 0.1, True)):
-        places = np.array([[near, 0.0]]), np.array([[0.1, 0.0]])
-        (straight,), _, _ = Planner(FAST)._judge(nodes, passed, Targets(*places))
-        asked = Targets(*places, np.array([turn]), np.array([0.8]))
-        way, now, _ = Planner(FAST, headings=HeadingTargets(tolerance=0.2))._judge(nodes, passed, asked)
-        assert now.item() == passes
-        expected = 0.1 + price * 0.8 if passes else straight[0] + price * (turn + (0.8 - turn))
-        assert way.item() == pytest.approx(expected, rel=1e-9)
 
 
 def test_the_planner_turns_to_either_side_and_keeps_a_heading_that_is_met():

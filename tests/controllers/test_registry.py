@@ -2,8 +2,11 @@
 
 import json
 import json.decoder
+import os
 import pickle
+import subprocess
 import sys
+import threading
 import zipfile
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,18 +15,27 @@ import numpy as np
 import pytest
 from gymnasium.spaces import Box, Discrete
 
+import seastar_gym
 from later import Later
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar
 from seastar_gym.controllers import checkpoint
 from seastar_gym.controllers import registry as third_party
-from seastar_gym.controllers.contract import actions_in, actions_of, observed, require_fit, require_policy, starts
+from seastar_gym.controllers.contract import actions_of, observed, require_fit, require_policy, starts
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.learned import BUNDLED, bundled_file, by_name, of_task, pretrained
 from seastar_gym.controllers.open_loop import OpenLoopPolicy, RandomPolicy, scripted
-from seastar_gym.controllers.planner import TIMED_BUDGETS, Budget, Planner, budget_for
-from seastar_gym.controllers.registry import AGENTS, default_agents, files_of, load_agent, load_agents
+from seastar_gym.controllers.planner import Planner
+from seastar_gym.controllers.registry import (
+    AGENTS,
+    RobotByRobot,
+    call_function,
+    default_agents,
+    files_of,
+    load_agent,
+    load_agents,
+)
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.swim import swim, swim_many
 
@@ -83,7 +95,6 @@ REFUSED = [
     (lambda: load_agents(["gallop"]), "Others are learned, greedy, planner, gait-planner"),
     *((lambda name=name: load_agents([name]), "A policy is in a file named .safetensors")
       for name in ("policy.pth", "model.pkl", "runs/policy.pt")),
-    (lambda: scripted("random", "legs"), "actions must be one of"),
     *((lambda name=name: scripted(name), "pentagon, straight, rest, lagged, thrifty, wave, lagged-pentagon, random")
       for name in ("pentagram", "", "2+", "2+,5+", "2-,5-", "a+,b-", "1+,2-,3+")),
     *((lambda name=name: scripted(name), "two different limbs from 1 to 5") for name in ("1+,1-", "1+,6-", "0+,1-")),
@@ -107,26 +118,10 @@ REFUSED = [
 """What is refused, and words of the sentence."""
 
 
-@pytest.mark.parametrize("call, words", REFUSED)
-def test_what_no_controller_could_use_is_refused_in_a_sentence(call, words):
-    with assert_refused(*words.split("|")):
-        call()
-
-
-def test_what_is_just_allowed_is_taken():
-    fitting(agent(decision_period=1.0 + 1e-12, observation_space=Box(-1.0, 1.0, (186,)), action_space=Discrete(21)))
-    require_policy(agent())
-    assert observed(np.zeros(4), 4).shape == (4,) and observed(np.zeros((0, 4)), 4).shape == (0, 4)
-    assert starts(None, 2).tolist() == [False] * 2 and starts(True, 2).tolist() == starts([1], 2).tolist() == [True] * 2
-    assert starts([0, 1], 2).tolist() == [False, True]
-    assert actions_of(agent(action_space=Discrete(73)), 9) == "pairs" and actions_of(agent(), 9) == "limbs"
-    says = agent(action_space=None), agent(action_space=Discrete(21)), agent(actions="joint")
-    assert [actions_in(policy, "continuous", 5) for policy in says] == ["continuous", "pairs", "joint"]
-    of_periods = [budget_for(seconds) for seconds in (None, 1.0, 0.5, 0.4, 0.2, 0.15, 0.1, 0.05)]
-    longer = [TIMED_BUDGETS[known] for known in (0.5, 0.5, 0.2, 0.2, 0.1, 0.1)]  # the next longer decision's
-    assert of_periods == [Budget(), Budget(), *longer]
-    cost = [budget.beam * (budget.depth - 1) for _, budget in sorted(TIMED_BUDGETS.items())]
-    assert cost == sorted(cost)
+def test_what_no_controller_could_use_is_refused_in_a_sentence(subtests):
+    for call, words in REFUSED:
+        with subtests.test(words), assert_refused(*words.split("|")):
+            call()
 
 
 # Agents by name: one line adds one.
@@ -239,3 +234,69 @@ def test_a_damaged_model_is_refused_in_a_sentence(tmp_path):
     model.save(tmp_path / "model.zip")
     with assert_refused("has weights that are not finite"):
         load_agents([str(tmp_path / "model.zip")])
+
+
+# Agents of a user's own module: found in the current folder, and asked for one robot at a time
+
+
+MINE = """
+import numpy as np
+
+class Mine:
+    actions = "pairs"
+
+    def __init__(self):
+        self.decisions = 0
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        assert observation.ndim == 1
+        self.decisions += 1
+        return np.int64((self.decisions + 7 * (observation[0] > 0)) % 21), state
+
+def make(env):
+    return Mine()
+"""
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    Path("mine_of_one.py").write_text(MINE)
+    yield tmp_path
+    sys.modules.pop("mine_of_one", None)
+
+
+def test_a_robot_in_company_swims_as_alone(here):
+    policy = call_function("mine_of_one:make", None)
+    first, second = (swim_many("mine", policy, "random", 3, FAST, max_strokes=6, threads=1) for _ in range(2))
+    for one, again in zip(first, second, strict=True):
+        np.testing.assert_array_equal(one.cross_track_errors, again.cross_track_errors)
+    observation = np.random.default_rng(0).standard_normal((3, 40)).astype(np.float32)
+    state = None
+    for decision in range(1, 5):
+        actions, state = policy.predict(observation, state, np.full(3, decision == 1))
+        assert actions.tolist() == [(decision + 7 * (row[0] > 0)) % 21 for row in observation]
+
+
+def test_what_cannot_be_copied_is_shared_and_what_is_batched_is_not_wrapped(here):
+    Path("mine_of_one.py").write_text(MINE + "\nimport threading\nMine.__init__ = lambda self: vars(self).update(\n"
+                                             "    decisions=0, lock=threading.Lock())\n")  # fmt: skip
+    policy = call_function("mine_of_one:make", None)
+    assert isinstance(policy, RobotByRobot) and policy.actions == "pairs" and policy.lock is not threading.Lock()
+    actions, _ = policy.predict(np.ones((2, 40), np.float32), None, np.ones(2, bool))
+    assert actions.tolist() == [8, 9]
+    Path("mine_batched.py").write_text("def make(env):\n    from seastar_gym.gaits import pentagon_gait\n"
+                                       "    from seastar_gym.controllers.open_loop import scripted\n"
+                                       "    return scripted('pentagon')\n")  # fmt: skip
+    assert type(call_function("mine_batched:make", None)) is type(scripted("pentagon"))
+
+
+@pytest.mark.parametrize("words", [("evaluate", "--task", "SeastarSwim-v0", "--seeds", "2", "--decisions", "3"),
+                                   ("evaluate", "--seconds", "3")])  # fmt: skip
+def test_a_fresh_process_finds_it_in_the_current_folder(here, words):
+    env = {**os.environ, "PYTHONPATH": str(Path(seastar_gym.__file__).parents[1])}
+    line = [sys.executable, "-P", "-m", "seastar_gym.cli", *words, "--agents", "mine_of_one:make"]
+    done = subprocess.run(line, env=env, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "mine_of_one:make" in done.stdout

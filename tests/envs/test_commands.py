@@ -9,12 +9,11 @@ import pytest
 from gymnasium import spaces
 
 from refusals import assert_refused
-from seastar_gym import RewardWeights, SymmetryReduction
+from seastar_gym import SymmetryReduction
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import LIMB_COMMANDS, action_space, command_table, to_commands
 from seastar_gym.envs.goal import SERVED, GoalForm
 from seastar_gym.envs.layout import Layout
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import weights
 
 
@@ -55,55 +54,6 @@ def test_actions_become_commands():
     assert limbs.tolist() == [[0.0, 1.0, -1.0, 0.0, 1.0], [-1.0] * 5]
     for actions in ("joint", "pairs"):
         np.testing.assert_array_equal(to_commands(actions, 5, np.array([3, 0]), 2), command_table(actions, 5)[[3, 0]])
-
-
-@pytest.mark.parametrize("actions", ["limbs", "joint", "pairs", "continuous"])
-def test_every_sampled_action_is_accepted_whatever_type_its_whole_numbers_have(actions):
-    space = action_space(actions, 4)
-    space.seed(0)
-    for _ in range(50):
-        commands = to_commands(actions, 4, np.asarray(space.sample())[None], 1)
-        assert commands.shape == (1, 4) and np.abs(commands).max() <= 1.0
-    given = np.zeros((1, 4)) if actions == "continuous" else np.zeros_like(space.sample(), np.uint8)[None]
-    assert not to_commands(actions, 4, given, 1).any() and not np.shares_memory(
-        to_commands(actions, 4, given, 1), given
-    )
-
-
-@pytest.mark.parametrize("actions, largest", [("limbs", 2), ("joint", 242), ("pairs", 20)])
-def test_actions_beyond_the_last_are_refused_with_a_sentence(actions, largest):
-    for bad in (largest + 1, -1, 10**12):
-        action = np.zeros((2, 5) if actions == "limbs" else 2, int)
-        action[1] = bad
-        with assert_refused(f'With actions="{actions}" an action is from 0 to {largest}, '):
-            to_commands(actions, 5, action, 2)
-    with assert_refused(f'With actions="{actions}" the actions of 2 robot'):
-        to_commands(actions, 5, np.zeros((3, 5), int), 2)
-
-
-# The rewarded route keeps to the aim of the weights, which are checked and have a plain form.
-
-
-HUB, CORNER, FOLLOWING = np.array([[-0.1, 0.0], [0.0, 0.0], [0.0, 0.1]])
-
-
-@pytest.mark.parametrize("aim", [0.0, 0.4, 0.7, 1.0])
-def test_the_route_round_a_corner_is_reflected_at_the_aim_and_the_last_leg_ends_in_the_centre(aim):
-    """By symmetry it touches the circle on the diagonal of a right angle."""
-    touch = aim * 0.01 * np.array([-1.0, 1.0]) / np.sqrt(2.0)
-    length = 2.0 * np.linalg.norm(HUB - touch)
-    assert RewardWeights(aim=aim).way_to_next(HUB, CORNER, FOLLOWING, 0.01) == pytest.approx(length, abs=1e-8)
-    hub, last = np.random.default_rng(0).normal(size=(2, 100, 2))
-    np.testing.assert_array_equal(RewardWeights(aim=aim).way_to_next(hub, last, last, 0.01), np.hypot(*(last - hub).T))
-
-
-def test_environments_reward_the_route_of_their_aim():
-    def progress(aim: float) -> float:
-        env = SeastarSwimEnv([[0.05, 0.0], [0.05, 0.1]], fidelity="fast", reward=RewardWeights(aim=aim))
-        env.reset(seed=0)
-        return env.step([0, 0, 1, 2, 0])[4]["reward_progress"]
-
-    assert abs(progress(0.0) - progress(1.0)) > 1e-3
 
 
 # The goal form says where the robot is and where it should be, and rewards as it says for any goals.

@@ -5,14 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from seastar_gym import HeadingTargets, RewardWeights, SmaWires
-from seastar_gym.envs import symmetry
+from seastar_gym import HeadingTargets, RewardWeights
 from seastar_gym.envs.layout import HEADINGS, Layout
 from seastar_gym.envs.options import wrapped
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import body_heading
 from seastar_gym.gaits import turning_wave
-from symmetries import symmetry_for
 
 AT = Layout(5, 2, HEADINGS)
 CORNERS = [[0.05, 0.0], [0.05, 0.05], [0.0, 0.0]]
@@ -116,40 +114,3 @@ def test_headings_are_along_the_legs_or_drawn():
 @pytest.mark.parametrize("angle, turn", [(0, 0), (np.pi, -np.pi), (1.5 * np.pi, -np.pi / 2), (-7.0, 2 * np.pi - 7.0)])
 def test_turns_go_the_shortest_way_round(angle, turn):
     assert wrapped(np.array(angle)) == pytest.approx(turn, abs=1e-12)
-
-
-# Symmetry
-
-
-def test_only_a_mirror_changes_a_turn():
-    seen = np.random.default_rng(0).normal(size=(10, AT.size))
-    mirror = symmetry.memory_mirror(SmaWires())
-    carried = symmetry_for(5, mirror, entries=HEADINGS).carry(seen, np.arange(10))
-    expected = seen[:, AT.headings].copy()
-    expected[1::2, 1::2] *= -1.0
-    np.testing.assert_array_equal(carried[:, AT.headings], expected)
-    plain = symmetry_for(5, mirror).carry(np.delete(seen, AT.headings, axis=1), np.arange(10))
-    np.testing.assert_array_equal(np.delete(carried, AT.headings, axis=1), plain)
-    back = symmetry_for(5, mirror, entries=HEADINGS).carry(carried, symmetry.inverse(np.arange(10), 5))
-    np.testing.assert_allclose(back, seen, atol=1e-13)
-
-
-# Pictures
-
-
-def test_pictures_show_the_asked_heading_and_limb_1():
-    pytest.importorskip("pygame")
-    pictures = []
-    for headings in (HeadingTargets(np.pi / 2), HeadingTargets(-np.pi / 2), None):
-        env = SeastarSwimEnv([[0.3, 0.0]], fidelity="fast", render_mode="rgb_array", headings=headings)
-        env.reset(seed=0)
-        pictures.append(env.render())
-        camera = env._batch.pictures.renderer_of(0).camera
-    places = [camera.to_pixels(place) for place in ([0.3, 0.025], [0.3, -0.025], [0.1, 0.0])]
-    orange = [[is_orange(picture[int(y), int(x)]) for x, y in places] for picture in pictures]
-    assert orange == [[True, False, True], [False, True, True], [False, False, False]]
-
-
-def is_orange(colour):
-    red, green, blue = colour.astype(int)
-    return red > 200 and 80 < green < 160 and blue < 60

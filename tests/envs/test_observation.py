@@ -22,7 +22,6 @@ from seastar_gym import (
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
 from seastar_gym.envs.observation import observe
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import at_stations, heading_of, stations_of
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -84,17 +83,6 @@ def test_every_index_holds_what_the_table_says(scene):
             scene.robot, simulator.positions[robot], simulator.velocities[robot], targets[robot, :2], targets[robot, 2:]
         )
         np.testing.assert_allclose(found[robot], expected, rtol=0.0, atol=1e-12)
-
-
-def test_an_environment_shows_its_simulators_state_and_its_waypoints():
-    env = SeastarSwimEnv("random", fidelity="fast", random_heading=True, scene=Scene(TEN))
-    (observation, _), rng = env.reset(seed=3), np.random.default_rng(0)
-    for _ in range(10):
-        q, v = env.simulator.positions[0], env.simulator.velocities[0]
-        expected = expected_observation(env.scene.robot, q, v, *env.waypoints[:2])
-        np.testing.assert_allclose(observation, expected, rtol=2e-7, atol=1e-6)
-        observation, _, _, _, info = env.step(rng.integers(0, 3, 5))
-        assert info["waypoint_index"] == 0
 
 
 @pytest.mark.parametrize("nodes_per_limb", [5, 10])

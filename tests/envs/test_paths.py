@@ -9,9 +9,7 @@ from scipy.interpolate import CubicSpline
 from refusals import assert_refused
 from seastar_gym import Attachment, Body, Scene, Seastar
 from seastar_gym.envs import paths
-from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.paths import FEW, PATHS, cross_track_error, make_path, path_length, register_path, shortest_way
-from seastar_gym.envs.robots import Robots
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import (
     at_stations,
@@ -22,7 +20,6 @@ from seastar_gym.envs.stations import (
     stations_of,
     weights,
 )
-from seastar_gym.envs.waypoints import AlongPath
 
 ORIGIN = np.zeros(2)
 
@@ -140,19 +137,6 @@ def test_a_registered_path_can_be_asked_for_by_its_name_and_is_checked(monkeypat
     register_path("nowhere")(lambda rng: np.zeros((1, 2)))
     with assert_refused("must lead away from the origin"):
         path_of("nowhere")
-
-
-def test_a_longer_path_of_another_robot_leaves_the_way_to_go_as_it_is():
-    scene = Scene(Seastar(nodes_per_limb=3))
-    path = [[0.1, 0.0], [0.1, 0.1], [0.3, 0.1]]
-    task = AlongPath(path)
-    robots = Robots(task, SwimOptions(scene=scene), 2, 1)
-    generators = [np.random.default_rng(robot) for robot in range(2)]
-    robots.reset(np.array([True, True]), generators)
-    before = task.measure_way_to_go(robots, np.zeros((2, 2)))
-    robots.reset(np.array([False, True]), generators, [*path, [0.3, 0.3], [0.4, 0.3]])
-    after = task.measure_way_to_go(robots, np.zeros((2, 2)))
-    assert after[0] == before[0] and after[1] == pytest.approx(before[1] + 0.3)
 
 
 def test_a_fidelity_of_a_scene_that_nobody_measured_promises_nothing():

@@ -248,16 +248,6 @@ def test_pictures_survive_a_stranger_who_quits_pygame_and_others_who_take_the_wi
     large.close()
 
 
-def test_frames_are_shown_no_faster_than_asked(dummy_window):
-    renderer = renderer_of()
-    renderer.show(frame_of(), fps=20)
-    start = pygame.time.get_ticks()
-    for _ in range(4):
-        renderer.show(frame_of(), fps=20)
-    assert pygame.time.get_ticks() - start >= 190
-    renderer.close()
-
-
 def test_a_window_where_nobody_looks_is_refused(monkeypatch):
     """SDL has a driver without a display, and takes it without being asked."""
     pygame.display.quit()

@@ -18,7 +18,9 @@ from seastar_gym import (
     Scene,
     Seastar,
     Simulator,
+    SmaWires,
     SolverStatus,
+    ThermalSma,
     Uniform,
 )
 from seastar_gym.accuracy import chapters_certificate, timed_certificate
@@ -29,7 +31,6 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 
 STRAIGHT = np.array([0, 1, 0, 0, 2])
-REST = np.zeros(5, int)
 
 
 def fast(**arguments) -> SeastarSwimEnv:
@@ -70,12 +71,20 @@ def test_info_tells_what_was_measured_of_the_fidelity(fidelity, period):
     assert info["path_error"] <= (info["space_error"] + info["time_error"]) * (1.0 + 1e-5)
 
 
-@pytest.mark.parametrize("scene", [Scene(Seastar(youngs_modulus=2e6)), Scene(fluid=None), Scene(Seastar(5, 9)), None])
-def test_info_promises_nothing_for_robots_that_were_not_measured_or_were_drawn(scene):
+SOFT, HOT = Seastar(youngs_modulus=2e6), ThermalSma(largest_temperature=60.0)
+
+
+@pytest.mark.parametrize(
+    "scene, period",
+    [*((scene, None) for scene in (Scene(SOFT), Scene(fluid=None), Scene(Seastar(5, 9)), None)), (Scene(), 0.05),
+     *((scene, 0.2) for scene in (Scene(SOFT, actuator=SmaWires()), Scene(actuator=SmaWires(refractory=True)),
+                                  Scene(actuator=HOT)))],
+)  # fmt: skip
+def test_info_promises_nothing_for_robots_and_times_that_were_not_measured_or_were_drawn(scene, period):
     draws = None if scene else DomainRandomization({"limb_strengths": Uniform(0.5, 0.9)})
-    env = SeastarSwimEnv(scene=scene, fidelity="fast", randomization=draws)
+    env = SeastarSwimEnv(scene=scene, fidelity="fast", randomization=draws, decision_period=period)
     for info in (env.reset(seed=0)[1], env.step(STRAIGHT)[4]):
-        assert np.isnan([info["path_error"], info["batch_real_time_factor"]]).all()
+        assert np.isnan([info["path_error"], info.get("batch_real_time_factor", np.nan)]).all()
     env = fast()  # and nothing once the scene or a strength was changed
     known = env.reset(seed=0)[1]["path_error"]
     chapters = env.simulator.scene

@@ -198,15 +198,6 @@ def test_action_maps_say_what_the_command_map_says_and_are_a_group_action(mode, 
             np.testing.assert_array_equal(carry(carry(actions, first), second), at_once)
 
 
-@pytest.mark.parametrize("group", [5, *(symmetry.symmetry_of(scene) for scene, *_ in LESSER.values())], ids=str)
-@pytest.mark.parametrize("mode", MODES)
-def test_restored_actions_are_those_before_the_reduction(mode, group):
-    actions = random_actions(mode, 5 if group == 5 else 4, 100)
-    elements = np.random.default_rng(3).choice(elements_of(group), 100)
-    reduced = symmetry_for(group, mode=mode).carry_actions(actions, elements)
-    np.testing.assert_array_equal(symmetry_for(group, mode=mode).restore(reduced, elements), actions)
-
-
 # Which scenes are symmetric
 
 TAPERED = replace(STAR, limbs=(Limb(length=0.09, radius=(2e-3, 1e-3)),) * 4)

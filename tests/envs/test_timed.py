@@ -10,21 +10,16 @@ from seastar_gym import (
     Numerics,
     RewardWeights,
     Scene,
-    Seastar,
     SmaPulse,
     SmaWires,
     SymmetryReduction,
     ThermalSma,
 )
-from seastar_gym.accuracy.chapters import ERRORS
-from seastar_gym.envs.commands import action_masks, to_commands
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 
 FAST = Numerics.preset("fast")
-MODES = ("limbs", "joint", "pairs", "continuous")
 REFRACTORY = Scene(actuator=SmaWires(refractory=True), numerics=FAST)
-STIFF = Scene(Seastar(youngs_modulus=2e6), actuator=SmaWires(), numerics=FAST)
 HOT = Scene(actuator=ThermalSma(largest_temperature=240.0 - 220.0 * np.exp(-0.05 / 0.42)), numerics=FAST)
 """Wires reach the largest temperature after 0.05 s."""
 STRAIGHT = np.array([0, 1, 0, 0, 2])
@@ -45,15 +40,6 @@ def test_a_decision_is_a_stroke_unless_another_period_is_asked_for():
             env.reset(seed=0)
             for k in range(1, 4):
                 assert env.step(STRAIGHT)[4]["time"] == pytest.approx(k * period, rel=1e-14)
-
-
-@pytest.mark.parametrize("scene, period", [(None, 0.05), (REFRACTORY, 0.2), (HOT, 0.2), (STIFF, 0.2)])
-def test_other_robots_and_wires_and_times_that_were_not_measured_are_promised_nothing(scene, period):
-    fidelity = "fast" if scene is None else None
-    env = SeastarSwimEnv(scene=scene, fidelity=fidelity, decision_period=period)
-    batch = SeastarSwimVectorEnv(2, scene=scene, fidelity=fidelity, decision_period=period)
-    for info in (env.reset(seed=0)[1], batch.reset(seed=0)[1], batch.step(np.zeros((2, 5), int))[4]):
-        assert all(np.isnan(info[name]).all() for name in ERRORS) and "batch_real_time_factor" not in info
 
 
 # Heat
@@ -114,23 +100,6 @@ def test_the_memory_of_wires_is_observed_or_not_and_forgotten_at_a_reset():
 
 
 # Masks
-
-
-@pytest.mark.parametrize("actions", MODES)
-def test_a_mask_is_true_for_actions_that_are_followed_as_a_whole(actions):
-    rng = np.random.default_rng(0)
-    refractory = rng.random((4, 5, 2)) < 0.3
-    masks = action_masks(actions, refractory)
-    if actions == "continuous":
-        np.testing.assert_array_equal(masks, ~refractory.reshape(4, 10))
-    elif actions == "limbs":
-        np.testing.assert_array_equal(masks.reshape(4, 5, 3)[..., 1:], ~refractory)
-        assert masks.reshape(4, 5, 3)[..., 0].all()
-    else:
-        for number in range(masks.shape[1]):
-            commands = to_commands(actions, 5, np.full(4, number), 4)
-            followed = ~((commands > 0) & refractory[..., 0] | (commands < 0) & refractory[..., 1]).any(axis=1)
-            np.testing.assert_array_equal(masks[:, number], followed)
 
 
 @pytest.mark.parametrize("scene", [REFRACTORY, HOT])

@@ -53,40 +53,7 @@ def test_nothing_that_was_returned_changes_later_and_what_a_caller_does_to_it_ch
     assert actions.min() == 1
 
 
-def test_a_reset_takes_seeds_and_paths_as_single_environments_do():
-    """Paths of different lengths, one number or a seed for every robot, or the next episode of one that has begun."""
-    batch, singles = both(ID, 3, max_episode_steps=3, fidelity="fast", random_heading=True)
-    seen = []
-    for seed, path in ((2, "line"), ([7, 2, 3], "figure-eight"), (None, [[0.1, 0.0], [0.2, 0.0]]), (5, "random")):
-        results = [env.reset(seed=seed, options={"path": path}) for env in (batch, singles)]
-        assert_same_steps(*results)
-        seen.append(results[0][0])
-        for _ in range(5):  # beyond the time limit: then the environment's own path again
-            actions = np.ones((3, 5), int)
-            assert_same_steps(batch.step(actions), singles.step(actions))
-    own = batch.reset(seed=2)[0]
-    np.testing.assert_array_equal(batch.reset(seed=[None, 2, 3])[0][1:], own[:2])
-    assert min(np.abs(batch.reset()[0] - each).max() for each in (own, *seen)) > 1e-3
-
-
 # What a vector environment of Gymnasium offers
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["waypoints", "action_space", "observation_space", "actions", "scene", "np_random_seed", "render_mode",
-     "action_masks"],
-)  # fmt: skip
-def test_attributes_are_those_of_single_environments(name):
-    batch, singles = both(ID, 3, path="random", fidelity="fast")
-    for env in (batch, singles):
-        env.reset(seed=4)
-    found, expected = batch.call(name), singles.call(name)
-    assert type(found) is type(expected) is tuple and len(found) == len(expected) == 3
-    for one, other in zip(found, expected, strict=True):
-        np.testing.assert_equal(one, other)
-    if name != "action_masks":
-        np.testing.assert_equal(batch.get_attr(name), found)
 
 
 def test_attributes_are_set_as_in_single_environments_and_what_is_common_is_refused():

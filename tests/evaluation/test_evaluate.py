@@ -8,9 +8,9 @@ import gymnasium as gym
 import imageio.v3 as imageio
 import numpy as np
 import pytest
-from matplotlib.colors import to_rgb
 
 from evaluation.made_up import made_up_swim
+from later import Later
 from refusals import assert_refused
 from seastar_gym import TASKS, Scene, SmaPulse
 from seastar_gym.controllers.open_loop import scripted
@@ -24,6 +24,8 @@ from seastar_gym.evaluation.pictures import COLOURS, FPS, FRAMES_PER_STROKE
 from seastar_gym.evaluation.results import results, time_series, write_csv
 from seastar_gym.evaluation.rollout import MEASURES, SECONDS, Episodes, make_batch, measure_of, measure_of_task, rollout
 from seastar_gym.evaluation.swim import RECORDED, Disturbance, swim, swims_of
+
+colors = Later("matplotlib.colors")
 
 SHORT = [[0.02, 0.0]]
 EASY = {"fidelity": "fast", "waypoint_radius": 2e-3, "say": lambda text: None}
@@ -99,7 +101,7 @@ def test_files_hold_the_swims_and_a_picture_their_traces(written, tmp_path, monk
     pixels = imageio.imread(folder / "new" / "traces.png")[..., :3].astype(float) / 255.0
     assert min(pixels.shape[:2]) > 200
     for colour in COLOURS[:2]:
-        assert np.count_nonzero(np.abs(pixels - to_rgb(colour)).max(axis=-1) < 0.02) > 100
+        assert np.count_nonzero(np.abs(pixels - colors.to_rgb(colour)).max(axis=-1) < 0.02) > 100
     monkeypatch.chdir(tmp_path)
     evaluate({"a": scripted("straight")}, SHORT, max_strokes=1, **EASY)
     evaluate({"a": scripted("straight")}, SHORT, max_strokes=1, out="there", video=False, **EASY)

@@ -10,7 +10,7 @@ from PIL import Image
 
 from evaluation.made_up import MARKUP, swims
 from refusals import assert_refused
-from seastar_gym import Scene, UniformCurrent, Vortex, Water
+from seastar_gym import Scene, UniformCurrent, Vortex
 from seastar_gym.controllers.open_loop import scripted
 from seastar_gym.envs.frame import Frame
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -225,15 +225,6 @@ def test_the_page_needs_nothing_beside_it_and_is_light(evaluated):
     (recorded,) = re.findall(r"^const recorded = (.*);$", text, flags=re.MULTILINE)
     assert [each["agent"] for each in json.loads(recorded)["swims"]] == ["straight", MARKUP]
     assert json.loads(recorded)["path"] == [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0]]
-
-
-def test_a_current_and_films_are_on_the_page(tmp_path):
-    scene = replace(Scene.preset("fast"), fluid=Water(current=Vortex(1e-3)))
-    agents = {"straight & on": scripted("straight")}
-    evaluate(agents, SHORT, max_strokes=2, scene=scene, out=tmp_path, report=Remarks(), say=lambda text: None)
-    text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    (filmed,) = re.findall(r'Films: <a href="([^"]+)">straight &amp; on</a>', text)
-    assert (tmp_path / filmed).is_file() and '"name":"current up to' in text
 
 
 class Watched:

@@ -11,7 +11,6 @@ from seastar_gym import Scene, Seastar, SmaPulse, Water
 from seastar_gym.identify import command as its_command
 from seastar_gym.identify import identify, synthetic, with_parameters
 from seastar_gym.identify.fit import DOUBT
-from seastar_gym.identify.search import beginning, noise_of
 
 NAMES = ("fluid.drag_coefficient", "robot.youngs_modulus", "actuator.peak_angle")
 TRUE = 1.5, 0.55e6, 0.42
@@ -35,16 +34,6 @@ def test_limbs_that_ring_have_their_modulus_found_from_afar(seed, n_strokes, fac
     assert found.values == pytest.approx(TRUE, rel=0.03) and not found.is_doubted and found.at_end == ()
     assert found.scene.numerics == scene.numerics  # though it was fitted with a smaller tolerance
     assert found.noise == pytest.approx(1e-3, rel=0.15)
-
-
-def test_a_wrong_minimum_is_left_for_the_right_one(monkeypatch):
-    """From all strokes at once, from where the fit of this track ends 44 % too low."""
-    scene = with_parameters(RINGING, [NAMES[1]], [0.5 * FIRST[1]])
-    monkeypatch.setattr("seastar_gym.identify.search.STAGES", ())
-    found = identify(scene, NAMES, track())
-    assert found.values[1] == pytest.approx(TRUE[1], rel=0.03)
-    monkeypatch.setattr("seastar_gym.identify.search.STIFFNESS", {})
-    assert identify(scene, NAMES, track()).is_doubted
 
 
 @pytest.mark.parametrize("turn, shift", [(0.0, (0.0, 0.0)), (6e-3, (5e-4, -8e-4)), (-8e-3, (-7e-4, 0.0))])
@@ -97,25 +86,6 @@ def test_a_number_at_the_end_of_the_search_is_named(monkeypatch):
     monkeypatch.setattr("seastar_gym.identify.fit.LARGEST_FACTOR", 1.1)
     found = identify(with_parameters(RINGING, NAMES[1:], TRUE[1:]), NAMES[:1], track(n_strokes=2))
     assert found.at_end == NAMES[:1] and "at the end of the search" in found.report()
-
-
-def test_noise_is_that_of_each_coordinate():
-    t = np.linspace(0.0, 3.0, 400)[:, None, None]
-    exact, rng = np.concatenate([np.sin(t), np.cos(t)], axis=2), np.random.default_rng(0)
-    assert noise_of(exact + 2e-3 * rng.standard_normal(exact.shape)) == pytest.approx(2e-3, rel=0.1)
-    assert np.isnan(noise_of(exact[:4]))
-    unlike = exact + np.array([[1e-3], [1e-4]]) * rng.standard_normal((400, 2, 2))
-    assert noise_of(unlike) == pytest.approx(np.sqrt(0.5 * (1e-6 + 1e-8)), rel=0.1)
-
-
-@pytest.mark.parametrize("timed", [False, True])
-def test_the_beginning_of_a_track_has_its_commands(timed):
-    seen = track()
-    seen = replace(seen, command_times=3.0 + 1.1 * np.arange(6.0), time=seen.time + 3.0) if timed else seen
-    begin = 3.0 * timed
-    part = beginning(seen, 2.0, 1.0)
-    assert part.time[-1] < begin + 2.0 <= seen.time[len(part.time)] + 1e-9 and len(part.commands) == 2
-    assert len(beginning(seen, 2.0, 1.0, margin=0.5).commands) == 3 and beginning(seen, 9.0, 1.0) is None
 
 
 def turned(angle):

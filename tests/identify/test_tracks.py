@@ -204,21 +204,6 @@ def test_hdf5_as_trackers_write_it_is_read(tmp_path):
     np.testing.assert_array_equal(track.points["tip"], tracks[0, :, 1].T)
 
 
-@pytest.mark.parametrize("up", ["y", "z"])
-def test_a_rigid_body_turns_as_its_points_do(up, tmp_path):
-    """Anti-clockwise from above, whichever axis is up: a marker on the body's x-axis is where its heading says."""
-    angle = 0.7
-    axis = {"y": (0.0, math.sin(angle / 2), 0.0), "z": (0.0, 0.0, math.sin(angle / 2))}[up]
-    x = {"y": (math.cos(angle), 0.0, -math.sin(angle)), "z": (math.cos(angle), math.sin(angle), 0.0)}[up]
-    rows = MOTIVE.splitlines()
-    numbers = [0, 0.0, *axis, math.cos(angle / 2), 0.0, 0.0, 0.0, 0.1, 0, 0, 0, 1.0, *x]
-    file = written(tmp_path, "motive.csv", "\n".join([*rows[:7], ",".join(map(str, numbers))]))
-    track = read_motive(file, up)
-    marker = track.points["Seastar:Marker 001"][0] - track.points["Seastar"][0]
-    assert math.atan2(marker[1], marker[0]) == pytest.approx(angle)
-    assert track.orientations["Seastar"][0] == pytest.approx(angle)
-
-
 CORNERS = np.array([[0.0, 0.0], [0.4, 0.0], [0.4, 0.3], [0.0, 0.3]])
 
 

@@ -9,12 +9,12 @@ import pytest
 
 from faults import Tank
 from refusals import assert_refused
-from seastar_gym import Scene, Simulator, SmaWires, ThermalSma
+from seastar_gym import Scene, SmaWires, ThermalSma
 from seastar_gym.controllers import scripted
 from seastar_gym.controllers.learned import pretrained
 from seastar_gym.plant import guard as heat
 from seastar_gym.plant.guard import Guard, Limits
-from seastar_gym.plant.plant import PlantError, SimulatedPlant
+from seastar_gym.plant.plant import PlantError
 from seastar_gym.plant.swim import PlantSwim
 
 
@@ -122,15 +122,6 @@ def test_what_policies_command_is_heated(name, options, policy, most):
         guard.heat((command * follows).tolist(), 0.1)
         guard.wait_until(plant.time + env.unwrapped.decision_period)
     assert asked > 30 and masked <= most * asked and plant.heated.hottest() <= 100.0
-
-
-def test_a_third_pulse_in_a_row_is_masked():
-    scene = Scene(actuator=SmaWires()).at("fast")
-    env = PlantSwim(SimulatedPlant(Simulator(scene)), scene=scene, decision_period=0.2, actions="pairs")
-    env.reset()
-    infos = [env.step(action)[4] for action in [0] * 10 + [3] * 3]
-    assert [info["masked_limbs"] for info in infos[10:]] == [0, 0, 2]
-    assert not any(info["plant_message"] for info in infos)
 
 
 def test_a_swim_takes_the_numbers_of_the_scene_s_wires():

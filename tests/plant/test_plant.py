@@ -10,7 +10,6 @@ import time
 import tty
 from collections import deque
 from dataclasses import replace
-from io import FileIO
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -19,7 +18,7 @@ import pytest
 
 from evaluation import made_up
 from faults import LIES
-from refusals import assert_refused, assert_told
+from refusals import assert_refused
 from seastar_gym import Body, DomainRandomization, Scene, Seastar, Sight, Simulator, SmaPulse, SmaWires, Uniform, files
 from seastar_gym.cli import drive as drive_command
 from seastar_gym.cli.drive import report
@@ -29,7 +28,7 @@ from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.open_loop import OpenLoopPolicy
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.rollout import rollout
-from seastar_gym.identify import Measurement, identify, trajectory, with_parameters
+from seastar_gym.identify import Measurement, trajectory
 from seastar_gym.identify.measurement import ORIENTATION
 from seastar_gym.plant import lines
 from seastar_gym.plant.guard import FIRST, Guard, Limits
@@ -238,26 +237,6 @@ def test_bad_lines_stop_the_wires(bad, ends):
     assert plant.heated().any() == (b"hello 2" not in bad)
 
 
-def test_silence_stops_the_wires(ends):
-    plant = simulated()
-    far, server = joined(ends, plant)
-    far.heat([1, 0, 0, 0, 0], 0.08)
-    server.turn(), plant.wait(0.005)
-    assert plant.heated().any()
-    server._heard_at -= lines.SILENCE
-    server.turn()
-    assert not plant.heated().any()
-
-
-def test_a_driver_that_sends_without_end_does_not_keep_the_plant(ends):
-    plant = simulated()
-    plant.heat([1, 0, 0, 0, 0], 0.08)
-    with FileIO("/dev/zero", "r+") as flood:
-        server = Server(plant, flood)
-        server.turn(), server.turn()
-    assert not plant.heated().any()
-
-
 @pytest.mark.parametrize("error", [OSError(5, "gone"), KeyboardInterrupt(), MemoryError(), SystemExit()])
 def test_whatever_ends_a_plant_s_loop_stops_the_wires(error, ends, monkeypatch):
     plant = simulated()
@@ -310,30 +289,6 @@ def test_pulses_that_waited_for_a_busy_plant_are_not_heated(ends):
     assert not plant.heated().any()
     with pytest.raises(PlantError, match="The plant was busy"):
         far.sight()
-
-
-@pytest.mark.parametrize("seconds", [np.nan, np.inf, -0.01, 1e300])
-def test_a_line_asks_for_no_pulse_that_cannot_be(seconds, ends):
-    far, _ = joined(ends, simulated())
-    with assert_refused("A pulse must be from 0 to 10 s"):
-        far.heat([1, 0, 0, 0, 0], seconds)
-
-
-@pytest.mark.parametrize(
-    "said, words",
-    [("hello 2 5", "speaks version 2"), ("sight 1 2 3", "needs numbers"), ("sight 1 2 3 four", "needs numbers"),
-     ("sight 1 2 3 4 5 6", "do not suit 5 limbs"), ("error It burns.", "The plant has stopped: It burns."),
-     *((f"sight {number} 0 0 0", "needs numbers") for number in
-       ("nan", "inf", "1e999", "1_0", "0x1", "9" * 400, "١", "+1", "1e")),
-     ("sight 1 0 0 0 inf 0 0 0 0 0 0 0 0 0", "need to be numbers"), (f"hello 1 {'9' * 5000}", "more than 4096 bytes"),
-     ("what", "says no 'what'"), ("hello 1 0", "speaks version 1"), ("hello 1 5", "has restarted")],
-)  # fmt: skip
-def test_what_a_driver_does_not_understand_is_said_in_a_sentence(said, words, ends):
-    far, _ = joined(ends, simulated())
-    ends[0].send(sealed(said))
-    with pytest.raises(PlantError, match=words) as refused:
-        far.sight()
-    assert str(refused.value).endswith(".")
 
 
 def test_a_line_that_is_closed_or_full_is_said_to_be(ends, monkeypatch):
@@ -460,20 +415,6 @@ def test_logs_tell_when_commands_were_given_and_what_the_robot_did(scene, nodes,
     assert np.abs(measured.positions - expected).max() < 1e-3 < np.abs(expected - expected[0]).max() / 10
     poses = np.loadtxt(tmp_path / "poses.csv", delimiter=",", skiprows=1)
     assert poses[0, 4] == pytest.approx(1.0, abs=1e-6) and (poses[:, 0] < poses[:, 1]).all() and len(poses) > 100
-
-
-def test_logs_of_late_decisions_tell_the_drag(tmp_path):
-    truth = with_parameters(SCENE, ["fluid.drag_coefficient"], [1.3])
-    plant = simulated(Sight(delay=0.05, noise=5e-4, turn_noise=0.01), scene=truth)
-    env = PlantSwim(plant, logs=tmp_path, **OPTIONS)
-    env.reset(seed=0)
-    for action in np.random.default_rng(0).integers(env.action_space.n, size=12).tolist():
-        plant.wait(0.02)
-        env.step(action)
-    env.close()
-    measured = Measurement.from_csv(tmp_path / "tracking.csv", tmp_path / "commands.csv")
-    found = identify(SCENE, ["fluid.drag_coefficient"], measured)
-    assert found.values[0] == pytest.approx(1.3, rel=0.05) and not found.is_doubted
 
 
 def test_markers_between_nodes_are_not_tracked():
@@ -663,14 +604,3 @@ def test_a_port_has_one_driver_and_one_that_is_full_is_no_hang():
         with pytest.raises(PlantError, match="takes no more lines"):
             deque((talk.send("beat") for _ in range(100_000)), maxlen=0)
     os.close(ours), os.close(theirs)
-
-
-@pytest.mark.parametrize(
-    "line, words",
-    [("/dev/none", "/dev/none cannot be opened: no such file or directory."),
-     ("/dev/null", "/dev/null is no serial line.")],
-)  # fmt: skip
-def test_what_is_no_serial_line_is_said_in_a_sentence(line, words, tmp_path, capsys):
-    """Of other commands that cannot be done: cli/test_cli.py."""
-    assert drive(tmp_path, "--yes", "--plant", f"serial:{line}") != 0
-    assert_told(capsys, words)

@@ -17,7 +17,6 @@ import pytest
 from faults import COLD_WITHIN, LIES, Heated, garbage, greedy
 from seastar_gym.plant.guard import LATENESS, Limits
 from seastar_gym.plant.lines import LinePlant, sealed
-from seastar_gym.plant.plant import PlantError
 
 pytestmark = pytest.mark.skipif(
     not (shutil.which("g++") and hasattr(os, "openpty")), reason="There is no compiler, or no pseudo-terminal, here."
@@ -97,29 +96,6 @@ def test_pulses_heat_their_wires_for_their_time(wires):
     beat(plant, 0.05)
     (began, *_), (ended, *_) = changes()[4:]
     assert ended - began < 60
-
-
-def test_a_driver_that_is_silent_has_cold_wires(wires):
-    plant, _, changes = wires
-    plant.heat([1, 1, 1, 1, 1], 0.12)
-    plant.sight()
-    time.sleep(0.3)
-    times = [change[0] for change in changes()]
-    assert len(times) == 10 and 95 <= max(times) - min(times) <= 119
-
-
-@pytest.mark.parametrize(
-    "bad", [b"heat 80 +0000\n", b"x" * 300 + b"\n", *map(sealed, ["heat 121 +0000", "heat 80 +000", "heat 80 +000x",
-                                                                  "heat +0000", "fly", "heat  +0000"])]
-)  # fmt: skip
-def test_bad_lines_cool_the_wires_and_are_told(bad, wires):
-    plant, line, changes = wires
-    plant.heat([0, 1, 0, 0, 0], 0.12)
-    os.write(line, bad)
-    with pytest.raises(PlantError, match="The plant has stopped: "):
-        beat(plant, 1.0)
-    (on, *_), (off, *_) = changes()
-    assert off - on < 60
 
 
 # On a clock that is played

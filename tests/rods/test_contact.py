@@ -1,5 +1,7 @@
 """Contact between limbs: energy, forces and step are the oracle's; who touches whom, and who came to cross whom."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -11,17 +13,17 @@ from seastar_gym.lanes.plain import Lanes, Mask
 from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.model import make_rods
 from seastar_gym.rods.bundles import make_work
-from seastar_gym.rods.contact import coupled
 from seastar_gym.rods.contact.coupled import add_contact_product, solve_again_coupled, solve_coupled, solver_iterations
 from seastar_gym.rods.contact.forces import SLOT_ROWS, STIFFNESS, add_contact, add_contact_energy, members, n_listed
-from seastar_gym.rods.contact.pairs import edges_cross, freeze_contact, on_their_sides, without_new_crossings
+from seastar_gym.rods.contact.pairs import freeze_contact, without_new_crossings
 from seastar_gym.rods.guard import add_held_energy
 from seastar_gym.rods.linear import solve_again, substitute_star
 from seastar_gym.rods.potential import factorise
 from seastar_gym.rods.step import SCHEMES, Stage
+from seastar_gym.rods.terms.hub import Actuation, set_natural_hub_angles
+from seastar_gym.scene.robot import Discretisation
 from slopes import nodes, plain, rotated, rows
 from stages import EVERYONE, RandomStages, robot_and_star
-from touching import touching_limbs
 
 ANGLE = 0.3
 
@@ -154,7 +156,6 @@ def test_limbs_that_press_each_other_store_the_same_where_a_stage_asks_and_where
 ROBOT = Seastar(5, 4)
 RODS = make_rods(Scene(ROBOT, actuator=SmaPulse(0.1), contact=Contact()))
 REST = ROBOT.nodes()
-RNG = np.random.default_rng(0)
 ODD = np.arange(N_LANES) % 2 == 1
 
 
@@ -190,31 +191,6 @@ def test_limbs_that_crossed_before_may_part_again_and_robots_whose_pairs_were_no
     np.testing.assert_array_equal(found(REST, REST, missed=ODD), ~ODD)
 
 
-def test_limbs_are_on_their_sides_of_a_line_across_the_difference_of_their_roots():
-    """Of bent robots away from the origin, some with limbs that come near to each other."""
-    q_0 = REST + 0.2 + 2e-3 * RNG.standard_normal((N_LANES, *REST.shape))
-    q_1 = q_0 + 0.02 * RNG.standard_normal(q_0.shape)
-    seen = plain(on_their_sides(RODS, rows(q_1), rows(q_0), 1, 2))
-    for lane in range(N_LANES):
-        a, b = (root / np.linalg.norm(root) for root in q_0[lane, [4, 7]] - q_0[lane, 0])
-        across = b - a + rotated(a + b, 0.5 * np.pi)
-        right, left = ((q_1[lane, 3 * limb + 1 : 3 * limb + 4] - q_1[lane, 0]) @ across for limb in (1, 2))
-        assert seen[lane] == (right.max() < 0.0 < left.min())
-    assert 0 < seen.sum() < N_LANES
-
-
-def test_edges_cross_where_the_lines_through_them_meet_within_both():
-    """And not at their ends."""
-    q = RNG.standard_normal((40, N_LANES, ROBOT.n_nodes, 2))
-    q[0, :, [1, 2, 5, 6]] = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0], [0.5, 0.0]])[:, None]
-    for each in q:
-        seen = plain(edges_cross(RODS, rows(each), 1, 5))
-        for lane in range(N_LANES):
-            (i, k), (j, m) = each[lane, [1, 2]], each[lane, [5, 6]]
-            shares = np.linalg.solve(np.stack([k - i, j - m], axis=1), j - i)
-            assert seen[lane] == np.all((shares > 0.0) & (shares < 1.0))
-
-
 # The Newton step where limbs touch solves the star's matrix plus that of contact.
 
 
@@ -246,17 +222,26 @@ def test_the_step_solves_the_star_and_contact_together_and_derivatives_do_to_rou
     np.testing.assert_array_equal(plain(solver_iterations(work)), iterations)
 
 
-def test_whoever_does_not_arrive_in_200_iterations_is_missed(monkeypatch):
-    touching, iterations = touching_limbs(), []
-    rods, work = touching.rods, touching.work
-    _, alone, _ = factorise(rods, work, touching.stage, None)
+# Touching limbs
 
-    def never_less(rods, a, b):
-        if a is work.contact.r:
-            iterations.append(1.0)
-        return Lanes(1.0)
 
-    monkeypatch.setattr(coupled, "dot", never_less)
-    solve_coupled(rods, work, EVERYONE, alone)
-    assert work.contact.missed.all() and len(iterations) == 1 + 200
-    assert np.all(plain(solver_iterations(work)) == 200.0)
+GAMMA = 2e-4
+
+
+def touching_limbs(discretisation: Discretisation = "continuum") -> SimpleNamespace:
+    """Limbs 1 and 2 of five lie along each other."""
+    robot, star = Seastar(5, 4, discretisation=discretisation), Star(5, 4)
+    rods = make_rods(Scene(robot, actuator=SmaPulse(0.1), contact=Contact()))
+    q_0, rng = np.tile(star.rest, (N_LANES, 1, 1)), np.random.default_rng(0)
+    q = q_0.copy()
+    for limb, turn in ((0, 0.62), (1, -0.62)):
+        own = slice(3 * limb + 1, 3 * limb + 4)
+        q[:, own] = rotated(q[:, own], turn)
+    q += 2e-4 * rng.standard_normal(q.shape)
+    work = make_work(rods, 1)
+    work.q[:], work.q_hat[:], work.v_hat[:] = rows(q), rows(q - 1e-4), 0.1 * rng.standard_normal(work.q.shape)
+    still = np.zeros((5, N_LANES))
+    set_natural_hub_angles(rods, work, Actuation(still, still), Lanes(1.0))
+    stage = Stage(work.q_hat, work.v_hat, Lanes(GAMMA), Lanes(1.0 / GAMMA), False)
+    freeze_contact(rods, work, stage, rows(q_0))
+    return SimpleNamespace(rods=rods, work=work, stage=stage, q_0=rows(q_0))

@@ -11,7 +11,6 @@ from seastar_gym.lanes.plain import Lanes, Mask
 from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.model import make_rods
 from seastar_gym.rods import interval
-from seastar_gym.rods import step as steps
 from seastar_gym.rods.bundles import make_work
 from seastar_gym.rods.interval import cover_interval
 from seastar_gym.rods.newton import Limits
@@ -24,17 +23,14 @@ from seastar_gym.rods.step import (
     SCHEMES,
     SIZE,
     STEPS,
-    Step,
-    end_guarded_step,
     memory_row,
 )
-from seastar_gym.rods.terms.hub import Actuation
 from slopes import plain, rows
 
 ROBOT = Seastar(5, 3)
 RODS = make_rods(Scene(ROBOT))
 MIDPOINT, EULER = SCHEMES["implicit-midpoint"], SCHEMES["implicit-euler"]
-EVERYONE, NOBODY = np.ones(N_LANES, bool), np.zeros(N_LANES, bool)
+EVERYONE = np.ones(N_LANES, bool)
 FIRST = np.arange(N_LANES) == 0
 LIMIT, DURATION, MOST = 2.0, 0.4, 1000
 SMALL, LARGE = 0.1 * LIMIT, 0.5 * LIMIT
@@ -144,35 +140,3 @@ def test_adapted_steps_grow_to_where_their_errors_let_them_and_are_not_refused_t
     found = cover(monkeypatch, error, adaptive=True)
     settled = np.array([step.size for step in found.tried if step.start > 0.5])
     assert found.arrived.all() and np.all((settled > 0.4 * largest) & (settled <= largest))
-
-
-@pytest.mark.parametrize(
-    "halvings, cut, turns_back",
-    [(0, 0.01, True), (7, 0.01, True), (8, 0.01, False), (11, 0.01, False), (12, 1.0, False)],
-)
-def test_the_guard_is_milder_after_eight_halvings_and_after_twelve(monkeypatch, halvings, cut, turns_back):
-    asked = {}
-
-    def hold(rods, work, scheme, q, v, h, frame, robots, allowed, largest_cut):
-        asked.update(cut=lanes(largest_cut)[0], held=robots.robots)
-        return Mask(NOBODY), Mask(EVERYONE)
-
-    def poles(rods, work, q, robots):
-        asked.update(turnable=robots.robots)
-        return Mask(NOBODY)
-
-    for name, fake in {"hold_to_energy": hold, "through_poles": poles, "end_step": lambda *_: None}.items():
-        monkeypatch.setattr(steps, name, fake)
-    q, v = rows(ROBOT.nodes()), np.zeros((2 * ROBOT.n_nodes, N_LANES))
-    work, report = make_work(RODS, 1), np.zeros((len(REPORT_ROWS), N_LANES))
-    still, limits = Actuation(*np.zeros((2, 5, N_LANES))), Limits(np.array([1e-9]), 20, MOST, False, np.array([LIMIT]))
-    step = Step(Lanes(0.0), Lanes(1.0), Lanes(0.01), Lanes(20.0 * (1 + halvings)), Mask(NOBODY))
-    masks = Mask(EVERYONE), Mask(FIRST)
-    end_guarded_step(
-        RODS, work, MIDPOINT, still, q, v, np.zeros((2 * ROBOT.n_nodes + 3, N_LANES)), step, None, *masks,
-        limits, report,
-    )  # fmt: skip
-    assert asked["cut"] == cut
-    np.testing.assert_array_equal(asked["held"], FIRST)
-    np.testing.assert_array_equal(asked["turnable"], FIRST & turns_back)
-    np.testing.assert_array_equal(report[REPORT_ROWS.index("energy_cuts")], 1.0)

@@ -116,27 +116,6 @@ def test_arithmetic_is_that_of_float64_to_the_last_bit_with_no_hidden_contractio
         assert_same_bits(value, by_numpy(line, operands), line)
 
 
-AUGMENTED = """\
-        x, y, z, w = a, a, a, a
-        x += b
-        y -= b
-        z *= b
-        w /= b
-        x += 1.0
-        y -= 2
-        z *= 3.0
-        w /= 7
-"""
-
-
-def test_augmented_assignments_are_the_operators_and_make_new_values(run_all, operands):
-    found = run_all("{}", ["x", "y", "z", "w", "a"], operands, LOOP + AUGMENTED)
-    a, b = operands.a, operands.b
-    with np.errstate(all="ignore"):
-        for value, expected in zip(found, [a + b + 1.0, a - b - 2, a * b * 3.0, a / b / 7, a], strict=True):
-            assert_same_bits(value, expected)
-
-
 def exact_product_sum(c: float, a: float, b: float) -> float:
     """c + a b rounded once: a fraction has no rounding of its own, and its conversion rounds to nearest."""
     return float(Fraction(c) + Fraction(a) * Fraction(b))
@@ -228,18 +207,6 @@ def test_load_reads_per_robot_and_shared_rows_and_store_writes_lanes_or_one_numb
     np.testing.assert_array_equal(out[1:].T, np.tile([3.5, 1.5, 7.0, 0.25, 1.0], (N_LANES, 1)))
 
 
-def test_rows_need_no_alignment(operands):
-    n = operands.a.size
-    shifted = [np.empty(n + 1)[1:].reshape(operands.a.shape) for _ in range(4)]
-    for array, values in zip(shifted, (operands.a, operands.b, operands.c), strict=False):
-        array[:] = values
-    assert any(array.ctypes.data % 64 for array in shifted)
-    out = shifted[3]
-    kernel_of("compiled", "{}", LOOP, ["a + b"])(*shifted[:3], out)
-    with np.errstate(all="ignore"):
-        assert_same_bits(out, operands.a + operands.b)
-
-
 @ONLY_COMPILED
 def test_narrow_lanes_compute_for_the_first_robots_of_a_row_to_the_same_bits_and_touch_no_other(operands):
     wide, narrow = (np.full((len(ARITHMETIC) * len(operands.a), N_LANES), 0.5) for _ in range(2))
@@ -262,57 +229,13 @@ REFUSED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("line", REFUSED)
-def test_what_lanes_cannot_do_is_a_typing_error_at_compilation_and_a_type_error_in_plain_python(line, twin):
-    one = np.ones((1, N_LANES))
-    if line == "load(a_rows, 0)" and (twin == "plain" or numba.config.DISABLE_JIT):
-        pytest.skip("an array is its own rows in plain Python")
-    with pytest.raises((TypingError, TypeError)):
-        kernel_of(twin, "{}", LOOP, [line])(one, one, one, one.copy())
-
-
-@ONLY_COMPILED
-@pytest.mark.parametrize(
-    "array",
-    [
-        np.ones((1, N_LANES), np.float32),
-        np.ones((1, N_LANES), np.int64),
-        np.ones((N_LANES, 2)).T,
-        np.ones((2, 2 * N_LANES))[:, ::2],
-        np.ones((1, 1, N_LANES)),
-        (np.ones(3), np.ones(4)),
-        "rows",
-    ],
-    ids=["float32", "int64", "transposed", "strided", "three axes", "plain tuple", "string"],
-)
-def test_only_contiguous_float64_rows_and_named_tuples_of_them_can_be_borrowed_and_shared_ones_not_written(array):
-    @compiled
-    def function(rows):
-        return any_lane(load(borrow(rows), 0) > 0.0)
-
-    @compiled
-    def write(rows):
-        store(borrow(rows), 0, 1.0)
-
-    with pytest.raises(TypingError):
-        function(array)
-    with pytest.raises(TypingError):
-        write(np.zeros(3))  # shared
-
-
-@kernel
-def as_lanes(number):
-    return splat(number)
-
-
-@ONLY_COMPILED
-def test_a_kernel_whose_arguments_tell_no_form_has_no_lanes_of_its_own():
-    @compiled
-    def function(out):
-        store(borrow(out), 0, as_lanes(1.0))
-
-    with pytest.raises(TypingError, match="splat needs lanes, rows or a bundle of rows among the arguments"):
-        function(np.ones((1, N_LANES)))
+def test_what_lanes_cannot_do_is_a_typing_error_at_compilation_and_a_type_error_in_plain_python(twin, subtests):
+    one, is_plain = np.ones((1, N_LANES)), twin == "plain" or numba.config.DISABLE_JIT
+    for line in REFUSED:
+        if line == "load(a_rows, 0)" and is_plain:
+            continue  # an array is its own rows in plain Python
+        with subtests.test(line), pytest.raises((TypingError, TypeError)):
+            kernel_of(twin, "{}", LOOP, [line])(one, one, one, one.copy())
 
 
 # The width

@@ -22,14 +22,7 @@ from seastar_gym import (
     Vortex,
     Water,
 )
-from seastar_gym.envs.observation import body_axis
-from seastar_gym.envs.stations import stations
-from seastar_gym.lanes import plain as numpy_lanes
-from seastar_gym.lanes import registers as lanes
-from seastar_gym.lanes.plain import Lanes, Mask
 from seastar_gym.lanes.registers import N_LANES
-from seastar_gym.rods import star as motion
-from slopes import NO_WORK, plain
 
 ROOT = Path(__file__).resolve().parents[2]
 COMPILED = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
@@ -112,44 +105,3 @@ def test_strokes_in_plain_python_stay_within_their_rows_and_are_those_of_the_mac
     assert expected["implicit-euler counts"][1].sum() > 0  # steps were halved
     assert expected["bent along counts"][2].sum() > 0  # energy was cut
     assert np.abs(expected["contact"] - expected["no contact"]).max() > 1e-5  # limbs have met
-
-
-# One kernel
-
-
-def test_a_kernel_that_python_calls_runs_step_by_step_with_all_that_it_calls(monkeypatch):
-    loaded, load = [], numpy_lanes.load
-    monkeypatch.setattr(numpy_lanes, "load", lambda rows, row: loaded.append(row) or load(rows, row))
-    motion.relative(NO_WORK._replace(current=np.zeros((4, 1))), 1, Lanes(1.0), Lanes(2.0))
-    assert loaded == [2, 3]
-    square = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0])[:, None]
-    turned = np.array([0.0, 0.0, 0.0, 1.0, -1.0, 0.0])[:, None]
-    np.testing.assert_allclose(plain(body_axis(square, turned, stations(2), 2)), [[0.0], [1.0]], atol=1e-15)
-
-
-# The twin
-
-
-def test_the_twin_has_every_function_of_lanes():
-    assert all(callable(getattr(numpy_lanes, name)) and hasattr(lanes, name) for name in numpy_lanes.FUNCTIONS)
-    used = {
-        name
-        for file in (ROOT / "seastar_gym").rglob("*.py")
-        if file.parent.name != "lanes"  # other lanes are made of them
-        for block in file.read_text(encoding="utf-8").split("seastar_gym.lanes.registers import ")[1:]
-        for name in block.lstrip("(").split(")" if block.startswith("(") else "\n")[0].replace(",", " ").split()
-    }
-    assert used <= {*numpy_lanes.FUNCTIONS, "N_LANES", "Form", "PLAIN", "NARROW", "registers"}
-
-
-def test_lanes_are_values_and_refuse_what_would_not_compile():
-    rows = np.ones((2, 3))
-    value = numpy_lanes.load(rows, 1)
-    numpy_lanes.store(rows, 1, 5.0)
-    np.testing.assert_array_equal(value.numbers, 1.0)
-    for result in (np.float64(2.0) * Lanes([1.0, 2.0]), np.float64(4.0) - Lanes([2.0, 0.0])):
-        np.testing.assert_array_equal(plain(result), [2.0, 4.0])
-    with pytest.raises(IndexError):
-        numpy_lanes.load(rows, 2)
-    with pytest.raises(TypeError, match="ask any_lane"):
-        bool(Mask([True, False]))

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import oracle
-from along_oracle import Bent
-from continuum_oracle import Continuum, ContinuumShaped
+from continuum_oracle import Bent, Continuum, ContinuumShaped
 from currents import CURRENTS, velocity
 from hubs import HUBS, robot_with
 from oracle import Star
@@ -23,7 +22,10 @@ from seastar_gym.rods.body import place_roots
 from seastar_gym.rods.bundles import make_work
 from seastar_gym.rods.linear import solve_again, substitute_star
 from seastar_gym.rods.potential import elastic_energy, energies, factorise, fill_moments
+from seastar_gym.rods.star import rotation, tangent
+from seastar_gym.rods.terms.along import add_moved_energy, hyperbolic_tangent
 from seastar_gym.rods.terms.clamp import orientation
+from seastar_gym.rods.terms.current import GRID, VORTEX, Current, current_velocity
 from seastar_gym.rods.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.rods.terms.inertia import kinetic_energy
 from slopes import gradient, plain, rows
@@ -258,3 +260,170 @@ def test_the_moment_that_resists_an_actuator_is_the_slope_of_the_energy_in_its_r
 
     fill_moments(rods, work, actuation(turns), q, moments)
     np.testing.assert_allclose(moments[:, 0], gradient(energy, turns, 1e-3), rtol=1e-6)
+
+
+# Currents: velocities of the fluid at places, from the numbers of each kind
+
+
+PLACES = np.random.default_rng(0).uniform(-0.4, 0.4, (2, 80))
+
+
+def current_at(current: Current, places: np.ndarray) -> np.ndarray:
+    return np.array(plain(current_velocity(current, *map(Lanes, places))))
+
+
+def grid(function, n_x: int = 9, n_y: int = 7, spacing: float = 0.125) -> Current:
+    """Samples of a current on points from (-0.5, -0.375) on."""
+    x, y = -0.5 + spacing * np.arange(n_x), -0.375 + spacing * np.arange(n_y)
+    samples = np.stack(function(*np.meshgrid(x, y, indexing="ij")), axis=-1)
+    return Current(GRID, np.array([-0.5, -0.375, 1.0 / spacing]), n_x, n_y, samples.ravel())
+
+
+def bilinear(x, y):
+    return 0.1 + 0.3 * x - 0.5 * y + 2.0 * x * y, 0.2 * x + 0.05 * y
+
+
+def test_a_vortex_has_its_circulation_far_from_its_core_and_turns_rigidly_within():
+    angles = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    directions = np.array([np.cos(angles), np.sin(angles)])
+    eddy = Current(VORTEX, np.array([0.1, -0.05, 0.02, 0.06**2]))
+    for r, speed in ((600.0, 0.02 / 600.0), (6e-6, 0.02 * 6e-6 / 0.06**2)):
+        u = current_at(eddy, np.array([[0.1], [-0.05]]) + r * directions)
+        np.testing.assert_allclose((u * directions).sum(axis=0), 0.0, atol=1e-8 * speed)
+        np.testing.assert_allclose(directions[0] * u[1] - directions[1] * u[0], speed, rtol=1e-6)
+
+
+def test_a_grid_is_bilinear_between_its_samples_and_that_of_the_nearest_edge_beyond():
+    """It is continuous across its cells, and what is no place is the first point."""
+    current, inside = grid(bilinear), PLACES[:, np.abs(PLACES[1]) < 0.375]
+    np.testing.assert_allclose(current_at(current, inside), bilinear(*inside), rtol=0.0, atol=1e-14)
+    outside = np.array([[-9.0, 0.2, 9.0, np.nan], [0.1, 9.0, -9.0, np.nan]])
+    nearest = np.array([[-0.5, 0.2, 0.5, -0.5], [0.1, 0.375, -0.375, -0.375]])
+    np.testing.assert_allclose(current_at(current, outside), bilinear(*nearest), rtol=0.0, atol=1e-14)
+
+    def rough(x, y):
+        return np.sin(40.0 * x + y), np.cos(30.0 * y)
+
+    border = np.array([np.full(7, 0.125), np.linspace(-0.375, 0.375, 7)])
+    beside = np.array([[1e-12], [0.0]])
+    for side in (border - beside, border, border + beside):
+        np.testing.assert_allclose(current_at(grid(rough), side), rough(*border), atol=1e-9)
+
+
+# Tangents and rotations of edges
+
+
+# The tangent
+
+
+def tangents(x: np.ndarray) -> np.ndarray:
+    return plain(tangent(Lanes(x)))
+
+
+def test_tangent_is_that_of_numpy_to_a_few_units_in_the_last_place():
+    """Up to 1.3 rad: the chapter's hub hinges, opened by two peaks, need pi/5 + pi/5 = 1.26 rad."""
+    x = np.concatenate([np.linspace(-1.3, 1.3, 200_001), [0.0, -0.0, 1e-300, -1e-9]])
+    exact = np.tan(x.astype(np.longdouble))
+    found = tangents(x)
+    assert np.max(np.abs(found - exact) / np.spacing(np.abs(exact.astype(float)))) < 5.0
+    assert not np.signbit(found[-4])
+
+
+def test_tangent_is_that_of_an_angle_a_few_units_in_the_last_place_away_up_to_the_pole():
+    x = 0.5 * np.pi - np.geomspace(1e-6, 0.4, 10_000)
+    exact = np.tan(x.astype(np.longdouble))
+    # d tan x = (1 + tan^2 x) dx: the pole magnifies what rounding does to the angle.
+    error_in_angle = (tangents(x) - exact) / (1.0 + exact**2)
+    assert np.max(np.abs(error_in_angle)) < 4.0 * np.spacing(1.5)
+
+
+@pytest.mark.parametrize("turns", [0.0, 1e-9, 0.3, 3.1, 3.2, -7.0, 100.0, -1e4])
+def test_rotations_are_those_of_any_angle(turns):
+    c, s = plain(rotation(Lanes(np.array([turns]))))
+    assert c[0] == pytest.approx(np.cos(turns), abs=1e-12) and s[0] == pytest.approx(np.sin(turns), abs=1e-12)
+    assert c[0] ** 2 + s[0] ** 2 == pytest.approx(1.0, abs=1e-15)
+
+
+# Actuators that act along limbs: natural curvature, stiffness, and the energy that moving them stores
+
+
+PEAK, RATIO, CURVATURES = 1.1, 2.5, (4.0, 0.0, -3.0)
+PROFILE = (1.0, 3.0, 0.5)
+ROBOT = Seastar(
+    3, 5, limbs=tuple(Limb(natural_curvature=k) for k in CURVATURES),
+    along=AlongLimb(0.8, PROFILE), stiffening=Stiffening(RATIO, 0.4, 0.1),
+)  # fmt: skip
+RODS = make_rods(Scene(ROBOT, actuator=SmaPulse(PEAK)))
+STAR = Bent(
+    3, 5, directions=(0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0), lengths=(0.1,) * 3, radii=((1.6e-3,) * 2,) * 3,
+    moduli=((1e6,) * 2,) * 3, curvatures=CURVATURES, share=0.8, ratio=RATIO, middle=0.4, width=0.1, peak=PEAK,
+    profile=lambda s: np.interp(s, (0.0, 0.5, 1.0), PROFILE),
+)  # fmt: skip
+BEGIN, END = np.array([0.2, -1.0, 0.0]), np.array([0.9, -0.4, 0.5])
+
+
+def actuation(begin: np.ndarray, end: np.ndarray) -> Actuation:
+    return Actuation(*(np.tile(turns[:, None], N_LANES) for turns in (begin, end)))
+
+
+def memory(turns: np.ndarray):
+    work = make_work(RODS, 1)
+    set_natural_hub_angles(RODS, work, actuation(0.0 * turns, turns), Lanes(1.0))
+    return work
+
+
+# Logistic stiffening
+
+
+def test_the_hyperbolic_tangent_is_numpys():
+    x = np.concatenate([np.linspace(-25.0, 25.0, 2001), [0.0, 1e-9, -1e-9]])
+    np.testing.assert_allclose(plain(hyperbolic_tangent(Lanes(x))), np.tanh(x), rtol=2e-15, atol=0.0)
+
+
+# Profiles
+
+
+@pytest.mark.parametrize("profile", [1.0, (1.0, 0.0), PROFILE, (0.0, 1.0, 2.0, 1.0, 0.0, -0.2), (1.0, *(0.0,) * 9)])
+@pytest.mark.parametrize("nodes", [2, 5, 11])
+def test_hinges_turn_by_the_hat_functions_of_the_profile(profile, nodes):
+    points = profile if isinstance(profile, tuple) else (profile, profile)
+    star = Bent(1, nodes, share=0.6, profile=lambda s: np.interp(s, np.linspace(0.0, 1.0, len(points)), points))
+    found = AlongLimb(0.6, profile).hinge_shares(nodes)
+    np.testing.assert_allclose(found, star.shares, rtol=0.0, atol=1e-9)
+
+
+# Energy
+
+
+def test_what_moving_natural_curvature_stores_is_the_energy_of_the_hinges_left_behind():
+    work = memory(0.0 * END)
+    moved = plain(add_moved_energy(RODS, work, actuation(BEGIN, END), Lanes(0.0), Lanes(1.0), 0.0))
+    begin, end = STAR.at(BEGIN), STAR.at(END)
+    expected = sum(
+        0.5 * max(f) / f[1] * EI * dl * (oracle.curvature(b, dl) - oracle.curvature(a, dl)) ** 2
+        for a, b, EI, dl, f in zip(
+            begin.inner_angles, end.inner_angles, end.hinge_EI, end.hinge_dl,
+            np.repeat(np.stack([begin.factors, end.factors], axis=1), 3, axis=0), strict=True,
+        )
+    )  # fmt: skip
+    np.testing.assert_allclose(moved, expected, rtol=1e-9)
+    np.testing.assert_allclose(work.EI_kappa_bar, memory(END).EI_kappa_bar, rtol=1e-14)
+
+
+# Coefficients
+
+
+@pytest.mark.parametrize("nodes", [2, 3, 5, 10])
+def test_kinetic_energy_is_positive_however_limbs_taper(nodes):
+    """Coarse limbs of very different radii once had a negative one."""
+    rng = np.random.default_rng(nodes)
+    for _ in range(50):
+        limbs = tuple(Limb(radius=tuple(10.0 ** rng.uniform(-4, -2, rng.integers(2, 6)))) for _ in range(3))
+        rods = make_rods(Scene(Seastar(n_limbs=3, nodes_per_limb=nodes, limbs=limbs)))
+        matrix = np.diag(rods.mass.copy())  # lumped masses, less what edges have less
+        for e, mu in enumerate(rods.edge_mass):
+            matrix[np.ix_(*[[0 if e % (nodes - 1) == 0 else e, e + 1]] * 2)] -= mu * np.array(
+                [[1.0, -1.0], [-1.0, 1.0]]
+            )
+        assert matrix.sum() == pytest.approx(rods.mass.sum())
+        assert np.linalg.eigvalsh(matrix).min() > 0.0

@@ -4,10 +4,8 @@ import copy
 import dataclasses
 import math
 
-import numpy as np
 import pytest
 
-from oracle import Star
 from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Vortex, Water
 
 FIDELITIES = ("rapid", "fast", "balanced", "accurate", "reference", "chapter")
@@ -61,17 +59,6 @@ def test_a_resolution_that_nobody_named_is_not_lost():
         assert same == Seastar(nodes_per_limb=12) and same.named_resolution == (None, None)
 
 
-@pytest.mark.parametrize("n_limbs", range(1, 13))
-def test_nodes_are_the_oracles(n_limbs):
-    for nodes_per_limb in (2, 3, 7, 10):
-        robot = Seastar(n_limbs, nodes_per_limb, limb_length=0.07)
-        star = Star(n_limbs, nodes_per_limb, limb_length=0.07)
-        np.testing.assert_allclose(robot.nodes(), star.rest, rtol=0.0, atol=1e-16)
-        assert robot.n_nodes == star.n_nodes == 1 + n_limbs * (nodes_per_limb - 1)
-        robot.nodes()[:] = 7.0
-        assert robot.nodes().max() < 0.2
-
-
 # How parts are shown
 
 SCENES = (
@@ -93,19 +80,3 @@ def test_notebooks_show_every_part_of_a_scene_with_its_units(golden):
 
 
 # Swims at their limits
-
-
-@pytest.mark.parametrize("discretisation, share", [("chapter", 0.3), ("continuum", 0.3), ("continuum", 1.0)])
-def test_the_largest_allowed_peak_still_swims(discretisation, share):
-    pulse = SmaPulse(peak_angle=0.999 * share * math.pi)
-    scene = Scene(Seastar(discretisation=discretisation), actuator=pulse, numerics=Numerics(step=0.01))
-    commands = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 5)).reshape(5, -1).T
-    simulator = Simulator(scene, len(commands))
-    report = simulator.stroke(commands)
-    assert not report.status.any() and np.isfinite(simulator.positions).all()
-
-
-def test_an_opening_hub_allows_crossing_limbs_and_a_turning_one_the_chapters_peak():
-    scene = Scene(actuator=SmaPulse(peak_angle=0.8), numerics=Numerics(step=0.01))
-    assert Simulator(scene).stroke([[1.0, -1.0, 0.0, 0.0, 0.0]]).smallest_opening_angle[0] < 0.0
-    Scene(Seastar(hub_hinge="turning", discretisation="chapter"), actuator=SmaPulse(peak_angle=math.pi / 5))

@@ -221,17 +221,16 @@ NO_SCENES = [
     (to_dict(Seastar()), "plain Seastar, not a Scene"),
     ({**PLAIN, "robot": PLAIN["numerics"]}, "Scene.robot must be"),
     *(({**PLAIN, "loads": nested(depth)}, words)
-      for depth, words in ((31, "A load is"), (32, "nested too deeply"), (100_000, "nested too deeply"))),
+      for depth, words in ((31, "A load is"), (32, "nested too deeply"), (10_000, "nested too deeply"))),
     ({**PLAIN, "fluid": {**PLAIN["fluid"], "current": {"kind": "Vortex"}}}, "does not say"),
     ({**PLAIN, "actuator": {"kind": "Limited"}}, "does not say"),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("refused", NO_SCENES, ids=lambda refused: " ".join(refused[1:]))
-def test_what_is_no_scene_is_refused(refused):
-    data, *words = refused
-    with assert_refused(*words):
-        Scene.from_dict(data)
+def test_what_is_no_scene_is_refused(subtests):
+    for data, *words in NO_SCENES:
+        with subtests.test(words=words), assert_refused(*words):
+            Scene.from_dict(data)
 
 
 @pytest.mark.parametrize(

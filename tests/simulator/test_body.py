@@ -12,10 +12,6 @@ MIDPOINT = Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-10)
 SPECK = {"n_limbs": 2, "nodes_per_limb": 2, "limb_length": 1e-3, "rod_radius": 1e-4, "density": 1.0}
 """Limbs without weight, for bodies by themselves."""
 AT_HUB = (Attachment(0.0, 0.0, 0.0), Attachment(0.0, 0.0, math.pi))
-FRAME = tuple(Attachment(x, y, math.copysign(1.2, y) if x > 0 else math.copysign(1.9, y))
-              for x, y in ((0.03, -0.015), (0.03, 0.015), (-0.03, 0.015), (-0.03, -0.015)))  # fmt: skip
-"""Four limbs at the corners of a rectangle, two at each long side."""
-FOUR_LIMBS = Seastar(n_limbs=4, nodes_per_limb=5, body=Body.rectangle(0.06, 0.03, attachments=FRAME))
 
 
 def alone(body: Body, fluid: Water | None, numerics: Numerics = MIDPOINT, **parts) -> Simulator:
@@ -28,17 +24,6 @@ def set_moving(simulator: Simulator, velocity: tuple[float, float], spin: float)
     q = simulator.positions
     v = np.array(velocity) + spin * np.stack([-q[..., 1], q[..., 0]], axis=-1)
     simulator.set_state(simulator.get_state()._replace(velocities=v, spin=np.full(len(q), spin)))
-
-
-def test_a_small_light_body_swims_as_the_point_hub_does():
-    """The difference goes down with its size."""
-    paths = []
-    for body in (None, Body(radius=2e-4), Body(radius=1e-4)):
-        simulator = Simulator(Scene(Seastar(nodes_per_limb=5, body=body), numerics=MIDPOINT))
-        simulator.advance(0.3, [[0, 1, 0, 0, -1]])
-        paths.append(simulator.positions[0])
-    far, near = (np.abs(path - paths[0]).max() for path in paths[1:])
-    assert near < 2e-4 and near == pytest.approx(0.5 * far, rel=0.2)
 
 
 def test_a_robot_with_a_lopsided_body_turns_about_its_centre_of_mass():

@@ -261,25 +261,6 @@ def test_the_largest_overlap_is_of_any_time_step_and_zero_apart():
     assert (Simulator(Scene(TEN), 2).stroke(CLOSING[:2]).largest_overlap == 0.0).all()
 
 
-LAYER = Contact(layer=10e-3)
-
-
-@DEEP
-@pytest.mark.parametrize(
-    "nodes, peak, contact, least, most, fails",
-    [
-        *((nodes, 0.75, Contact(), least, most, False) for nodes, least, most in ((10, 0.0, 0.3), (37, 0.5, 1.0))),
-        (37, 0.75, LAYER, 0.95, 1.05, True), (37, 0.62, LAYER, 0.0, 0.5, False), (37, 0.62, Contact(), 0.0, 0.2, False),
-    ],
-)  # fmt: skip
-def test_limbs_turned_past_each_other_come_deeper_on_finer_meshes(nodes, peak, contact, least, most, fails):
-    """Clamps whose directions cross, beyond 0.63 rad, leave no room near the hub, of which ten nodes see little."""
-    robot = Seastar(nodes_per_limb=nodes)
-    scene = Scene(robot, actuator=SmaPulse(peak), numerics=Numerics("sdirk2", 5e-3), contact=contact)
-    report = Simulator(scene, len(DISTINCT)).stroke(DISTINCT)
-    assert least <= report.largest_overlap.max() < most and bool(report.status.any()) == fails
-
-
 def test_the_modulus_of_a_layer_is_that_of_a_beam_on_an_elastic_foundation():
     """k = 4 EI/layer^4 of every limb's own bending stiffness; the default's layer is the fourth root of six radii."""
     limbs = (Limb(), Limb(youngs_modulus=2e6), Limb(section=Strip(3e-3, 8e-3)), Limb(radius=(2e-3, 1e-3)), Limb())

@@ -15,7 +15,6 @@ from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.scene.scene import LARGEST_OVERLAP
 from seastar_gym.simulator import watches as error_bars
 from seastar_gym.simulator.watches import WINDOW
-from strokes import assert_same
 
 FAST = Scene.preset("fast")
 N_ROBOTS = N_LANES + 3
@@ -41,31 +40,6 @@ def test_the_estimate_covers_the_true_error_is_not_vacuous_and_never_falls(fidel
     assert np.mean(np.array(ratios) >= 1.0) >= 0.95
     assert np.median(ratios) <= 5.0
     assert (np.diff(estimates, axis=0) >= 0.0).all()
-
-
-def test_the_twin_has_edges_and_steps_half_as_long():
-    adapted = replace(FAST, numerics=Numerics("implicit-midpoint", 4e-3, path_tolerance=0.01))
-    for scene in (FAST, adapted):
-        twin = error_bars.twin_scene(scene)
-        assert twin.robot.nodes_per_limb - 1 == 2 * (scene.robot.nodes_per_limb - 1)
-        assert twin.numerics.step == 0.5 * scene.numerics.step and twin.numerics.path_tolerance is None
-        assert twin.numerics.scheme == scene.numerics.scheme and twin.robot.limb_length == scene.robot.limb_length
-
-
-@pytest.mark.parametrize("lengths", [0.1, (0.1, 0.2)], ids=["one length", "each its own"])
-def test_the_estimate_is_at_least_what_newton_leaves(lengths):
-    """Newton's tolerance counts beside the distance of the two hubs, in limb lengths, but not at rest."""
-    robot = replace(FAST.robot, limb_length=np.array(lengths) if np.ndim(lengths) else lengths)
-    numerics = Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-3)
-    simulator = Simulator(replace(FAST, robot=robot, numerics=numerics), 2, error_bars=True)
-    assert not simulator.error_estimate.any()
-    estimate = simulator.stroke(COMMANDS[0, :2]).error_estimate
-    distance = np.linalg.norm(
-        simulator.hub_position() - simulator._watches["error_estimate"].twin.hub_position(), axis=1
-    )
-    floor = 1e-3 * np.broadcast_to(lengths, 2)
-    assert (distance > 0.0).all()
-    np.testing.assert_allclose(estimate, error_bars.FACTORS["implicit-midpoint"] * (distance + floor), rtol=1e-12)
 
 
 def test_chapters_discretisation_has_error_bars_by_a_factor_of_its_own():
@@ -101,28 +75,6 @@ def test_strengths_and_numbers_of_each_robot_hold_for_the_twin():
     simulator.set_scene(own)
     simulator.set_limb_strengths(strengths)
     np.testing.assert_array_equal(simulator.stroke(COMMANDS[0]).error_estimate, other.error_estimate)
-
-
-@pytest.mark.parametrize("repair", ["reset", "set_state"])
-def test_a_reset_repairs_the_twin_where_one_was_interrupted(monkeypatch, repair):
-    simulator = swimmers()
-    state = simulator.get_state()
-
-    def interrupt(robot, angle):
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(simulator._watches["error_estimate"].twin._batch, "put_at_rest", interrupt)
-        with pytest.raises(KeyboardInterrupt):
-            simulator.reset()
-    with pytest.raises(RuntimeError, match="call reset"):
-        simulator.stroke(COMMANDS[1])
-    if repair == "set_state":
-        simulator.set_state(state)
-        assert np.isnan(simulator.stroke(COMMANDS[1]).error_estimate).all()
-    simulator.reset()
-    simulator.stroke(COMMANDS[0])
-    assert_same(simulator, swimmers())
 
 
 def test_a_state_from_elsewhere_has_no_estimate_until_the_reset():

@@ -10,28 +10,23 @@ from currents import CURRENTS, velocity
 from hubs import TEN
 from seastar_gym import (
     Body,
-    Contact,
     Numerics,
     Scene,
     Seastar,
     Simulator,
-    SmaPulse,
-    SmaWires,
     SolverStatus,
     UniformCurrent,
     Water,
 )
 from seastar_gym import model as module
 from seastar_gym.accuracy.measure import long_swims
-from seastar_gym.rods.step import SOLVER_ITERATIONS
-from seastar_gym.simulator.watches import ENOUGH, EVERY, WINDOW, is_watched
+from seastar_gym.simulator.watches import ENOUGH, EVERY, WINDOW
 from strokes import finished
 
 RESONANT = Scene(Seastar(nodes_per_limb=12), numerics=Numerics("implicit-midpoint", 10e-3, 1e-5))
 """Gathers energy within some 60 strokes."""
 GAITS = long_swims(5, 8, 1)
 CALM = Numerics("implicit-midpoint", 5e-3, 1e-5)
-FAST = Scene.preset("fast")
 
 
 def swim(scene: Scene, strokes: int, commands: np.ndarray = GAITS, **options) -> tuple[Simulator, np.ndarray]:
@@ -115,23 +110,6 @@ def test_the_energy_in_a_current_is_that_of_the_same_motion_in_still_water(name,
     np.testing.assert_array_equal(simulator.velocities, velocities)
 
 
-def test_fidelities_of_the_chapters_robot_and_twins_are_not_watched_and_everything_else_is():
-    simulator, growth = swim(FAST, 25, error_bars=True)
-    assert (
-        not is_watched(FAST)
-        and np.isnan(growth).all()
-        and np.isnan(simulator._watches["error_estimate"].twin.energy_growth).all()
-    )
-    assert all(
-        is_watched(replace(FAST, **other))
-        for other in (
-            {"numerics": CALM},
-            {"robot": replace(FAST.robot, nodes_per_limb=8)},
-            {"robot": replace(FAST.robot, youngs_modulus=1e7)},
-        )
-    )
-
-
 def test_a_reset_and_a_new_state_begin_anew_and_a_pickle_goes_on():
     simulator, growth = swim(replace(RESONANT, numerics=CALM), 25)
     again = pickle.loads(pickle.dumps(simulator))
@@ -143,16 +121,6 @@ def test_a_reset_and_a_new_state_begin_anew_and_a_pickle_goes_on():
     assert np.flatnonzero(simulator.energy_growth == 1.0).tolist() == [3]
     simulator.set_state(simulator.get_state())
     assert (simulator.energy_growth == 1.0).all()
-
-
-def test_short_decisions_of_wires_are_watched_once_in_a_period():
-    simulator, seen = Simulator(replace(FIVE, actuator=SmaWires()), 2), []
-    for k in range(5 * (WINDOW + 1 + EVERY)):
-        seen.append(simulator.advance(0.2, np.full((2, 5), (-1.0) ** k)).energy_growth)
-    assert np.isfinite(seen).all() and np.flatnonzero(np.diff(seen, axis=0).any(axis=1)).tolist() == [
-        5 * (WINDOW + 1) - 2,
-        5 * (WINDOW + 1 + EVERY) - 2,
-    ]
 
 
 # A stroke's work is bounded: no step below 1/4096 of an interval, and no robot beyond its iterations.
@@ -200,34 +168,3 @@ def test_robots_that_need_more_iterations_than_they_have_fail_and_the_others_kee
     assert bound.failed.any()
     bound.reset()
     assert not bound.stroke(commands).status.any()
-
-
-def crowd() -> Simulator:
-    """Two robots of twelve limbs that touch, those of the second thrown at each other at 30 m/s."""
-    scene = Scene(Seastar(12, 10), None, SmaPulse(0.2), Numerics("implicit-midpoint", 5e-3), contact=Contact())
-    simulator = Simulator(scene, 2)
-    state = simulator.get_state()
-    speeds = 30.0 * np.random.default_rng(0).uniform(-1.0, 1.0, 12) / scene.robot.limb_length
-    arms = (state.positions[1, 1:] - state.positions[1, 0]).reshape(12, -1, 2)
-    state.velocities[1, 1:] = (np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * speeds[:, None, None]).reshape(-1, 2)
-    simulator.set_state(state)
-    return simulator
-
-
-@pytest.mark.filterwarnings("ignore:Limbs of robot:RuntimeWarning")
-def test_iterations_of_the_linear_solver_count_where_limbs_touch(monkeypatch):
-    """A crowd needs hundreds of them for a Newton iteration. It fails, and its neighbour keeps every bit."""
-    commands = np.resize([1.0, -1.0], (2, 12))
-    free = crowd()
-    needed = free.stroke(commands).newton_iterations
-    solver = free._batch.report[0, SOLVER_ITERATIONS, :2]
-    most = int(2 * needed.max())
-    assert solver[0] + needed[0] < most < solver[1]
-    monkeypatch.setattr(module, "MOST_ITERATIONS_PER_STEP", 0)
-    monkeypatch.setattr(module, "MOST_ITERATIONS", most)
-    bound = crowd()
-    report = bound.stroke(commands)
-    assert report.status.tolist() == [SolverStatus.CONVERGED, SolverStatus.ITERATION_LIMIT]
-    assert report.newton_iterations[1] < needed[1]
-    np.testing.assert_array_equal(bound.positions[0], free.positions[0])
-    np.testing.assert_array_equal(bound.velocities[0], free.velocities[0])

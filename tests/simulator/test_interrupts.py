@@ -250,17 +250,6 @@ def test_a_change_that_was_broken_off_asks_for_a_reset_or_a_state_which_cures_it
     assert_not_begun(simulator, swimmers())
 
 
-def test_robots_that_were_put_elsewhere_meanwhile_stay_there(monkeypatch):
-    def reset_and_fail():
-        simulator.reset()
-        raise MemoryError
-
-    simulator = swimmers()
-    with interrupted(simulator, Kernel(monkeypatch, before=reset_and_fail, nth=1), MemoryError):
-        simulator.stroke(COMMANDS[1])
-    assert_not_begun(simulator, Simulator(Scene(numerics=FAST), N_ROBOTS, 1))
-
-
 SWIM_UNTIL_INTERRUPTED = """
 import sys, numpy as np
 from seastar_gym import Numerics, Scene, Simulator
@@ -367,25 +356,6 @@ def test_ctrl_c_waits_for_the_end_of_what_holds_it_back_and_goes_to_whoever_hand
             signal.raise_signal(signal.SIGINT)
     with handled_by(signal.SIG_IGN), held_back():
         signal.raise_signal(signal.SIGINT)
-
-
-def test_what_another_thread_compiles_holds_back_no_ctrl_c_of_the_main_one():
-    begun, go_on, done = threading.Event(), threading.Event(), threading.Event()
-
-    def compile_there():
-        with held_back():
-            begun.set()
-            assert go_on.wait(60.0)
-        done.set()
-
-    thread = threading.Thread(target=compile_there)
-    thread.start()
-    assert begun.wait(60.0)
-    with pytest.raises(KeyboardInterrupt):
-        signal.raise_signal(signal.SIGINT)
-    go_on.set()
-    thread.join()
-    assert done.is_set()
 
 
 INTERRUPTED_AT_FIRST = """

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import oracle
-from along_oracle import Bent
-from continuum_oracle import Continuum, ContinuumShaped
+from continuum_oracle import Bent, Continuum, ContinuumShaped
 from currents import CURRENTS, velocity
 from oracle import Array, Star
 from seastar_gym import (

@@ -8,9 +8,7 @@ import pytest
 
 from hubs import TEN, robot_with
 from seastar_gym import Body, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State
-from seastar_gym.envs.observation import observed_rows
 from seastar_gym.envs.stations import heading_of
-from seastar_gym.lanes.dispatch import KnownCode, code_for
 from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.scene.number import side_by_side
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
@@ -253,23 +251,3 @@ def test_a_number_that_is_none_ends_its_robots_stroke_which_lies_where_its_hub_w
     simulator.reset(simulator.failed)
     assert not simulator.stroke(commands[0]).status.any()
     assert all(status.sentence.endswith(".") and "\n" not in status.sentence for status in SolverStatus)
-
-
-def test_machine_code_that_is_kept_is_that_for_its_arguments(monkeypatch):
-    """A robot for all, then each with numbers of its own; commands of pulses, with and without pauses; energies."""
-    call, entries = KnownCode.call, set()
-
-    def checked(self, kind, entry, *args):
-        call(self, kind, entry, *args)
-        assert self._codes[entry, kind] is code_for(entry, *args)
-        entries.add(entry)
-
-    monkeypatch.setattr(KnownCode, "call", checked)
-    simulator = Simulator(Scene(numerics=Numerics(step=0.05)), 2)
-    for density in (1000.0, np.array([900.0, 1100.0]), 1000.0):
-        simulator.set_scene(Scene(Seastar(density=density), numerics=Numerics(step=0.05)))
-        simulator.stroke(np.ones((2, 5)))
-        finished(simulator.advance_in_parts(1.0, np.ones((2, 5)), 2))
-        assert (simulator.elastic_energy() >= 0.0).all() and (simulator.kinetic_energy() > 0.0).all()
-        observed_rows(simulator, np.zeros((2, 4)))
-    assert {entry.__name__ for entry in entries} == {"advance", "energies", "energies_in_water", "observe"}

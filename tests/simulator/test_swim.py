@@ -8,7 +8,6 @@ import pytest
 
 from hubs import HUBS, TEN, robot_with
 from seastar_gym import AlongLimb, Numerics, Scene, Seastar, Simulator, SmaPulse, Stiffening, Vortex, Water
-from simulator.test_body import FOUR_LIMBS
 
 CHAPTER = Seastar(discretisation="chapter")
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
@@ -122,22 +121,6 @@ def test_commanding_the_next_limb_turns_the_swim_by_72_degrees_and_mirrored_comm
     expected = turned(moved([4, 0, 1, 2, 3]), FIFTH_OF_TURN)
     np.testing.assert_allclose(next_limb, expected, rtol=0.0, atol=rounding)
     np.testing.assert_allclose(mirrored, moved(mirror) * [1.0, -1.0], rtol=0.0, atol=rounding)
-
-
-@pytest.mark.parametrize("robot, rounding", [(TEN, 1e-11), (FOUR_LIMBS, 1e-9)], ids=["hub", "body"])
-def test_the_water_is_the_same_everywhere_and_in_every_direction(robot, rounding):
-    """A robot that begins elsewhere under another heading swims the same swim there."""
-    here, there = (swimmer("implicit-midpoint", 5e-3, 8, robot=robot) for _ in range(2))
-    heading, place = 0.7, np.array([0.4, -0.3])
-    there.reset(heading=heading)
-    state = there.get_state()
-    there.set_state(state._replace(positions=state.positions + place))
-    for commands in random_commands(8, robot.n_limbs):
-        here.stroke(commands)
-        there.stroke(commands)
-    np.testing.assert_allclose(there.positions, turned(here.positions, heading) + place, rtol=0.0, atol=rounding)
-    np.testing.assert_allclose(there.velocities, turned(here.velocities, heading), rtol=0.0, atol=1e5 * rounding)
-    np.testing.assert_allclose(there.orientation(), here.orientation() + heading, rtol=0.0, atol=100.0 * rounding)
 
 
 # Convergence

@@ -107,15 +107,6 @@ def test_several_processes_fill_one_file(tmp_path):
     assert json.loads((tmp_path / "toy.json").read_text())["runs"] == {"0": "mine", "1": "theirs", "2": "theirs"}
 
 
-@pytest.mark.parametrize("name", [name for name, study in STUDIES.items() if study.run])
-def test_a_help_names_the_command_and_where_it_writes(name, capsys):
-    assert STUDIES[name].name == name
-    with pytest.raises(SystemExit) as done:
-        main([name, "--help"])
-    shown = " ".join(capsys.readouterr().out.split())
-    assert done.value.code == 0 and f"usage: python -m studies.{name} [" in shown and "by default" in shown
-
-
 # Pages
 
 

@@ -3,7 +3,6 @@
 from functools import partial
 
 import numpy as np
-import pytest
 
 from refusals import assert_refused
 from seastar_gym.scene import Scene, Seastar, SmaPulse
@@ -65,10 +64,9 @@ REFUSED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("refused", REFUSED, ids=lambda refused: " ".join(refused[1:]))
-def test_what_no_sweep_can_be_is_refused(refused, tmp_path, monkeypatch):
+def test_what_no_sweep_can_be_is_refused(tmp_path, monkeypatch, subtests):
     monkeypatch.chdir(tmp_path)
-    make, *words = refused
-    with assert_refused(*words):
-        make()
-    assert not list(tmp_path.iterdir())
+    for make, *words in REFUSED:
+        with subtests.test(words=words), assert_refused(*words):
+            make()
+        assert not list(tmp_path.iterdir())

@@ -9,20 +9,18 @@ import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import numpy as np
 import pyarrow.parquet
 import pytest
 
 import works
 from losing import Interrupted
 from refusals import assert_refused
-from seastar_gym.scene import Scene, Seastar, SmaPulse
-from seastar_gym.simulator import Simulator
+from seastar_gym.scene import Scene
 from seastar_gym.sweep.command import as_text
 from seastar_gym.sweep.designs import Choices, Range, Sweep
 from seastar_gym.sweep.executors import Outcome, Processes, RayTasks, SlurmJobs, dask_client, outcomes
 from seastar_gym.sweep.run import ATTEMPTS, ResultFiles, read_results, result_file_of, run
-from seastar_gym.sweep.swimming import REFUSED, swim
+from seastar_gym.sweep.swimming import swim
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -212,29 +210,6 @@ def test_results_are_the_same_bits_on_every_executor(name, tmp_path, sweep):
 
 
 FAST = Scene.preset("fast")
-
-
-def one_cell(*axes, **options):
-    (batch,) = Sweep(FAST, axes, **{"settling": 1, "measured": 2, **options}).batches()
-    return batch
-
-
-@pytest.mark.parametrize("order", [(0, 1, 2), (1, 2, 0), (2, 0, 1)])
-def test_the_smallest_opening_angle_is_that_of_any_interval(order):
-    """Whichever interval has it: neighbours turned towards each other, with force, a little, or not at all."""
-    commands = np.array([[0.0, 1.0, -1.0, 0.0, 0.0], [0.0, 0.4, -0.4, 0.0, 0.0], np.zeros(5)])[list(order)]
-    found = swim(one_cell(gait=commands, settling=1, measured=2))["smallest_opening_angle"]
-    simulator = Simulator(FAST)
-    angles = [simulator.stroke([command]).smallest_opening_angle[0] for command in commands]
-    assert found.tolist() == [min(angles)] and np.ptp(angles) > 0.1
-    assert angles.index(min(angles)) == order.index(0)
-
-
-def test_a_cell_of_refused_designs_is_a_result():
-    chapter = Scene(Seastar(n_limbs=3, discretisation="chapter", nodes_per_limb=5), actuator=SmaPulse(0.1))
-    axes = Choices("robot.n_limbs", (5, 3)), Choices("actuator.peak_angle", (0.8, 0.9))
-    five, three = Sweep(chapter, axes, settling=0, measured=1).batches()
-    assert (swim(three)["status"] == REFUSED).all() and (swim(five)["status"] == 0).all()
 
 
 def test_a_part_has_units_scene_and_choices(tmp_path):
