@@ -188,7 +188,7 @@ MOST_SAMPLES = 100_000
 """Most sequences of a class that can be asked for."""
 LEVELS = (0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
 """Errors for which a summary names the fastest setting."""
-REPEATED = ("repeated", "alternating", "held", "on-off", "policies")
+REPEATED = ("repeated", "alternating", "held", "on-off", "policies", "chapter's")
 """Beginnings of the names of classes whose commands are repeated."""
 
 HEADS = ("error", "speed", "fastest setting")

@@ -8,7 +8,8 @@ import pytest
 
 from seastar_gym import Contact, DomainRandomization, Numerics, Scene, Seastar, Simulator, SmaPulse, Uniform
 from seastar_gym.accuracy.certificate import resolved
-from seastar_gym.accuracy.measure import SHORT, STROKES, draw_classes, swim
+from seastar_gym.accuracy.commands import STROKES, draw_classes
+from seastar_gym.accuracy.measure import SHORT, swim
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.lanes.registers import N_LANES
