@@ -69,9 +69,9 @@ def scene_for(
         certificate has.
 
     >>> scene_for(0.005).robot.nodes_per_limb
-    28
-    >>> scene_for(0.005, decision_period=0.2).robot.nodes_per_limb
-    12
+    14
+    >>> scene_for(0.001, any_gait=True, decision_period=0.2).robot.nodes_per_limb
+    19
     >>> scene_for(1e-6)
     Traceback (most recent call last):
     ValueError: No measured setting keeps the path error below 0.0001 %: the best, ...
