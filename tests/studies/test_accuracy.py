@@ -68,7 +68,7 @@ def test_the_scan_is_whole_and_its_front_has_no_setting_that_another_beats():
         best = front.front(some, front.of_any)
         for each in best:
             enough = (1.0 - front.NOTICEABLE) * front.of_any(each)
-            assert not any(other.cost <= each.cost and front.of_any(other) < enough for other in some)
+            assert not any(other.cost < each.cost and front.of_any(other) < enough for other in some)
         assert {each.resolution.nodes_per_limb for each in best} >= {7, 12}
         assert {*front.chosen(kind)} <= {*front.settings()}
 
