@@ -10,6 +10,7 @@ writes the tables of `seastar_gym.accuracy.chapters`, and `--store --speeds` onl
 """
 
 import itertools
+import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -378,7 +379,7 @@ def presets(_: object) -> str:
         growth = max(in_table(name, each).energy_growth for each in ("strokes", "wires"))
         rows.append([
             f"`{name}`", nodes, f"{scheme}, {row.step / MILLI:g} ms", f"{row.damping:g}", f"{row.newton_tolerance:.0e}",
-            *(each.replace(" %", "") for each in numbers), f"{growth:.2f}",
+            *(each.replace(" %", "") for each in numbers), "–" if math.isnan(growth) else f"{growth:.2f}",
         ])  # fmt: skip
     head = ["fidelity", "N", "scheme and step", "damping", "tolerance", "space [%]", "time [%]", "random [%]",
             "repeated [%]", "growth"]  # fmt: skip
