@@ -183,10 +183,12 @@ def warn_undamped(scene: Scene, decision_period: float | None) -> None:
 
     errors = errors_in_info(scene, None, decision_period)["gait_error"]
     of_chapters = "" if math.isnan(errors) else f", by up to {100 * errors:.2g} % of the hub's path"
+    # Another scheme would be compiled for nothing else.
+    modes = resonances(scene, decision_period) if scene.numerics.scheme == "implicit-midpoint" else []
     warnings.warn(
         f"The limbs of this scene damp nothing, so that decisions drive their resonances, which steps of "
         f"{1e3 * scene.numerics.step:g} ms misplace{of_chapters}: Seastar(relaxation_time=relaxation_time(0.1, 10.0)) "
-        f"damps them as soft silicone does. {told(resonances(scene, decision_period), decision_period)}".strip(),
+        f"damps them as soft silicone does. {told(modes, decision_period)}".strip(),
         stacklevel=4,
     )
 

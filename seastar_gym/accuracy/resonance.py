@@ -40,7 +40,7 @@ def natural_frequencies(scene: Scene) -> list[float]:
     They are peaks of the spectrum of small oscillations of undamped limbs, which are simulated for four seconds.
 
     >>> [round(f, 1) for f in natural_frequencies(Scene())][:2]
-    [8.8, 24.6]
+    [1.5, 6.2]
     """
     require_kind("scene", scene, Scene, "a Scene")
     one = scene if scene.n_robots is None else scene.of_robot(0)
