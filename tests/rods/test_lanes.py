@@ -254,6 +254,30 @@ def test_an_impossible_width_is_refused(width):
 # A kernel asks a bundle whether a term is there, and what it does with one that is not need not compile.
 
 
+@ONLY_COMPILED
+@pytest.mark.parametrize(
+    "array",
+    [
+        np.ones((1, N_LANES), np.float32), np.ones((1, N_LANES), np.int64), np.ones((N_LANES, 2)).T,
+        np.ones((2, 2 * N_LANES))[:, ::2], np.ones((1, 1, N_LANES)), (np.ones(3), np.ones(4)), "rows",
+    ],
+    ids=["float32", "int64", "transposed", "strided", "three axes", "plain tuple", "string"],
+)  # fmt: skip
+def test_only_contiguous_float64_rows_and_named_tuples_of_them_can_be_borrowed_and_shared_ones_not_written(array):
+    @compiled
+    def function(rows):
+        return any_lane(load(borrow(rows), 0) > 0.0)
+
+    @compiled
+    def write(rows):
+        store(borrow(rows), 0, 1.0)
+
+    with pytest.raises(TypingError):
+        function(array)
+    with pytest.raises(TypingError):
+        write(np.zeros(3))  # shared
+
+
 class Part(NamedTuple):
     weight: Any
 
