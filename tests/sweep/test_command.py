@@ -66,11 +66,13 @@ def test_counting_simulates_nothing(tmp_path, capsys):
 
 def test_a_search_from_words_to_its_best(tmp_path, capsys):
     """Which does not write through a link."""
-    pytest.importorskip("optuna")
-    words = "robot.limb_length=0.05:0.15", "--optuna", "4", "--robots", "2", "--out", str(tmp_path)
+    optuna = pytest.importorskip("optuna")
+    words = "robot.limb_length=0.05:0.15", "--optuna", "4", "--robots", "2", "--minimize", "--out", str(tmp_path)
     assert main([*words, *QUICK]) == 0
-    assert "Best speed: 0.0" in capsys.readouterr().out
-    assert (tmp_path / "study.db").exists() and read_results(tmp_path).num_rows == 4
+    found = read_results(tmp_path).column("speed").to_pylist()
+    assert len(found) == 4 and f"Best speed: {min(found):.6g}" in capsys.readouterr().out
+    [study] = optuna.get_all_study_summaries(f"sqlite:///{tmp_path}/study.db")
+    assert study.direction.name == "MINIMIZE"
     (tmp_path / "study.db").rename(tmp_path / "somebody's")
     (tmp_path / "study.db").symlink_to(tmp_path / "somebody's")
     before = (tmp_path / "somebody's").read_bytes()
