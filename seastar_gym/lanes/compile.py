@@ -88,8 +88,9 @@ def kernel_sources(package: Path = PACKAGE) -> list[Path]:
     ]
 
 
-def source_digest(package: Path = PACKAGE, numpy_version: str = np.__version__) -> str:
-    """Hexadecimal digest of everything that the machine code depends on."""
+def source_digest(package: Path = PACKAGE, numpy_version: str = "") -> str:
+    """Hexadecimal digest of everything that the machine code depends on. numpy_version: That of this process if ""."""
+    numpy_version = numpy_version or np.__version__
     versions = f"numba {numba.__version__} llvmlite {llvmlite.__version__} numpy {numpy_version} lanes {N_LANES}"
     digest = hashlib.sha256(versions.encode())
     for source in kernel_sources(package):

@@ -24,6 +24,7 @@ from seastar_gym import (
     Uniform,
 )
 from seastar_gym.accuracy import chapters_certificate, timed_certificate
+from seastar_gym.accuracy.certificate import MARGIN
 from seastar_gym.envs import rendering, seastar_swim
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.paths import cross_track_error, shortest_way
@@ -62,13 +63,13 @@ def test_info_tells_what_was_measured_of_the_fidelity(fidelity, period):
     known, repeated = certificate.of(scene), certificate.repeated(certificate.actions)
     others = [name for name in certificate.actions if name not in repeated]
     _, info = SeastarSwimEnv(fidelity=fidelity, decision_period=period).reset(seed=0)
-    assert (info["path_error"], info["gait_error"]) == (known.error(others), known.error(repeated))
+    assert (info["path_error"], info["gait_error"]) == (known.promise(others), known.promise(repeated))
     typical = known.typical_error(others), known.typical_error(repeated)
     assert (info["typical_error"], info["typical_gait_error"]) == typical
     assert (info["space_error"], info["time_error"]) == (known.space_error, known.time_error)
     assert info.get("batch_real_time_factor") == (None if in_time else known.speed)
     assert 0.0 < info["typical_error"] < info["path_error"] and info["typical_gait_error"] < info["gait_error"]
-    assert info["path_error"] <= (info["space_error"] + info["time_error"]) * (1.0 + 1e-5)
+    assert info["path_error"] <= MARGIN * (info["space_error"] + info["time_error"]) * (1.0 + 1e-2)
 
 
 SOFT, HOT = Seastar(youngs_modulus=2e6), ThermalSma(largest_temperature=60.0)
@@ -76,7 +77,8 @@ SOFT, HOT = Seastar(youngs_modulus=2e6), ThermalSma(largest_temperature=60.0)
 
 @pytest.mark.parametrize(
     "scene, period",
-    [*((scene, None) for scene in (Scene(SOFT), Scene(fluid=None), Scene(Seastar(5, 9)), None)), (Scene(), 0.05),
+    [*((scene, None) for scene in (Scene(SOFT), Scene(fluid=None), Scene(Seastar(5, 15)), None)),
+     (Scene(actuator=SmaWires()), 0.05),
      *((scene, 0.2) for scene in (Scene(SOFT, actuator=SmaWires()), Scene(actuator=SmaWires(refractory=True)),
                                   Scene(actuator=HOT)))],
 )  # fmt: skip

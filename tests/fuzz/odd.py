@@ -75,7 +75,7 @@ MADE: Calls = {
     "Numerics.preset": (Numerics.preset, dict(fidelity="fast")),
     "Scene.preset": (Scene.preset, dict(fidelity="fast")),
     "scene_for": (scene_for, dict(error=0.1, any_gait=True)),
-    "chapters_certificate().for_error": (chapters_certificate().for_error, dict(error=0.1, classes=("random",))),
+    "chapters_certificate().for_error": (chapters_certificate().for_error, dict(error=0.1, classes=("small",))),
     "chapters_certificate().of": (chapters_certificate().of, dict(scene=Scene.preset("fast"))),
     "timed_certificate": (timed_certificate, dict(decision_period=0.2)),
     "SeastarSwimEnv": (SeastarSwimEnv, dict(
