@@ -228,9 +228,9 @@ def measured(name: str, table: Table) -> Certificate:
             },
         }  # fmt: skip
     return Certificate(
-        physics(table.scene), tuple(settings), promised, promised, table.samples * max(1, len(table.periods)), limit_error=max(of_limit), classes=CLASSES_VERSION,
-        version=__version__, machine=machine(), decision_period=max(table.periods, default=None),
-        measured_over=over | {"processor_seconds": round(time.process_time() - began)},
+        physics(table.scene), tuple(settings), promised, promised, table.samples * max(1, len(table.periods)),
+        limit_error=max(of_limit), classes=CLASSES_VERSION, version=__version__, machine=machine(),
+        decision_period=max(table.periods, default=None), measured_over=over | {"processor_seconds": round(time.process_time() - began)},
     )  # fmt: skip
 
 
