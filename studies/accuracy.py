@@ -230,7 +230,8 @@ def measured(name: str, table: Table) -> Certificate:
     return Certificate(
         physics(table.scene), tuple(settings), promised, promised, table.samples * max(1, len(table.periods)),
         limit_error=max(of_limit), classes=CLASSES_VERSION, version=__version__, machine=machine(),
-        decision_period=max(table.periods, default=None), measured_over=over | {"processor_seconds": round(time.process_time() - began)},
+        decision_period=max(table.periods, default=None),
+        measured_over=over | {"processor_seconds": round(time.process_time() - began)},
     )  # fmt: skip
 
 
