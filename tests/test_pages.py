@@ -59,7 +59,7 @@ def short_form(monkeypatch, tmp_path):
     monkeypatch.setitem(many.swim_many.__kwdefaults__, "max_strokes", LONGEST)
     monkeypatch.setattr(measure, "NODES", (12,))
     monkeypatch.setattr(measure, "SHORT", Numerics("implicit-midpoint", 1e-3, 1e-8))
-    monkeypatch.setattr(measure, "NUMERICS", (Numerics("implicit-midpoint", 5e-3, 1e-6),))
+    monkeypatch.setattr(measure, "NUMERICS", (Numerics("implicit-midpoint", 2.5e-3, 1e-6),))
     monkeypatch.setattr(endurance, "LONG", 40)
     monkeypatch.setattr(measure, "MANY_NODES", 17)
     monkeypatch.setattr(paths, "PATHS", dict(paths.PATHS))

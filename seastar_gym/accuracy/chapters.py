@@ -179,16 +179,13 @@ def warn_undamped(scene: Scene, decision_period: float | None) -> None:
     damped = relaxation_time is not None and bool(np.min(relaxation_time) > 0.0)
     if decision_period is None or decision_period >= stroke or damped or scene.numerics.step <= SHORT_STEP:
         return
-    from seastar_gym.accuracy.resonance import resonances, told  # simulates, and most scenes are damped
-
     errors = errors_in_info(scene, None, decision_period)["gait_error"]
     of_chapters = "" if math.isnan(errors) else f", by up to {100 * errors:.2g} % of the hub's path"
-    # Another scheme would be compiled for nothing else.
-    modes = resonances(scene, decision_period) if scene.numerics.scheme == "implicit-midpoint" else []
     warnings.warn(
         f"The limbs of this scene damp nothing, so that decisions drive their resonances, which steps of "
         f"{1e3 * scene.numerics.step:g} ms misplace{of_chapters}: Seastar(relaxation_time=relaxation_time(0.1, 10.0)) "
-        f"damps them as soft silicone does. {told(modes, decision_period)}".strip(),
+        "damps them as soft silicone does. seastar_gym.accuracy.resonance.resonances(scene, "
+        f"{decision_period:g}) has their frequencies.",
         stacklevel=4,
     )
 

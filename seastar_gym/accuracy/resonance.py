@@ -44,7 +44,8 @@ def natural_frequencies(scene: Scene) -> list[float]:
     """
     require_kind("scene", scene, Scene, "a Scene")
     one = scene if scene.n_robots is None else scene.of_robot(0)
-    return list(_frequencies(replace(one, numerics=Numerics("implicit-midpoint", STEP, 1e-9))))
+    own = one.numerics if one.numerics.scheme == "implicit-midpoint" else Numerics("implicit-midpoint")
+    return list(_frequencies(replace(one, numerics=replace(own, step=STEP, newton_tolerance=1e-9))))
 
 
 @lru_cache(32)

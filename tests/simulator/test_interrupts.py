@@ -414,7 +414,7 @@ except KeyboardInterrupt:
 """
 
 
-@pytest.mark.parametrize("library, nth", [("numba", 1), ("numba", 120), ("scipy", 1), ("scipy", 100), ("pygame", 10)])
+@pytest.mark.parametrize("library, nth", [("numba", 1), ("numba", 120), ("scipy", 1), ("scipy", 3), ("pygame", 10)])
 def test_the_first_environment_can_be_interrupted_in_the_middle_of_an_import(library, nth):
     if library == "pygame":
         pytest.importorskip("pygame")
