@@ -71,7 +71,7 @@ class CustomBuildHook(BuildHookInterface[Any]):
         for level in self.LEVELS:
             with tempfile.TemporaryDirectory() as nothing:
                 own = {"PYTHONPATH": self.root, "NUMBA_CACHE_DIR": nothing, "PYTHONHASHSEED": "0"}
-                command = [sys.executable, "-m", "seastar_gym.lanes.shipped", level, self._folder.name]
+                command = [sys.executable, "-m", "seastar_gym.cli.shipped", level, self._folder.name]
                 subprocess.run(command, env=os.environ | own, cwd=nothing, check=True)
         build_data["force_include"][self._folder.name] = "seastar_gym/compiled"
         build_data["pure_python"] = False

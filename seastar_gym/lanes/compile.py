@@ -210,8 +210,8 @@ class _SoundFile(IndexDataCacheFile):
         return _sound(path)
 
 
-# Code that a wheel may bring, for a level of x86-64 instead of a processor: shipped.py compiles it. What a processor of
-# a level can do is in LLVM's words, the highest level first.
+# Code that a wheel may bring, for a level of x86-64 instead of a processor; cli/shipped.py compiles it. What a
+# processor of a level can do is in LLVM's words, the highest level first.
 SHIPPED = PACKAGE / "compiled"
 _V2 = "cmov crc32 cx16 cx8 fxsr mmx popcnt sahf sse sse2 sse3 sse4.1 sse4.2 ssse3"
 _V3 = f"{_V2} avx avx2 bmi bmi2 f16c fma lzcnt movbe xsave"

@@ -49,7 +49,7 @@ def shipped(tmp_path_factory):
     if N_LANES not in NATIVE:
         pytest.skip("a processor of neither level")
     folder = tmp_path_factory.mktemp("shipped")
-    command = [sys.executable, "-m", "seastar_gym.lanes.shipped", NATIVE[N_LANES], str(folder / "code"), ID]
+    command = [sys.executable, "-m", "seastar_gym.cli.shipped", NATIVE[N_LANES], str(folder / "code"), ID]
     own = {"NUMBA_CACHE_DIR": str(folder / "builders"), "PYTHONPATH": str(compiling.PACKAGE.parent)}
     subprocess.run(command, env=os.environ | own, check=True, capture_output=True)
     return folder / "code"

@@ -1,6 +1,6 @@
 """Compiles the kinds of code that a wheel may carry, for a level of x86-64. Nothing of it runs on this processor.
 
-    python -m seastar_gym.lanes.shipped x86-64-v4 FOLDER [ID ...]
+    python -m seastar_gym.cli.shipped x86-64-v4 FOLDER [ID ...]
 
 The build hook calls it (`HATCH_BUILD_HOOK_ENABLE_CUSTOM=true python -m build --wheel`). Kinds are those that all
 registered ids ask for, or some, one robot and batches.
