@@ -29,7 +29,7 @@ observation, info = env.reset(seed={seed})
 info = env.step(policy.predict(observation)[0])[4]
 setting = certificate.of(scene)
 assert (info["space_error"], info["time_error"]) == (setting.space_error, setting.time_error)
-print("errors", info["path_error"], setting.error(certificate.promised))
+print("errors", info["path_error"], setting.promise(certificate.promised))
 """
 
 
