@@ -59,20 +59,31 @@ class CustomMetadataHook(MetadataHookInterface):
 
 
 class CustomBuildHook(BuildHookInterface[Any]):
-    """Compiles the kinds of code that the registered ids ask for, for processors of x86-64-v4 and v3."""
+    """Compiles the kinds of code that ids ask for, for processors of x86-64-v4 and v3.
 
-    LEVELS = ("x86-64-v4", "x86-64-v3")
+    All registered ids, or those in SEASTAR_SHIPPED_IDS, parted by spaces.
+    """
+
+    LANES = {"x86-64-v4": "8", "x86-64-v3": "4"}
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile, and have the files included."""
         if version == "editable":
             return
         self._folder = tempfile.TemporaryDirectory()
-        for level in self.LEVELS:
-            with tempfile.TemporaryDirectory() as nothing:
-                own = {"PYTHONPATH": self.root, "NUMBA_CACHE_DIR": nothing, "PYTHONHASHSEED": "0"}
-                command = [sys.executable, "-m", "seastar_gym.cli.shipped", level, self._folder.name]
-                subprocess.run(command, env=os.environ | own, cwd=nothing, check=True)
+        # What the build requires is in pip's own PYTHONPATH.
+        path = os.pathsep.join(filter(None, [self.root, os.environ.get("PYTHONPATH")]))
+        ids = os.environ.get("SEASTAR_SHIPPED_IDS", "").split()
+        others = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+        with tempfile.TemporaryDirectory() as nothing:
+            running = []
+            for level, lanes in self.LANES.items():
+                own = {"PYTHONPATH": path, "NUMBA_CACHE_DIR": nothing, "PYTHONHASHSEED": "0", "SEASTAR_LANES": lanes}
+                command = [sys.executable, "-m", "seastar_gym.cli.shipped", level, self._folder.name, *ids]
+                running.append(subprocess.Popen(command, env=others | own, cwd=nothing))
+            codes = [each.wait() for each in running]
+            if any(codes):
+                raise RuntimeError("The machine code of the wheel could not be compiled.")
         build_data["force_include"][self._folder.name] = "seastar_gym/compiled"
         build_data["pure_python"] = False
         python = f"cp{sys.version_info[0]}{sys.version_info[1]}"

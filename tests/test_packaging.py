@@ -22,7 +22,8 @@ from seastar_gym.envs import symmetry
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
 ROOT = Path(__file__).resolve().parent.parent
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+PROJECT = PYPROJECT["project"]
 OURS = {"seastar_gym", "agents", "studies", "train"}
 NOT_REQUIRED = {*OURS, "rclpy", "geometry_msgs", "std_msgs", "cv2"}  # examples of ROS 2 and of OpenCV
 # Where the import name does not say it.
@@ -155,6 +156,13 @@ def test_constraints_pin_all_that_gets_installed_within_the_declared_ranges():
     assert installed_with(requirements("test")) <= set(pinned)
     for one in requirements("test", "browser", "docs", "release"):
         assert pinned[canonicalize_name(one.name)] in one.specifier, one.name
+
+
+def test_machine_code_in_the_wheel_is_of_the_pinned_numba():
+    hook = PYPROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["hooks"]["custom"]
+    required, pinned = list(map(Requirement, hook["dependencies"])), pins("constraints.txt")
+    assert names(required) | {"llvmlite"} == names(requirements())
+    assert all(pinned[canonicalize_name(one.name)] in one.specifier for one in required)
 
 
 def test_lowest_versions_are_those_of_the_declared_ranges():

@@ -1,19 +1,22 @@
 """Compiles the kinds of code that a wheel may carry, for a level of x86-64. Nothing of it runs on this processor.
 
-    python -m seastar_gym.cli.shipped x86-64-v4 FOLDER [ID ...]
+    SEASTAR_LANES=8 python -m seastar_gym.cli.shipped x86-64-v4 FOLDER [ID ...]
 
 The build hook calls it (`HATCH_BUILD_HOOK_ENABLE_CUSTOM=true python -m build --wheel`). Kinds are those that all
 registered ids ask for, or some, one robot and batches.
 """
 
 import contextlib
-import os
 import sys
 from pathlib import Path
 from typing import Any
 
-LANES = {"x86-64-v4": "8", "x86-64-v3": "4"}
-"""Lanes of the vectors of each level."""
+
+def lanes_of(level: str) -> int:
+    """Lanes that the package takes on processors of a level."""
+    from seastar_gym.lanes.compile import LEVELS
+
+    return 8 if "avx512f" in LEVELS[level] else 4
 
 
 def names_alone(bitcode: bytes) -> bytes:
@@ -50,14 +53,16 @@ def keep(level: str, entry: Any, *args: Any) -> None:
 
 def main(level: str, folder: str, *ids: str) -> None:
     """Compile all kinds that ids ask for, all registered ones if none are named, for a level into a folder."""
-    os.environ["SEASTAR_LANES"] = LANES[level]  # before the package is imported
     import gymnasium as gym
     import numba
 
     import seastar_gym
     from seastar_gym.lanes import compile as compiling
     from seastar_gym.lanes import dispatch
+    from seastar_gym.lanes.registers import N_LANES
 
+    if lanes_of(level) != N_LANES:  # chosen as the package is imported
+        raise SystemExit(f"Code for {level} is on {lanes_of(level)} lanes: set SEASTAR_LANES={lanes_of(level)}.")
     numba.config.CPU_NAME, numba.config.USING_SVML = level, False
     numba.config.CPU_FEATURES = ",".join(sorted(f"+{each}" for each in compiling.LEVELS[level]))
     compiling.SHIPPED = Path(folder)

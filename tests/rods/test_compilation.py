@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Simulator
+from seastar_gym.cli.shipped import keep
 from seastar_gym.lanes import compile as compilation
 from seastar_gym.lanes.compile import PACKAGE, entry_point, kernel_sources, source_digest
 from seastar_gym.lanes.dispatch import code_for
@@ -336,6 +337,84 @@ def test_own_folders_keep_code_below_a_sticky_one_by_a_link_and_whatever_the_uma
         assert [fresh.call(), fresh.call()] == [COMPILED, FOUND]
     finally:
         os.umask(umask)
+
+
+# Code that came with the package
+
+
+@pytest.fixture
+def shipped(fresh, tmp_path, monkeypatch):
+    """A cache in which nothing is yet, and a package that has code for floats and for integers."""
+    monkeypatch.setattr(compilation, "SHIPPED", tmp_path / "compiled")
+    monkeypatch.setattr(compilation, "levels_of", lambda codegen: [(codegen.magic_tuple()[0], "x86-64-v3")])
+    (compilation.SHIPPED / compilation.shipped_digest()).mkdir(parents=True)
+    for x in (1.0, 3):
+        keep("x86-64-v3", entry_point(fresh.module.number.py_func), x)
+    return fresh
+
+
+def of_package(suffix: str) -> Path:
+    """A file of the code for floats that came with the package."""
+    return next(file for file in sorted(compilation.SHIPPED.rglob(f"*{suffix}")))
+
+
+def test_code_that_came_with_the_package_runs_without_a_trace(shipped, told):
+    before = {*shipped.cache.rglob("*")}
+    assert [shipped.call(), shipped.call(), shipped.call(3)] == [FOUND, FOUND, (4.5, 1, 0)]
+    assert not told() and {*shipped.cache.rglob("*")} == before
+
+
+def test_code_that_came_with_the_package_runs_where_no_folder_can_be_written(shipped, told, monkeypatch):
+    shutil.rmtree(shipped.cache)
+    shipped.cache.write_text("a file where the folder was", encoding="utf-8")
+    for home in ("HOME", "XDG_CACHE_HOME"):
+        monkeypatch.setenv(home, str(shipped.cache))
+    assert [shipped.call(), shipped.call(1j)] == [FOUND, (2.5 - 1.0 + 1j, 0, 1)]
+    (sentence,) = told()  # of the second
+    assert "set NUMBA_CACHE_DIR" in sentence
+
+
+def test_what_the_user_has_is_looked_for_first(cached, monkeypatch):
+    monkeypatch.setattr(compilation, "SHIPPED", cached.cache)
+    monkeypatch.setattr(compilation, "ShippedFile", lambda *_: pytest.fail("the package was asked"))
+    assert cached.call() == FOUND
+
+
+@pytest.mark.parametrize("suffix", [".nbi", ".1.nbc"])
+@pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE)
+def test_a_damaged_file_of_the_package_is_as_none(shipped, told, suffix, damage):
+    damage(of_package(suffix))
+    assert [shipped.call(), shipped.call()] == [COMPILED, FOUND]
+    (sentence,) = told()
+    assert "compiles" in sentence
+
+
+def edit(shipped, patch):
+    file = Path(shipped.module.number.py_func.__code__.co_filename)
+    file.write_text(file.read_text(encoding="utf-8") + "\n# edited\n", encoding="utf-8")
+
+
+UNFIT = {
+    "an edited source": edit,
+    "edited sources, or another numba": lambda _, patch: patch.setattr(compilation, "shipped_digest", lambda: "other"),
+    "another level": lambda _, patch: patch.setattr(compilation, "levels_of", lambda _: [("x86_64-any", "x86-64-v4")]),
+    "no level": lambda _, patch: patch.setattr(compilation, "levels_of", lambda _: []),
+    "code for integers in its place": lambda *_: shutil.copy(of_package(".2.nbc"), of_package(".1.nbc")),
+}
+
+
+@pytest.mark.parametrize("spoil", UNFIT.values(), ids=UNFIT)
+def test_code_of_the_package_that_does_not_fit_never_runs(shipped, monkeypatch, spoil):
+    spoil(shipped, monkeypatch)
+    assert [shipped.call(), shipped.call()] == [COMPILED, FOUND]
+
+
+def test_code_of_the_package_fits_all_of_numpy_2(monkeypatch):
+    def digest(version):
+        monkeypatch.setattr(np, "__version__", version)
+        return compilation.shipped_digest.__wrapped__()
+
+    assert digest("2.0.0") == digest("2.9.1") != digest("3.0.0")
 
 
 # Whoever waits is told

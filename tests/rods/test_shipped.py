@@ -1,14 +1,15 @@
-"""Machine code that a wheel carries: found where nothing was compiled, with the same bits, and never where unfit."""
+"""Machine code that a wheel carries: found where nothing was compiled, with the same bits, by processors it fits."""
 
 import os
+import runpy
 import subprocess
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import gymnasium as gym
 import pytest
 
+from seastar_gym.cli import shipped as shipping
 from seastar_gym.lanes import compile as compiling
 from seastar_gym.lanes.registers import N_LANES
 
@@ -43,6 +44,15 @@ def test_code_is_of_levels_whose_every_feature_the_processor_has(features, level
     assert compiling.levels_of(codegen(features)) == []
 
 
+def test_code_of_every_level_is_compiled_on_the_lanes_of_its_processors(tmp_path):
+    hook = runpy.run_path(str(compiling.PACKAGE.parent / "hatch_build.py"))["CustomBuildHook"]
+    assert {level: str(shipping.lanes_of(level)) for level in compiling.LEVELS} == hook.LANES
+    for level in compiling.LEVELS:
+        if shipping.lanes_of(level) != N_LANES:
+            with pytest.raises(SystemExit, match="set SEASTAR_LANES="):
+                shipping.main(level, str(tmp_path))
+
+
 @pytest.fixture(scope="module")
 def shipped(tmp_path_factory):
     """Folder of the code that one id asks for."""
@@ -64,41 +74,3 @@ def test_nothing_is_compiled_or_written_where_code_came_with_the_package_and_bit
     env = gym.make(ID)
     env.reset(seed=0)
     assert run.stdout.strip() == env.step([1, 0, 2, 0, 1])[0].tobytes().hex()
-
-
-def cut(file: Path) -> None:
-    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
-
-
-def flip(file: Path) -> None:
-    content = bytearray(file.read_bytes())
-    content[-1] ^= 1
-    file.write_bytes(bytes(content))
-
-
-def other(file: Path) -> None:
-    """Sound code, of another function."""
-    (other,) = list(file.parent.glob("observation.observe*.1.nbc"))
-    file.write_bytes(other.read_bytes())
-
-
-@pytest.mark.parametrize("damage", [cut, flip, other, Path.unlink])
-@pytest.mark.parametrize("what", ["nbc", "nbi"])
-def test_damaged_swapped_and_missing_files_count_as_none(damage, what, shipped, tmp_path, monkeypatch):
-    from seastar_gym.rods.interval import advance
-
-    def load():
-        file = compiling.ShippedFile(advance.py_func, advance._cache._impl.filename_base)
-        return [file.load(key) for key in keys]
-
-    monkeypatch.setattr(compiling, "SHIPPED", tmp_path)
-    folder = tmp_path / compiling.shipped_digest()
-    folder.mkdir()
-    for each in (shipped / folder.name).iterdir():
-        (folder / each.name).write_bytes(each.read_bytes())
-    index = compiling.ShippedFile(advance.py_func, advance._cache._impl.filename_base)._load_index()
-    keys = [*index]
-    assert keys and all(load())
-    for each in folder.glob(f"interval.advance*.{what}"):
-        damage(each)
-    assert not any(load())
