@@ -3,10 +3,12 @@
     python -m agents.cards
     python -m agents.cards --policies runs/FOLDER/policy.safetensors
 
-measures every bundled policy, or a trained one, and writes its card anew. `python train.py --publish` does so, too.
+measures every bundled policy, or a trained one, and writes its card anew. `python train.py --publish` does so, too,
+when it replaces a bundled policy by one that is no worse.
 """
 
 import hashlib
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,8 +17,10 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 import tyro
 
+from agents import options as training
+from agents.run import resume_command
 from seastar_gym.command import answered, run_command
-from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, load
+from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, bundled_file, load, save
 from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.swim import HELD_OUT_SEED, TIME_LIMIT, Swim, swim_many
 from seastar_gym.files import write_atomically
@@ -154,6 +158,45 @@ def write_card(file: Path, threads: int | None = None) -> Path:
     text = card(policy, file, hashlib.sha256(file.read_bytes()).hexdigest(), measure(policy, threads))
     write_atomically(place, text)
     return place
+
+
+def publish(options: training.Options, folder: Path) -> int:
+    """Make the run's policy the bundled one, unless it is worse and not confirmed; returns the exit code."""
+    policy = load(folder / "policy.safetensors")
+    if not options.publish_anyway and (objection := why_not(policy, options)):
+        command = f"{resume_command(folder)} --publish --publish-anyway"
+        print(f"The bundled policy stays: {objection}. Replace it all the same with\n    {command}", file=sys.stderr)
+        return 1
+    file = bundled_file(options.ppo.decision_period, BUNDLED)
+    save(policy, file)
+    print(f"Bundled: {file}, with its card {write_card(file, options.num_threads).name}")
+    return 0
+
+
+def why_not(policy: LearnedPolicy, options: training.Options) -> str | None:
+    """Reason against replacing the bundled policy by this one, None if there is none."""
+    file = bundled_file(options.ppo.decision_period, BUNDLED)
+    if not file.exists():
+        return None
+    try:
+        box = load(file)
+    except (ValueError, FileNotFoundError) as unreadable:
+        return f"there is nothing to compare with, {str(unreadable).rstrip('.')}"
+    ours, theirs = (held_out_decisions(one, options) for one in (policy, box))
+    if ours <= theirs:
+        return None
+    decisions = "strokes" if options.ppo.decision_period is None else "decisions"
+    return f"it takes {theirs:.1f} {decisions} on {HELD_OUT_PATHS} held-out random paths, the new one {ours:.1f}"
+
+
+def held_out_decisions(policy: LearnedPolicy, options: training.Options) -> float:
+    """Mean decisions to the last waypoint of held-out random paths; a swim that does not arrive counts as the limit."""
+    scene = make_scene(None, options.fidelity, options.ppo.decision_period)
+    swims = swim_many(
+        "learned", policy, "random", HELD_OUT_PATHS, scene, max_strokes=options.limit(scene), seed=HELD_OUT_SEED,
+        threads=options.num_threads, decision_period=options.ppo.decision_period,
+    )  # fmt: skip
+    return float(np.mean([done.strokes for done in swims]))
 
 
 @dataclass(frozen=True)

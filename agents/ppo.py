@@ -221,12 +221,6 @@ def _ridge(x: Floats, y: Floats) -> Floats:
     return np.asarray(np.linalg.solve(normal, scaled.T @ y / len(x)) / scale[:, None])
 
 
-def with_coasting(batch: gym.vector.VectorEnv[Any, Any, Any], weights: RewardWeights) -> CoastingProgress:
-    """A batch whose reward counts coasting, fitted to its scene and its time between decisions."""
-    inner: Any = batch.unwrapped
-    return CoastingProgress(batch, fit_coasting(inner.scene, inner.decision_period, np.random.default_rng(0)), weights)
-
-
 class CoastingProgress(gym.vector.VectorWrapper):
     """Batch in autoreset mode SAME_STEP whose reward for progress counts the way that the hub would coast.
 
@@ -286,7 +280,9 @@ def make_training_env(
     """
     env = make_training_batch(hyperparameters, path, random_heading, fidelity, threads, **options)
     if hyperparameters.coasting:
-        env = with_coasting(env, hyperparameters.reward)
+        inner: Any = env.unwrapped
+        coasting = fit_coasting(inner.scene, inner.decision_period, np.random.default_rng(0))
+        env = CoastingProgress(env, coasting, hyperparameters.reward)
     return BatchVecEnv(VectorSymmetryReduction(env) if hyperparameters.symmetry else env)
 
 

@@ -40,7 +40,7 @@ TINY = shlex.split(
 @pytest.fixture(scope="module", autouse=True)
 def short_swims():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("agents.training.options.TIME_LIMIT", SECONDS)
+        patch.setattr("agents.options.TIME_LIMIT", SECONDS)
         yield
 
 
