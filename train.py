@@ -40,7 +40,6 @@ try:
     from agents.options import Options, config_of, read_options, require_consent
     from agents.ppo import make_model, make_training_env, require_device
     from agents.run import (
-        Interruption,
         Robot,
         Watch,
         asked_for,
@@ -52,6 +51,7 @@ try:
         recorded,
         resume_command,
         robot_of,
+        stoppable,
         write_config,
     )
     from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
@@ -162,10 +162,10 @@ def run(options: Options, arguments: Sequence[str]) -> int:
 
 def train_and_compare(options: Options, folder: Path, film: Callable[[], Path | None]) -> int:
     """Train, compare, report, in the folder of the run; returns the exit code. film: See `filmed_beside`."""
-    with Interruption() as interruption:
-        model, watch = train(options, folder, lambda: interruption.requested)
+    with stoppable() as stop:
+        model, watch = train(options, folder, stop.is_set)
     export(model, folder)
-    if interruption.requested:
+    if stop.is_set():
         print(
             f"Stopped after {model.num_timesteps} strokes; {folder / 'model.zip'} is the policy so far. Continue with"
         )

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, get_args
 
 import numpy as np
 import tyro
@@ -38,11 +38,8 @@ CHAPTERS = "the chapter's robot"
 UNKNOWN = "not recorded"
 
 
-class Swims(NamedTuple):
-    """Swims of a policy at a fidelity: round the pentagon, and on held-out random paths, none where that is dear."""
-
-    pentagon: Swim
-    held_out: list[Swim]
+Swims = tuple[Swim, list[Swim]]
+"""Swims of a policy at a fidelity: round the pentagon, and on held-out random paths, none where that is dear."""
 
 
 def scenes_of(policy: LearnedPolicy) -> dict[str, Scene]:
@@ -64,7 +61,7 @@ def measure(policy: LearnedPolicy, threads: int | None = None) -> dict[str, Swim
         held_out = list[Swim]()
         if name in CHEAP:
             held_out = swim_many("learned", policy, "random", HELD_OUT_PATHS, scene, seed=HELD_OUT_SEED, **how)
-        found[name] = Swims(pentagon, held_out)
+        found[name] = pentagon, held_out
     return found
 
 
@@ -143,12 +140,12 @@ def training_facts(training: Mapping[str, Any]) -> str:
 
 
 def _row(fidelity: str, swims: Swims) -> str:
-    done = swims.pentagon
+    done, held_out = swims
     pentagon = f"{done.time[-1]:.1f} s, {done.strokes} {done.counted_in}" if done.finished else done.result
     energy = "" if done.joules_per_metre is None else f"{done.joules_per_metre:.0f}"
-    arrived = [one for one in swims.held_out if one.finished]
+    arrived = [one for one in held_out if one.finished]
     mean = f"{np.mean([one.time[-1] for one in arrived]):.1f}" if arrived else ""
-    share = f"{len(arrived)} of {len(swims.held_out)}" if swims.held_out else ""
+    share = f"{len(arrived)} of {len(held_out)}" if held_out else ""
     return f"| `{fidelity}` | {pentagon} | {energy} | {mean} | {share} |"
 
 

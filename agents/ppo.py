@@ -26,11 +26,11 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
 
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.controllers import checkpoint
+from seastar_gym.controllers import learned
 from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.greedy import turned
 from seastar_gym.controllers.learned import LearnedPolicy, Weights
 from seastar_gym.controllers.registry import task_of
+from seastar_gym.controllers.search import turned
 from seastar_gym.envs.commands import Discrete, command_table
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import RewardWeights
@@ -380,4 +380,4 @@ def policy_of(model: PPO) -> LearnedPolicy:
 
 def actor(weights: Mapping[str, torch.Tensor]) -> Weights:
     """Weights of the policy in Stable-Baselines3's network, under the names of `LearnedPolicy`."""
-    return checkpoint.actor({name: tensor.detach().cpu().numpy().copy() for name, tensor in weights.items()})
+    return learned.actor({name: tensor.detach().cpu().numpy().copy() for name, tensor in weights.items()})

@@ -12,6 +12,7 @@ import os
 import platform
 import shlex
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -46,7 +47,7 @@ from seastar_gym.identify.fit import DOUBT
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number, shown
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene_file import load_scene, search
+from seastar_gym.scene.scene import load_scene, search
 from seastar_gym.scene.serial import has_own_kinds
 
 TARGET = 170.0
@@ -416,23 +417,21 @@ class Watch(BaseCallback):
         return done
 
 
-class Interruption:
-    """Context in which a first Ctrl-C (or a termination) asks for an orderly stop; a second one stops at once."""
+@contextmanager
+def stoppable() -> Iterator[threading.Event]:
+    """Context whose event a first Ctrl-C (or a termination) sets, for an orderly stop; a second one stops at once."""
+    asked, before = threading.Event(), dict[int, Any]()
 
-    SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
-    def __enter__(self) -> "Interruption":
-        self.requested = False
-        self._before = {number: signal.signal(number, self._request) for number in self.SIGNALS}
-        return self
-
-    def _request(self, number: int, frame: FrameType | None) -> None:
-        self.requested = True
-        self._restore()
-
-    def _restore(self) -> None:
-        for number, handler in self._before.items():
+    def restore() -> None:
+        for number, handler in before.items():
             signal.signal(number, handler)
 
-    def __exit__(self, *exception: object) -> None:
-        self._restore()
+    def ask(number: int, frame: FrameType | None) -> None:
+        asked.set()
+        restore()
+
+    before.update((number, signal.signal(number, ask)) for number in (signal.SIGINT, signal.SIGTERM))
+    try:
+        yield asked
+    finally:
+        restore()

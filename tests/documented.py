@@ -176,7 +176,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     rng = np.random.default_rng
     for name, arguments in {
         **{name: dict(decision_period=0.1) for name in ("lagged_gait", "lagged_pentagon", "thrifty_gait")},
-        **{name: {} for name in ("Layout", "Limits", "Motion", "pair_gait")},
+        **{name: {} for name in ("Layout", "Limits", "pair_gait")},
         **{name: {} for name in ("pentagon_gait", "pretrained", "straight_gait")},
         **{name: dict(scene=FAST) for name in ("GreedyPolicy", "symmetry_of")},
         "turning_wave": dict(decision_period=0.1),

@@ -27,8 +27,8 @@ from later import Later
 from refusals import assert_told
 from seastar_gym import DomainRandomization, Numerics, Scene, Seastar, Sight, SmaWires, Uniform
 from seastar_gym.controllers import learned as policies
-from seastar_gym.controllers.checkpoint import load
 from seastar_gym.controllers.contract import actions_of, require_fit
+from seastar_gym.controllers.learned import load
 from seastar_gym.files import part_name
 
 train = Later("train")

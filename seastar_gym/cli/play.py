@@ -20,7 +20,7 @@ from seastar_gym.envs.canvas import import_pygame
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.paths import PATH_HELP, load_path
 from seastar_gym.scene.checks import require_number
-from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.scene.scene import load_scene
 
 if TYPE_CHECKING:
     from seastar_gym.cli.played import PlayedEnv

@@ -31,19 +31,18 @@ from typing import Any, get_args
 
 import numpy as np
 
-from seastar_gym.controllers import checkpoint, learned
+from seastar_gym.controllers import learned
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit
-from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.learned import reason_of
 from seastar_gym.controllers.open_loop import GAITS, scripted
-from seastar_gym.controllers.planner import Planner, gait_planner
+from seastar_gym.controllers.search import GreedyPolicy, Planner, gait_planner
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import OneRobotEnv, SeastarSwimEnv
 from seastar_gym.envs.tasks import name_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, require_kind, require_period, require_seed, require_texts, shown
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene_file import search
+from seastar_gym.scene.scene import search
 
 _FUNCTION = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
@@ -318,9 +317,9 @@ def learned_policy(name: str, decision_period: float | None = None) -> learned.L
 
     decision_period: As of `files_of`.
     """
-    if name.endswith(".zip"):
-        return None if is_model(name) else checkpoint.load(name)
     file = learned_file(name, decision_period)
+    if name.endswith(".zip"):
+        file = None if is_model(name) else Path(name)
     return None if file is None else learned.load(file)
 
 
@@ -359,10 +358,8 @@ def _scripted(name: str, seed: int, decision_period: float | None, n_limbs: int)
 
 
 def _load_file(name: str) -> Policy:
-    if not name.endswith(".zip"):
+    if not name.endswith(".zip") or not is_model(name):
         return learned.load(name)
-    if not is_model(name):
-        return checkpoint.load(name)
     try:
         return load_model(name)
     except ModuleNotFoundError as missing:

@@ -276,25 +276,18 @@ FORM = 2
 
 
 @dataclass(frozen=True)
-class Swim:
-    """How long robots swim. settling, measured: Intervals of a gait before and during the measurement."""
-
-    settling: int
-    measured: int
-
-
-@dataclass(frozen=True)
 class Configuration:
     """Scene and gait, or controller, of a lane batch, before its robots get their own numbers.
 
-    gait, swim: Of robots without a controller.
+    gait: Of robots without a controller. settling, measured: Its intervals before and during the measurement.
     labels: What was chosen, by the name of the axis: texts or numbers.
     controller: Controller, None for a gait.
     """
 
     scene: Scene
     gait: Gait
-    swim: Swim
+    settling: int
+    measured: int
     labels: tuple[tuple[str, Any], ...]
     controller: Controller | None = None
 
@@ -303,7 +296,8 @@ class Configuration:
         """All that results depend on except the numbers of robots, as JSON."""
         told = {"scene": self.scene.to_dict(), "labels": self.labels, "version": __version__, "form": FORM}
         if self.controller is None:
-            told |= {"commands": self.gait.commands, "interval": self.gait.interval, **asdict(self.swim)}
+            told |= {"commands": self.gait.commands, "interval": self.gait.interval}
+            told |= {"settling": self.settling, "measured": self.measured}
         else:
             told["pilot"] = asdict(self.controller)
         return json.dumps(told, sort_keys=True)
@@ -311,30 +305,12 @@ class Configuration:
     @property
     def intervals(self) -> int:
         """Intervals, such as strokes, that every robot swims; 0 for controllers, which end when they arrive."""
-        return self.swim.settling + self.swim.measured if self.controller is None else 0
+        return self.settling + self.measured if self.controller is None else 0
 
     @cached_property
     def digest(self) -> bytes:
         """SHA-256 of the text."""
         return hashlib.sha256(self.text.encode()).digest()
-
-
-def configuration_with(
-    scene: Scene, gait: Any, swim: Swim, choices: dict[str, tuple[Any, Any]], route: Route = Route()
-) -> Configuration:
-    """Configuration of a scene in which choices, (value, label) by the name of the axis, have replaced what was there.
-
-    route: What controllers swim.
-    """
-    values = {name: value for name, (value, _) in choices.items()}
-    try:
-        changed = scene_with(scene, values)
-        controller = controller_of(values["controller"], route, changed) if "controller" in values else None
-        chosen_gait = gait_of(values.get("gait", gait), changed) if controller is None else Gait(())
-    except TypeError as unfit:
-        raise ValueError(f"{shown(values)} do not fit the scene: {unfit}.") from None
-    labels = tuple((name, label) for name, (_, label) in choices.items())
-    return Configuration(changed, chosen_gait, swim, labels, controller)
 
 
 def scene_with(scene: Scene, values: dict[str, Any]) -> Scene:
@@ -500,11 +476,16 @@ class Sweep:
 
     def configuration(self, places: tuple[int, ...]) -> Configuration:
         """Configuration of one combination. places: Which value of every one of `of_configurations`."""
-        choices = {
-            axis.name: (axis.values[place], axis.labels[place])
-            for axis, place in zip(self.of_configurations, places, strict=True)
-        }
-        frame = configuration_with(self.scene, self.gait, Swim(self.settling, self.measured), choices, self.route)
+        chosen = list(zip(self.of_configurations, places, strict=True))
+        values = {axis.name: axis.values[place] for axis, place in chosen}
+        try:
+            scene = scene_with(self.scene, values)
+            controller = controller_of(values["controller"], self.route, scene) if "controller" in values else None
+            gait = gait_of(values.get("gait", self.gait), scene) if controller is None else Gait(())
+        except TypeError as unfit:
+            raise ValueError(f"{shown(values)} do not fit the scene: {unfit}.") from None
+        labels = tuple((axis.name, axis.labels[place]) for axis, place in chosen)
+        frame = Configuration(scene, gait, self.settling, self.measured, labels, controller)
         of_robots: tuple[Axis, ...] = (*self.ranges, *self.of_robots)
         missing = {axis.name for axis in of_robots} - set(numbers_of(frame.scene))
         if missing:

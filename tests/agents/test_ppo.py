@@ -13,10 +13,9 @@ from gymnasium.vector import AutoresetMode
 from later import Later
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar, Sight, SmaWires, Water
-from seastar_gym.controllers import checkpoint
-from seastar_gym.controllers.checkpoint import load
+from seastar_gym.controllers import learned
 from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.learned import LearnedPolicy, pretrained
+from seastar_gym.controllers.learned import LearnedPolicy, load, pretrained
 from seastar_gym.envs.symmetry import VectorFrameStack
 from seastar_gym.evaluation.rollout import make_batch
 
@@ -32,7 +31,7 @@ OTHER = {
     "max_episode_time": 5.0,
 }  # fmt: skip
 """Hyperparameters."""
-POLICY, FACTS, TENSORS = checkpoint.DESCRIPTION, "learner.json", checkpoint.LEARNER
+POLICY, FACTS, TENSORS = learned.DESCRIPTION, "learner.json", learned.LEARNER
 """Entries of a file: the description, the learner's facts, and its tensors."""
 OTHER_SCENE = Scene(robot=Seastar(n_limbs=4, nodes_per_limb=4), fluid=Water(drag_coefficient=1.5), numerics=FAST)
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaWires
-from seastar_gym.controllers import greedy
-from seastar_gym.controllers.greedy import Displacements, GreedyPolicy, displacement_map, measure_gaits
+from seastar_gym.controllers import search
 from seastar_gym.controllers.open_loop import to_actions
+from seastar_gym.controllers.search import Displacements, GreedyPolicy, displacement_map, measure_gaits
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import action_table
 from seastar_gym.evaluation.swim import swim
@@ -42,7 +42,7 @@ def test_the_map_is_measured_once_for_every_scene_and_again_where_its_file_is_da
     for file in files:
         file.write_bytes(b"no map")
     np.testing.assert_array_equal(displacement_map(FAST).hub, first.hub)
-    monkeypatch.setattr(greedy, "measure_gaits", None)  # would fail if called
+    monkeypatch.setattr(search, "measure_gaits", None)  # would fail if called
     np.testing.assert_array_equal(displacement_map(FAST).hub, first.hub)
     assert list((cache / "seastar-gym").iterdir()) == files
     with pytest.raises(TypeError):
@@ -63,7 +63,7 @@ def test_a_map_in_time_is_measured_over_as_many_seconds_and_kept_by_itself(cache
         calls.append((commands.shape, settling, measured, decision_period))
         return Displacements(np.full((len(commands), 2), decision_period or 1.0), np.zeros(len(commands)))
 
-    monkeypatch.setattr(greedy, "measure_gaits", measured)
+    monkeypatch.setattr(search, "measure_gaits", measured)
     wires = Scene(Seastar(3), actuator=SmaWires(0.4), numerics=FAST.numerics)
     found = {period: displacement_map(wires, "pairs", period).hub[0, 0] for period in (None, 0.5, 0.2, 0.5)}
     assert found == {None: 1.0, 0.5: 0.5, 0.2: 0.2}
@@ -75,18 +75,18 @@ def test_displacements_are_a_stroke_s_share_in_the_frame_in_which_they_begin(mon
     gaits = np.array([[[1.0, 0.0, -1.0, 0.0, 0.0]]])
     simulator = Simulator(FAST, 1)
     simulator.stroke(gaits[:, 0])
-    hub, heading = simulator.hub_position(), greedy.heading_of(simulator)
+    hub, heading = simulator.hub_position(), search.heading_of(simulator)
     simulator.stroke(gaits[:, 0])
     simulator.stroke(gaits[:, 0])
     way = (simulator.hub_position() - hub) @ [1.0, 1.0j] * np.exp(-1j * heading) / 2.0
     found = measure_gaits(FAST, gaits, settling=1, measured=2)
     np.testing.assert_allclose(found.hub @ [1.0, 1.0j], way, atol=1e-12)
-    np.testing.assert_allclose(found.turn, (greedy.heading_of(simulator) - heading) / 2.0, atol=1e-12)
+    np.testing.assert_allclose(found.turn, (search.heading_of(simulator) - heading) / 2.0, atol=1e-12)
     alternation = np.concatenate([pair_gait(3, 4), pair_gait(2, 5)])[None]  # over whole periods
     both = measure_gaits(FAST, np.concatenate([alternation, alternation[:, ::-1]]), settling=10, measured=4)
     np.testing.assert_allclose(both.hub[0], both.hub[1], atol=1e-5)
     assert 4.4e-3 < both.hub[0, 0] < 5.5e-3  # a stroke's share
     headings = iter([np.array([3.0]), np.array([-3.0])])
-    monkeypatch.setattr(greedy, "heading_of", lambda simulator: next(headings))
+    monkeypatch.setattr(search, "heading_of", lambda simulator: next(headings))
     found = measure_gaits(FAST, np.zeros((1, 1, 5)), settling=0, measured=2)
     np.testing.assert_allclose(found.turn, np.pi - 3.0)

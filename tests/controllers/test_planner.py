@@ -5,8 +5,7 @@ import pytest
 
 from every_part import ACTUATORS
 from seastar_gym import Body, HeadingTargets, Numerics, Scene, Seastar, Simulator
-from seastar_gym.controllers.greedy import waypoints_of
-from seastar_gym.controllers.planner import Budget, Planner, Targets, gait_planner, state_of
+from seastar_gym.controllers.search import Budget, Planner, Targets, gait_planner, state_of, waypoints_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import transform_commands
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -75,9 +74,9 @@ def test_an_observation_is_the_whole_state(scene, allowed):
 def test_a_search_in_time_compares_robots_that_have_coasted():
     """Without commands they swim on; the one that ends nearest counts, not the one that is nearest now."""
     planner = Planner(decision_period=0.5, budget=Budget(1, 1, 0.5), threads=1)
-    start = planner._swim_all._simulator(1).get_state()
-    later = planner._swim_all(start)
-    coasted = planner._swim_all.coasted(later, 0.5)
+    start = planner._branches._simulator(1).get_state()
+    (later,) = planner._branches.decisions(start)
+    coasted = planner._branches.coasted(later, 0.5)
     assert coasted.shape == (21, planner.scene.robot.n_nodes, 2)
     goal = np.array([[0.3, 0.1]])
     (chosen,) = planner._search(start, Targets(goal, goal))
@@ -92,7 +91,9 @@ def test_two_strokes_ahead_it_finds_what_an_exhaustive_search_finds(current):
     planner, after = Planner(FAST, 0.02, Budget(2, 21), threads=1), np.array([[0.2, 0.1]])
     states = state_of(observations, FAST)
     (chosen,) = planner._search(states, Targets(np.array([current]), after))
-    ends = planner._swim_all(planner._swim_all(states)).positions[:, 0].reshape(21, 21, 2)
+    (once,) = planner._branches.decisions(states)
+    (twice,) = planner._branches.decisions(once)
+    ends = twice.positions[:, 0].reshape(21, 21, 2)
     way = np.hypot(*np.moveaxis(ends - after, -1, 0))
     assert way[chosen].min() == pytest.approx(way.min(), abs=1e-6)
 
@@ -108,9 +109,10 @@ def test_who_can_arrive_at_the_last_waypoint_arrives_by_the_fewest_decisions():
     _, observations = swum(n_robots=5)
     planner = Planner(FAST, 0.0004, Budget(3, 21), threads=1)
     states = state_of(observations, FAST)
-    once = planner._swim_all(states)
+    (once,) = planner._branches.decisions(states)
     first = once.positions[:, 0].reshape(5, 21, 2)
-    twice = planner._swim_all(once).positions[:, 0].reshape(5, 21, 21, 2)
+    (twice,) = planner._branches.decisions(once)
+    twice = twice.positions[:, 0].reshape(5, 21, 21, 2)
     wanted = [4, 9, 16, 11]
     goals = np.stack([first[0, 4], first[1, 9], twice[2, 16, 3], twice[3, 11, 12], [1.0, 0.0]])
     chosen = planner._search(states, Targets(goals, goals))
@@ -162,7 +164,7 @@ def test_of_moves_that_arrive_the_planner_takes_the_one_that_arrives_first():
     slow[7:] = fast[:-7]
     planner = Planner(waypoint_radius=0.001, budget=Budget(1, 2), threads=1, decision_period=0.05, moves=[slow, fast])
     start, hubs = Simulator(planner.scene).get_state(), []
-    planner._swim_all(start, lambda positions: hubs.append(positions[:, 0]))
+    hubs += [state.positions[:, 0] for state in planner._branches.decisions(start)]
     goal = np.array(hubs)[10, 1][None]
     assert planner._search(start, Targets(goal, goal)) == [1]
     state = None

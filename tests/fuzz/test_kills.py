@@ -24,7 +24,7 @@ pytest.importorskip("tensorboard", reason="train.py writes its log for TensorBoa
 from fuzz.killed_training import SECONDS
 from later import Later
 from seastar_gym.controllers import learned as policies
-from seastar_gym.controllers.checkpoint import load
+from seastar_gym.controllers.learned import load
 from seastar_gym.evaluation.report.charts import read_progress
 
 train = Later("train")
