@@ -17,7 +17,10 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,22 +35,12 @@ from seastar_gym.controllers.description import Description, read_facts
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.sight import FOR_CAMERA, Sight, told
 from seastar_gym.envs.symmetry import FrameStack
-from seastar_gym.files import read_whole, write_atomically
+from seastar_gym.files import LARGEST_FILE, read_whole, write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number, require_file, require_flag, require_kind, require_period, shown
 
 if TYPE_CHECKING:
     from seastar_gym.envs.robots import Task
-
-import zipfile
-import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
-
-import safetensors
-import safetensors.numpy
-
-from seastar_gym.files import LARGEST_FILE
 
 BUNDLED = Path(__file__).parent / "policies" / "strokes.safetensors"
 """File of the bundled policy that decides stroke by stroke; `python train.py --publish` replaces it."""

@@ -12,8 +12,8 @@ from PIL import Image
 
 from seastar_gym import Scene, Seastar, Sight
 from seastar_gym.cli import compile, played, screen
-from seastar_gym.cli.keys import Steering, known_keys, typed
 from seastar_gym.cli.main import COMMANDS, main
+from seastar_gym.cli.play import Steering, known_keys, typed
 from seastar_gym.controllers.open_loop import GAITS
 from seastar_gym.controllers.registry import AGENTS
 from seastar_gym.envs.paths import PATHS
