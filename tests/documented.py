@@ -38,8 +38,8 @@ MADE_BY_THE_PACKAGE = {
 UNCALLED = {*MADE_BY_THE_PACKAGE, "RayTasks", "SlurmJobs", "dask_client", "chapters_certificate",
             "LinePlant", "open_serial", "serve"}  # fmt: skip
 """What takes no arguments, or needs Ray, submitit or a serial line, is not called either."""
-UNCHECKED = {"route", "tensorboard_log"}
-"""Arguments that are not checked where they are given: those of `Sweep` and `make_model`."""
+UNCHECKED = {"route"}
+"""Argument of `Sweep` that is not checked where it is given."""
 
 
 def documented() -> dict[str, str]:

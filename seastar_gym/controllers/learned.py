@@ -290,17 +290,12 @@ def by_name() -> dict[str, Path]:
     return {file.stem: file for folder in (BUNDLED.parent, TASKS) for file in sorted(folder.glob(f"*{BUNDLED.suffix}"))}
 
 
-def file_of(name: str) -> Path | None:
-    """File of the bundled policy of a name; None if there is none."""
-    return by_name().get(name)
-
-
 def pretrained(name: str = BUNDLED.stem) -> LearnedPolicy:
     """Bundled policy of a name, such as "strokes", "timed-0.2s" or "prey".
 
     ValueError, with the names that there are, for another one.
     """
-    file = file_of(name) if isinstance(name, str) else None
+    file = by_name().get(name) if isinstance(name, str) else None
     if file is None:
         raise ValueError(f"There is no bundled policy {shown(name)}: take one of {', '.join(by_name())}.")
     return load(file)

@@ -308,7 +308,7 @@ def learned_file(name: str, decision_period: float | None = None) -> Path | None
 
     decision_period: As of `files_of`.
     """
-    bundled = learned.bundled_file(decision_period) if name == "learned" else learned.file_of(name)
+    bundled = learned.bundled_file(decision_period) if name == "learned" else learned.by_name().get(name)
     return bundled or (Path(name) if name.endswith(".safetensors") else None)
 
 
@@ -338,9 +338,8 @@ def _load_agent(
 ) -> Policy:
     if name in AGENTS:
         return AGENTS[name](scene, decision_period, task)
-    bundled = learned.file_of(name)
-    if bundled is not None:
-        return learned.load(bundled)
+    if (policy := learned_policy(name)) is not None:
+        return policy
     if is_function(name):
         return call_function(name, make_env())
     return _load_file(name) if is_file(name) else _scripted(name, seed, decision_period, scene.robot.n_limbs)
@@ -358,10 +357,9 @@ def _scripted(name: str, seed: int, decision_period: float | None, n_limbs: int)
 
 
 def _load_file(name: str) -> Policy:
-    if not name.endswith(".zip") or not is_model(name):
-        return learned.load(name)
+    """Policy of a file that is no policy of this project, unless it is one that is refused."""
     try:
-        return load_model(name)
+        return load_model(name) if is_model(name) else learned.load(name)
     except ModuleNotFoundError as missing:
         raise ValueError(
             f'A model.zip of Stable-Baselines3 needs {missing.name}: pip install "seastar-gym[train]".'

@@ -20,9 +20,9 @@ import hashlib
 import itertools
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym import gaits
 from seastar_gym.controllers.contract import Policy, require_fit
 from seastar_gym.controllers.learned import load
-from seastar_gym.controllers.open_loop import scripted
+from seastar_gym.controllers.open_loop import GAITS, scripted
 from seastar_gym.controllers.registry import AGENTS, files_of, learned_file, load_agent
 from seastar_gym.envs.commands import checked_decision_period, decisions_in
 from seastar_gym.envs.paths import make_path
@@ -157,12 +157,8 @@ class Gait(NamedTuple):
     interval: float | None = None
 
 
-def _lagged(n_limbs: int) -> gaits.Floats:
-    return gaits.lagged_gait(DECISION, n_limbs)
-
-
-STROKES: dict[str, Callable[[int], gaits.Floats]] = {"straight": gaits.straight_gait}
-TIMED: dict[str, Callable[[int], gaits.Floats]] = {"lagged": _lagged, "thrifty": partial(gaits.thrifty_gait, DECISION)}
+TIMED = "lagged", "thrifty"
+"""Gaits in time."""
 
 
 def gait_of(what: str | ArrayLike, scene: Scene) -> Gait:
@@ -179,8 +175,8 @@ def gait_of(what: str | ArrayLike, scene: Scene) -> Gait:
     if what in TIMED:
         if not complete(scene.actuator).has_memory:
             raise ValueError(f'The gait "{what}" heats limbs in the middle of strokes: use an actuator like SmaWires.')
-        return Gait(_rows(TIMED[what](n_limbs)), DECISION)
-    return Gait(_rows(STROKES[what](n_limbs) if what in STROKES else _stroke(what, n_limbs)))
+        return Gait(_rows(GAITS[what](n_limbs, DECISION)), DECISION)
+    return Gait(_rows(gaits.straight_gait(n_limbs) if what == "straight" else _stroke(what, n_limbs)))
 
 
 def _rows(commands: gaits.Floats) -> tuple[tuple[float, ...], ...]:
@@ -193,7 +189,7 @@ def _stroke(text: str, n_limbs: int) -> gaits.Floats:
     for limb in text.split(","):
         number, sign = limb[:-1], limb[-1:]
         if sign not in ("+", "-") or not number.isdecimal() or not 1 <= int(number) <= n_limbs:
-            known = ", ".join([*STROKES, *TIMED])
+            known = ", ".join(["straight", *TIMED])
             raise ValueError(f"A gait is one of {known}, or limbs of {n_limbs} such as 1+,2-, not {shown(text)}.")
         command[0, int(number) - 1] = 1.0 if sign == "+" else -1.0
     return command

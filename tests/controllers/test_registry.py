@@ -174,7 +174,8 @@ def test_policies_have_names_and_files(monkeypatch):
     monkeypatch.setattr("seastar_gym.controllers.registry.is_model", lambda file: False)
     monkeypatch.setattr("seastar_gym.controllers.learned.load", lambda file: file)
     named = load_agents(["best.zip", "runs/last.safetensors", "runs/best.zip"])
-    assert named == {"best": "best.zip", "last": "runs/last.safetensors", "runs/best": "runs/best.zip"}
+    files = {"best": "best.zip", "last": "runs/last.safetensors", "runs/best": "runs/best.zip"}
+    assert named == {label: Path(file) for label, file in files.items()}
 
 
 # Zips: models of Stable-Baselines3, which are unpickled, and those of this project, which are not.
