@@ -303,9 +303,7 @@ def test_policies_are_exported(folder, monkeypatch, capsys):
 
 
 def test_training_runs_the_checkout_s_own_script_and_says_where_there_is_none(folder, monkeypatch, capsys):
-    from seastar_gym.cli import train
-
-    monkeypatch.setattr(train, "__file__", str(folder / "lib" / "seastar_gym" / "cli" / "train.py"))
+    monkeypatch.setattr("seastar_gym.cli.main.__file__", str(folder / "lib" / "seastar_gym" / "cli" / "main.py"))
     assert main(["train"]) == 2
     assert "Training needs a checkout" in capsys.readouterr().err
     (folder / "agents").mkdir()
