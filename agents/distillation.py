@@ -42,32 +42,21 @@ LEARNING_RATE = 1e-3
 """Learning rate of Adam at the beginning, which falls linearly to a hundredth."""
 
 
-class Teacher:
-    """Policy without memory that sees the true state of the robots of a batch.
+def advice(
+    teacher: LearnedPolicy, student: Symmetry, state: NDArray[np.float32], elements: NDArray[np.intp]
+) -> NDArray[np.float32]:
+    """Logits of a student's actions, shape (n, *distributions), by a teacher that sees the true state of its robots.
 
-    student: Symmetry of who learns from it, by the same actions.
+    teacher: Policy without memory, by the same actions. student: Symmetry of who learns.
+    state: Privileged observations, shape (n, size). elements: Those by which the student sees its robots turned.
     """
-
-    def __init__(self, policy: LearnedPolicy, student: Symmetry):
-        require_kind("policy", policy, LearnedPolicy, "a LearnedPolicy")
-        about = policy.description
-        if about.past or about.actions != student.actions:
-            raise ValueError(f'A teacher is a policy without memory, and with actions="{student.actions}".')
-        self.policy, self.student = policy, student
-        self.distributions = about.distributions
-
-    def logits(self, state: NDArray[np.float32], elements: NDArray[np.intp]) -> NDArray[np.float32]:
-        """Logits of the student's actions, shape (n, *distributions).
-
-        state: Privileged observations, shape (n, size). elements: Those by which the student sees its robots turned.
-        """
-        own, turned = self.policy.reduction, np.zeros(len(state), np.intp)
-        if own is not None:
-            state, turned = own.reduce(state)
-        flat = self.policy.logits(state).reshape(len(state), -1)
-        if own is not None:
-            flat = own.carry_masks(flat, inverse(turned, own.group))
-        return self.student.carry_masks(flat, elements).reshape(-1, *self.distributions)
+    own, turned = teacher.reduction, np.zeros(len(state), np.intp)
+    if own is not None:
+        state, turned = own.reduce(state)
+    flat = teacher.logits(state).reshape(len(state), -1)
+    if own is not None:
+        flat = own.carry_masks(flat, inverse(turned, own.group))
+    return student.carry_masks(flat, elements).reshape(-1, *teacher.description.distributions)
 
 
 def distil(
@@ -85,34 +74,38 @@ def distil(
     """
     require_kind("batch", batch, VectorFrameStack, "a VectorFrameStack")
     require_count("decisions", decisions, 1, 10**8)
-    inner, guide = batch.unwrapped, Teacher(teacher, batch.frame_stack.symmetry)
-    if teacher.description.layout != Layout.of(inner.scene):  # type: ignore[attr-defined]
+    require_kind("policy", teacher, LearnedPolicy, "a LearnedPolicy")
+    inner, about, student = batch.unwrapped, teacher.description, batch.frame_stack.symmetry
+    if about.past or about.actions != student.actions:
+        raise ValueError(f'A teacher is a policy without memory, and with actions="{student.actions}".')
+    if about.layout != Layout.of(inner.scene):  # type: ignore[attr-defined]
         raise ValueError("The teacher does not see what this batch's robots would show without a Sight.")
     rng = np.random.default_rng(seed)
     torch.manual_seed(seed)
-    network = _network((batch.frame_stack.size, *hidden, math.prod(guide.distributions)))
+    network = _network((batch.frame_stack.size, *hidden, math.prod(about.distributions)))
     adam = torch.optim.Adam(network.parameters())
     rounds = max(1, decisions // (ROUND * batch.num_envs))
     seen, told = list[torch.Tensor](), list[torch.Tensor]()
     observations, _ = batch.reset(seed=seed)
     for number in range(rounds):
         for _ in range(ROUND):
-            advice = guide.logits(inner.privileged_observations(), batch.elements)  # type: ignore[attr-defined]
+            state = inner.privileged_observations()  # type: ignore[attr-defined]
+            wanted = advice(teacher, student, state, batch.elements)
             seen.append(torch.from_numpy(observations))
-            told.append(torch.softmax(torch.from_numpy(advice), dim=-1))
-            logits = advice if number == 0 else network(seen[-1]).detach().numpy().reshape(advice.shape)
+            told.append(torch.softmax(torch.from_numpy(wanted), dim=-1))
+            logits = wanted if number == 0 else network(seen[-1]).detach().numpy().reshape(wanted.shape)
             explored = logits + number % 2 * rng.gumbel(size=logits.shape)  # every other round draws its actions
             actions = np.argmax(explored, axis=-1)
-            observations, *_ = batch.step(actions if guide.policy.actions == "limbs" else actions[:, 0])
+            observations, *_ = batch.step(actions if about.actions == "limbs" else actions[:, 0])
         for group in adam.param_groups:
             group["lr"] = LEARNING_RATE * (1.0 - 0.99 * number / rounds)
         _fit(network, adam, torch.cat(seen), torch.cat(told))
         on_decisions(len(seen) * batch.num_envs)
-    about = describe(BatchVecEnv(batch), hidden)
+    learned = describe(BatchVecEnv(batch), hidden)
     batch.close()
     names = {f"mlp_extractor.policy_net.{name}": value for name, value in network[:-1].state_dict().items()}
     last = {f"action_net.{name}": value for name, value in network[-1].state_dict().items()}
-    return LearnedPolicy(about, actor({**names, **last}))
+    return LearnedPolicy(learned, actor({**names, **last}))
 
 
 def _network(widths: tuple[int, ...]) -> torch.nn.Sequential:
