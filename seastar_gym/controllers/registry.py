@@ -252,8 +252,7 @@ def _known(seed: int, fidelity: Fidelity, decision_period: float | None, scene: 
     """Scene that agents know."""
     require_seed(seed)
     require_choice("fidelity", fidelity, get_args(Fidelity))
-    known = make_scene(None, fidelity) if scene is None else scene
-    require_kind("scene", known, Scene, "a Scene, or None")
+    require_kind("scene", scene, Scene | None, "a Scene, or None")
     require_period(decision_period)
     return make_scene(None, fidelity, decision_period) if scene is None else scene
 

@@ -70,7 +70,7 @@ class SmaPulse(HeatingAndCooling, ActuatorBase):
     peak_angle: Largest rotation [rad].
     heating_time: Delta t_1 [s].
     cooling_time: Delta t_2 [s].
-    heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
+    heating_power: Electric power of a heated wire [W], an assumption, see `base.WIRE_POWER`.
     """
 
     peak_angle: Annotated[Numbers, not_negative("rad")] = math.pi / 5
@@ -104,7 +104,7 @@ class MeasuredCurve(ActuatorBase):
     angles: Rotation by command 1 at those times [rad]. It is 0 at both ends, to a thousandth of the largest, so that
         limbs do not jump when their command changes.
     scale: Factor of the angles [1].
-    heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
+    heating_power: Electric power of a heated wire [W], an assumption, see `base.WIRE_POWER`.
     """
 
     times: tuple[float, ...]
