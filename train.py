@@ -76,9 +76,8 @@ def training_env(options: Options, robot: Robot) -> BatchVecEnv:
     )
 
 
-def train(options: Options, folder: Path, stop: Callable[[], bool]) -> tuple[PPO, Watch]:
+def train(options: Options, robot: Robot, folder: Path, stop: Callable[[], bool]) -> tuple[PPO, Watch]:
     """Learner, saved as model.zip, after the strokes that were asked for or when `stop()` was true; and its watch."""
-    robot = robot_of(options, folder)
     env = training_env(options, robot)
     new = options.resume is None or is_unbegun(folder)
     if new:
@@ -97,13 +96,12 @@ def train(options: Options, folder: Path, stop: Callable[[], bool]) -> tuple[PPO
     return model, watch
 
 
-def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Remarks:
+def describe(options: Options, robot: Robot, folder: Path, trained: int, watch: Watch) -> Remarks:
     """Remarks of the report on the training. trained: Length of the whole training [strokes]."""
-    scene = robot_of(options, folder).scene
-    rival = rival_of(options.ppo.decision_period, scene)
+    rival = rival_of(options.ppo.decision_period, robot.scene)
     against = {None: "", "greedy": " against greedy"}.get(rival, " against scripted")
     sentences = [
-        f"Swum by the robot of {options.scene}." if scene else f'Swum at fidelity "{options.fidelity}".',
+        f"Swum by the robot of {options.scene}." if robot.scene else f'Swum at fidelity "{options.fidelity}".',
         f"Trained for {trained} strokes, seed {options.seed}, by the first of these commands; the last three show the "
         "logs, compare again, and train on.",
     ]
@@ -155,15 +153,15 @@ def run(options: Options, arguments: Sequence[str]) -> int:
         keep(robot, folder, options.scene)
         write_config(options, arguments, folder)
         print(f"The run is in {folder}.", flush=True)
-        rival = rival_of(options.ppo.decision_period, robot_of(options, folder).scene)
-        with filmed_beside(rival, options, folder) as film:
-            return train_and_compare(options, folder, film)
+        robot = robot_of(options, folder)
+        with filmed_beside(rival_of(options.ppo.decision_period, robot.scene), options, folder) as film:
+            return train_and_compare(options, robot, folder, film)
 
 
-def train_and_compare(options: Options, folder: Path, film: Callable[[], Path | None]) -> int:
+def train_and_compare(options: Options, robot: Robot, folder: Path, film: Callable[[], Path | None]) -> int:
     """Train, compare, report, in the folder of the run; returns the exit code. film: See `filmed_beside`."""
     with stoppable() as stop:
-        model, watch = train(options, folder, stop.is_set)
+        model, watch = train(options, robot, folder, stop.is_set)
     export(model, folder)
     if stop.is_set():
         print(
@@ -172,10 +170,9 @@ def train_and_compare(options: Options, folder: Path, film: Callable[[], Path | 
         asked = ["--publish"] * options.publish + ["--publish-anyway"] * options.publish_anyway
         print(" ".join(["   ", resume_command(folder), *asked]))
         return 130
-    robot = robot_of(options, folder)
     others = rivals(options.ppo.decision_period, robot.scene)
     agents = {"learned": load_policy(folder / "policy.safetensors"), **others}
-    remarks = describe(options, folder, model.num_timesteps, watch)
+    remarks = describe(options, robot, folder, model.num_timesteps, watch)
     compare(agents, options, robot, remarks, folder, dict.fromkeys(others, film))
     print(f"Logs:    tensorboard --logdir {folder}\n{watch.efficiency}")
     return publish(options, folder) if options.publish else 0
