@@ -47,7 +47,7 @@ from seastar_gym.identify.fit import DOUBT
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number, shown
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene import load_scene, search
+from seastar_gym.scene.scene import find_modules_in, load_scene
 from seastar_gym.scene.serial import has_own_kinds
 
 TARGET = 170.0
@@ -317,7 +317,7 @@ def robot_of(options: Options, folder: Path) -> Robot:
     if options.scene is not None and file is not None and file.name == OWN_SCENE:
         if options.resume is not None and not options.run_scene:
             raise ValueError(f"{file} is Python, which --resume executes with --run-scene only: see that it is yours.")
-        search(options.scene.parent)  # for modules that it imports
+        find_modules_in(options.scene.parent)  # for modules that it imports
     return Robot(
         None if file is None else load_scene(file),
         None if options.intervals is None else read_intervals(folder / INTERVALS),

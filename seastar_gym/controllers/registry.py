@@ -42,7 +42,7 @@ from seastar_gym.envs.tasks import name_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, require_kind, require_period, require_seed, require_texts, shown
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene import search
+from seastar_gym.scene.scene import find_modules_in
 
 _FUNCTION = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
@@ -55,7 +55,7 @@ def is_function(name: str) -> bool:
 def module_file(name: str) -> Path:
     """File of the module of a function of this name. ValueError if there is none."""
     module = name.partition(":")[0]
-    search(Path.cwd())
+    find_modules_in(Path.cwd())
     try:
         spec = importlib.util.find_spec(module)
     except ModuleNotFoundError:
@@ -72,7 +72,7 @@ def call_function(name: str, env: OneRobotEnv) -> Policy:
     ValueError, with one sentence, if there is no such function or it returns no policy.
     """
     module, _, function = name.partition(":")
-    search(Path.cwd())
+    find_modules_in(Path.cwd())
     try:
         make = getattr(importlib.import_module(module), function, None)
     except ModuleNotFoundError as missing:

@@ -34,7 +34,7 @@ from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.scene.checks import require_callable, require_count, require_kind, require_texts
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene import search
+from seastar_gym.scene.scene import find_modules_in
 
 Floats = NDArray[np.float64]
 Batch = gym.vector.VectorEnv[Any, Any, Any]
@@ -213,7 +213,7 @@ def known_id(task: str) -> str:
     """
     module, _, id = task.rpartition(":")
     if module:
-        search(Path.cwd())
+        find_modules_in(Path.cwd())
         try:
             importlib.import_module(module)
         except ModuleNotFoundError as missing:

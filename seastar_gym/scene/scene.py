@@ -442,7 +442,7 @@ def load_scene(file: str | PathLike[str] | None) -> Scene:
             return Scene.from_dict(read_json(file))
         except ValueError as wrong:
             raise ValueError(f"{file} is no scene: {str(wrong).rstrip('.')}.") from wrong
-    search(file.parent, Path.cwd())
+    find_modules_in(file.parent, Path.cwd())
     try:
         found = runpy.run_path(str(file)).get("scene")
     except SyntaxError as wrong:
@@ -456,7 +456,7 @@ def load_scene(file: str | PathLike[str] | None) -> Scene:
     return found
 
 
-def search(*folders: Path) -> None:
+def find_modules_in(*folders: Path) -> None:
     """Have modules of folders found, after all others."""
     for folder in map(str, map(Path.absolute, folders)):
         if folder not in sys.path:
