@@ -22,7 +22,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,19 +32,18 @@ try:
     from stable_baselines3 import PPO
     from stable_baselines3.common.logger import configure
 
+    from agents import run as efficiency
+    from agents.cards import publish
+    from agents.comparison import compare, filmed_beside, rival_of, rivals
+    from agents.distillation import policy_for_camera
     from agents.learner_file import resume
+    from agents.options import Options, config_of, read_options, require_consent
     from agents.ppo import make_model, make_training_env, require_device
-    from agents.training import run as efficiency
-    from agents.training.camera import policy_for_camera
-    from agents.training.options import Options, config_of, read_options, require_consent
-    from agents.training.publishing import publish
-    from agents.training.run import (
-        Interruption,
+    from agents.run import (
         Robot,
         Watch,
         asked_for,
         export,
-        filmed_beside,
         held,
         is_unbegun,
         keep,
@@ -52,19 +51,14 @@ try:
         recorded,
         resume_command,
         robot_of,
+        stoppable,
         write_config,
     )
     from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
     from seastar_gym.command import ended_by_disk
-    from seastar_gym.controllers.contract import Policy, actions_of, require_fit
     from seastar_gym.controllers.learned import load as load_policy
-    from seastar_gym.controllers.open_loop import scripted
-    from seastar_gym.controllers.registry import load_agents
-    from seastar_gym.envs.commands import MOST_LIMBS
-    from seastar_gym.evaluation.comparison import evaluate
     from seastar_gym.evaluation.report.charts import Curve, read_progress
     from seastar_gym.evaluation.report.page import Remarks
-    from seastar_gym.scene import Scene
 except ModuleNotFoundError as missing:
     sys.exit(f'train.py needs {missing.name}: pip install "seastar-gym[train]".')
 
@@ -82,9 +76,8 @@ def training_env(options: Options, robot: Robot) -> BatchVecEnv:
     )
 
 
-def train(options: Options, folder: Path, stop: Callable[[], bool]) -> tuple[PPO, Watch]:
+def train(options: Options, robot: Robot, folder: Path, stop: Callable[[], bool]) -> tuple[PPO, Watch]:
     """Learner, saved as model.zip, after the strokes that were asked for or when `stop()` was true; and its watch."""
-    robot = robot_of(options, folder)
     env = training_env(options, robot)
     new = options.resume is None or is_unbegun(folder)
     if new:
@@ -103,59 +96,12 @@ def train(options: Options, folder: Path, stop: Callable[[], bool]) -> tuple[PPO
     return model, watch
 
 
-def compare(options: Options, folder: Path, remarks: Remarks, film: Callable[[], Path | None]) -> None:
-    """Compare the learned policy with its rival round the pentagon: table, CSV, picture, videos and report.
-
-    film: Returns the file of the rival's video, if somebody else made it, see `filmed_beside`.
-    """
-    decision_period, robot = options.ppo.decision_period, robot_of(options, folder)
-    others = rivals(decision_period, robot.scene)
-    evaluate(
-        {"learned": load_policy(folder / "policy.safetensors"), **others},
-        "pentagon",
-        max_strokes=options.limit(robot.scene),
-        decision_period=decision_period,
-        scene=robot.scene,
-        fidelity=robot.fidelity(options),
-        video=options.video,
-        filmed=dict.fromkeys(others, film),
-        report=remarks,
-        out=folder / "evaluation",
-    )
-
-
-def rival_of(decision_period: float | None, scene: Scene | None = None) -> str | None:
-    """Name of the agent that a policy is compared with for a time between decisions [s]; None if there is none.
-
-    The fastest scripted gait round the pentagon: in a timed environment the lagged one, where decisions allow it.
-    Gaits are for five limbs; for other numbers of limbs it is the greedy agent.
-    """
-    for name in ("lagged-pentagon", "pentagon"):
-        with suppress(ValueError):  # the gait needs other decisions, or another robot
-            gait = scripted(name, decision_period=decision_period)
-            if scene is not None:
-                require_fit(gait, scene, actions_of(gait, scene.robot.n_limbs), decision_period)
-            return name
-    n_limbs = 5 if scene is None else scene.robot.n_limbs
-    return "greedy" if n_limbs != 5 and n_limbs <= MOST_LIMBS else None
-
-
-def rivals(decision_period: float | None, scene: Scene | None = None) -> dict[str, Policy]:
-    """That agent by its name in the comparison, a gait as "script"; {} if there is none."""
-    name = rival_of(decision_period, scene)
-    if name is None:
-        return {}
-    (policy,) = load_agents([name], decision_period=decision_period, scene=scene).values()
-    return {name if name == "greedy" else "script": policy}
-
-
-def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Remarks:
+def describe(options: Options, robot: Robot, folder: Path, trained: int, watch: Watch) -> Remarks:
     """Remarks of the report on the training. trained: Length of the whole training [strokes]."""
-    scene = robot_of(options, folder).scene
-    rival = rival_of(options.ppo.decision_period, scene)
+    rival = rival_of(options.ppo.decision_period, robot.scene)
     against = {None: "", "greedy": " against greedy"}.get(rival, " against scripted")
     sentences = [
-        f"Swum by the robot of {options.scene}." if scene else f'Swum at fidelity "{options.fidelity}".',
+        f"Swum by the robot of {options.scene}." if robot.scene else f'Swum at fidelity "{options.fidelity}".',
         f"Trained for {trained} strokes, seed {options.seed}, by the first of these commands; the last three show the "
         "logs, compare again, and train on.",
     ]
@@ -207,30 +153,27 @@ def run(options: Options, arguments: Sequence[str]) -> int:
         keep(robot, folder, options.scene)
         write_config(options, arguments, folder)
         print(f"The run is in {folder}.", flush=True)
-        return train_and_compare(options, folder)
+        robot = robot_of(options, folder)
+        with filmed_beside(rival_of(options.ppo.decision_period, robot.scene), options, folder) as film:
+            return train_and_compare(options, robot, folder, film)
 
 
-def train_and_compare(options: Options, folder: Path) -> int:
-    """Train, compare, report, in the folder of the run; returns the exit code."""
-    rival = rival_of(options.ppo.decision_period, robot_of(options, folder).scene)
-    with filmed_beside(rival, options, folder) as film:
-        return train_beside(film, options, folder)
-
-
-def train_beside(film: Callable[[], Path | None], options: Options, folder: Path) -> int:
-    """Train, compare, report, while the film of its rival is made; returns the exit code."""
-    with Interruption() as interruption:
-        model, watch = train(options, folder, lambda: interruption.requested)
+def train_and_compare(options: Options, robot: Robot, folder: Path, film: Callable[[], Path | None]) -> int:
+    """Train, compare, report, in the folder of the run; returns the exit code. film: See `filmed_beside`."""
+    with stoppable() as stop:
+        model, watch = train(options, robot, folder, stop.is_set)
     export(model, folder)
-    if interruption.requested:
+    if stop.is_set():
         print(
             f"Stopped after {model.num_timesteps} strokes; {folder / 'model.zip'} is the policy so far. Continue with"
         )
         asked = ["--publish"] * options.publish + ["--publish-anyway"] * options.publish_anyway
         print(" ".join(["   ", resume_command(folder), *asked]))
         return 130
-    compare(options, folder, describe(options, folder, model.num_timesteps, watch), film)
-    print(f"Report:  {folder / 'evaluation' / 'report.html'}\nPolicy:  {folder / 'policy.safetensors'}")
+    others = rivals(options.ppo.decision_period, robot.scene)
+    agents = {"learned": load_policy(folder / "policy.safetensors"), **others}
+    remarks = describe(options, robot, folder, model.num_timesteps, watch)
+    compare(agents, options, robot, remarks, folder, dict.fromkeys(others, film))
     print(f"Logs:    tensorboard --logdir {folder}\n{watch.efficiency}")
     return publish(options, folder) if options.publish else 0
 

@@ -1,6 +1,7 @@
-"""Training: PPO on the native batch, imitation, and cards of the policies.
+"""Training: PPO on the native batch, imitation, and bundled policies.
 
-Controllers, evaluation and the adapter of Stable-Baselines3 are in the package, in `seastar_gym`.
+In come options on a command line, and the package's environments and adapter of Stable-Baselines3. Out go folders of
+runs, with the learner, the policy and its comparison, and bundled policies with their cards.
 """
 
 from seastar_gym.files import is_command, require_extra

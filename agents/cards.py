@@ -3,20 +3,24 @@
     python -m agents.cards
     python -m agents.cards --policies runs/FOLDER/policy.safetensors
 
-measures every bundled policy, or a trained one, and writes its card anew. `python train.py --publish` does so, too.
+measures every bundled policy, or a trained one, and writes its card anew. `python train.py --publish` does so, too,
+when it replaces a bundled policy by one that is no worse.
 """
 
 import hashlib
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, get_args
 
 import numpy as np
 import tyro
 
+from agents import options as training
+from agents.run import resume_command
 from seastar_gym.command import answered, run_command
-from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, load
+from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, bundled_file, load, save
 from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.swim import HELD_OUT_SEED, TIME_LIMIT, Swim, swim_many
 from seastar_gym.files import write_atomically
@@ -34,11 +38,8 @@ CHAPTERS = "the chapter's robot"
 UNKNOWN = "not recorded"
 
 
-class Swims(NamedTuple):
-    """Swims of a policy at a fidelity: round the pentagon, and on held-out random paths, none where that is dear."""
-
-    pentagon: Swim
-    held_out: list[Swim]
+Swims = tuple[Swim, list[Swim]]
+"""Swims of a policy at a fidelity: round the pentagon, and on held-out random paths, none where that is dear."""
 
 
 def scenes_of(policy: LearnedPolicy) -> dict[str, Scene]:
@@ -60,7 +61,7 @@ def measure(policy: LearnedPolicy, threads: int | None = None) -> dict[str, Swim
         held_out = list[Swim]()
         if name in CHEAP:
             held_out = swim_many("learned", policy, "random", HELD_OUT_PATHS, scene, seed=HELD_OUT_SEED, **how)
-        found[name] = Swims(pentagon, held_out)
+        found[name] = pentagon, held_out
     return found
 
 
@@ -139,12 +140,12 @@ def training_facts(training: Mapping[str, Any]) -> str:
 
 
 def _row(fidelity: str, swims: Swims) -> str:
-    done = swims.pentagon
+    done, held_out = swims
     pentagon = f"{done.time[-1]:.1f} s, {done.strokes} {done.counted_in}" if done.finished else done.result
     energy = "" if done.joules_per_metre is None else f"{done.joules_per_metre:.0f}"
-    arrived = [one for one in swims.held_out if one.finished]
+    arrived = [one for one in held_out if one.finished]
     mean = f"{np.mean([one.time[-1] for one in arrived]):.1f}" if arrived else ""
-    share = f"{len(arrived)} of {len(swims.held_out)}" if swims.held_out else ""
+    share = f"{len(arrived)} of {len(held_out)}" if held_out else ""
     return f"| `{fidelity}` | {pentagon} | {energy} | {mean} | {share} |"
 
 
@@ -154,6 +155,45 @@ def write_card(file: Path, threads: int | None = None) -> Path:
     text = card(policy, file, hashlib.sha256(file.read_bytes()).hexdigest(), measure(policy, threads))
     write_atomically(place, text)
     return place
+
+
+def publish(options: training.Options, folder: Path) -> int:
+    """Make the run's policy the bundled one, unless it is worse and not confirmed; returns the exit code."""
+    policy = load(folder / "policy.safetensors")
+    if not options.publish_anyway and (objection := why_not(policy, options)):
+        command = f"{resume_command(folder)} --publish --publish-anyway"
+        print(f"The bundled policy stays: {objection}. Replace it all the same with\n    {command}", file=sys.stderr)
+        return 1
+    file = bundled_file(options.ppo.decision_period, BUNDLED)
+    save(policy, file)
+    print(f"Bundled: {file}, with its card {write_card(file, options.num_threads).name}")
+    return 0
+
+
+def why_not(policy: LearnedPolicy, options: training.Options) -> str | None:
+    """Reason against replacing the bundled policy by this one, None if there is none."""
+    file = bundled_file(options.ppo.decision_period, BUNDLED)
+    if not file.exists():
+        return None
+    try:
+        box = load(file)
+    except (ValueError, FileNotFoundError) as unreadable:
+        return f"there is nothing to compare with, {str(unreadable).rstrip('.')}"
+    ours, theirs = (held_out_decisions(one, options) for one in (policy, box))
+    if ours <= theirs:
+        return None
+    decisions = "strokes" if options.ppo.decision_period is None else "decisions"
+    return f"it takes {theirs:.1f} {decisions} on {HELD_OUT_PATHS} held-out random paths, the new one {ours:.1f}"
+
+
+def held_out_decisions(policy: LearnedPolicy, options: training.Options) -> float:
+    """Mean decisions to the last waypoint of held-out random paths; a swim that does not arrive counts as the limit."""
+    scene = make_scene(None, options.fidelity, options.ppo.decision_period)
+    swims = swim_many(
+        "learned", policy, "random", HELD_OUT_PATHS, scene, max_strokes=options.limit(scene), seed=HELD_OUT_SEED,
+        threads=options.num_threads, decision_period=options.ppo.decision_period,
+    )  # fmt: skip
+    return float(np.mean([done.strokes for done in swims]))
 
 
 @dataclass(frozen=True)

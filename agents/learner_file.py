@@ -3,7 +3,7 @@
 A saved learner is Stable-Baselines3's own zip file with three more entries, which hold no pickles: `policy.json` is the
 description of the policy (observation layout, scene, action mode, symmetry), `learner.safetensors` has the network, the
 optimiser and the random generators, `learner.json` the settings and counters. `resume` reads these three, the policy
-alone is read by `seastar_gym.controllers.checkpoint`, and neither unpickles anything. `PPO.load` of Stable-Baselines3
+alone is read by `seastar_gym.controllers.learned`, and neither unpickles anything. `PPO.load` of Stable-Baselines3
 reads the file, too, and unpickles its own part: use it only on files of people whom you trust. Policies without their
 learner are in `seastar_gym.controllers.learned`.
 """
@@ -26,9 +26,8 @@ from stable_baselines3 import PPO
 from agents.ppo import Hyperparameters, actor, describe, make_model, policy_of, require_device
 from seastar_gym import RewardWeights
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.controllers.checkpoint import DESCRIPTION, LEARNER, one_sentence, opened
 from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.controllers.learned import DESCRIPTION, LEARNER, LearnedPolicy, one_sentence, opened
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.checks import require_count
 

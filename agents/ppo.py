@@ -12,10 +12,9 @@ would come to rest without further commands, which is a linear function of the o
 from __future__ import annotations
 
 import operator
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, get_args
+from typing import Any, get_args
 
 import gymnasium as gym
 import numpy as np
@@ -26,11 +25,11 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
 
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.controllers import checkpoint
+from seastar_gym.controllers import learned
 from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.greedy import turned
 from seastar_gym.controllers.learned import LearnedPolicy, Weights
 from seastar_gym.controllers.registry import task_of
+from seastar_gym.controllers.search import turned
 from seastar_gym.envs.commands import Discrete, command_table
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import RewardWeights
@@ -174,23 +173,17 @@ RIDGE = 1e-6
 """Weight of the squared coefficients in the fit, relative to the mean square of the scaled features."""
 
 
-class Coasting(NamedTuple):
-    """Displacement of the hub until rest, in the body frame, as a linear function of what is observed of the robot.
+def coasted(coefficients: Floats, observations: Floats) -> Floats:
+    """Displacements of the hub until rest, in the body frame [limb lengths], shape (n, 2), as `fit_coasting` fits them.
 
-    layout: Of the observations. coefficients: Shape (k + 1, 2), the constant last [limb lengths].
+    observations: Shape (n, size); a linear function of what they show of the robot, before the waypoints.
     """
-
-    layout: Layout
-    coefficients: Floats
-
-    def __call__(self, observations: Floats) -> Floats:
-        """Displacements [limb lengths], shape (n, 2), for observations of shape (n, size)."""
-        robot = observations[:, : self.layout.waypoints.start]
-        return np.asarray(robot @ self.coefficients[:-1] + self.coefficients[-1])
+    robot = observations[:, : len(coefficients) - 1]
+    return np.asarray(robot @ coefficients[:-1] + coefficients[-1])
 
 
-def fit_coasting(scene: Scene, decision_period: float | None, rng: np.random.Generator) -> Coasting:
-    """Fit the function to random swims of pairs of limbs with rests in between.
+def fit_coasting(scene: Scene, decision_period: float | None, rng: np.random.Generator) -> Floats:
+    """Coefficients of `coasted`, shape (k + 1, 2), the constant last, by random swims of pairs of limbs with rests.
 
     decision_period: Time between decisions [s]. None means a stroke.
     """
@@ -208,7 +201,7 @@ def fit_coasting(scene: Scene, decision_period: float | None, rng: np.random.Gen
         seen.append(observations[:, : layout.waypoints.start].astype(np.float64))
         ways.append(turned(twins.hub_position() - simulator.hub_position(), -heading) / scene.robot.limb_length)
     env.close()
-    return Coasting(layout, _ridge(np.concatenate(seen), np.concatenate(ways)))
+    return _ridge(np.concatenate(seen), np.concatenate(ways))
 
 
 def _ridge(x: Floats, y: Floats) -> Floats:
@@ -221,23 +214,19 @@ def _ridge(x: Floats, y: Floats) -> Floats:
     return np.asarray(np.linalg.solve(normal, scaled.T @ y / len(x)) / scale[:, None])
 
 
-def with_coasting(batch: gym.vector.VectorEnv[Any, Any, Any], weights: RewardWeights) -> CoastingProgress:
-    """A batch whose reward counts coasting, fitted to its scene and its time between decisions."""
-    inner: Any = batch.unwrapped
-    return CoastingProgress(batch, fit_coasting(inner.scene, inner.decision_period, np.random.default_rng(0)), weights)
-
-
 class CoastingProgress(gym.vector.VectorWrapper):
     """Batch in autoreset mode SAME_STEP whose reward for progress counts the way that the hub would coast.
 
     The step that ends an episode has the environment's own reward, so that a swim through the last waypoint is not
-    charged for the way that it does not go on. weights: Those of the environment's reward, whose waypoints have the
-    radius WAYPOINT_RADIUS.
+    charged for the way that it does not go on.
+
+    coasting: Coefficients that `fit_coasting` gives. weights: Those of the environment's reward, whose waypoints have
+    the radius WAYPOINT_RADIUS.
     """
 
     env: Any
 
-    def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any], coasting: Coasting, weights: RewardWeights):
+    def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any], coasting: Floats, weights: RewardWeights):
         super().__init__(env)
         self.coasting, self.weights = coasting, weights
         self._gain: Floats = np.zeros(env.num_envs)
@@ -259,15 +248,16 @@ class CoastingProgress(gym.vector.VectorWrapper):
     def _true(self, observations: Floats) -> Floats:
         """What would be observed of robots that are seen as they are, see `privileged_observations`."""
         batch = self.env.unwrapped
-        return observations if batch.layout == self.coasting.layout else batch.privileged_observations()
+        return observations if batch.layout == Layout.of(batch.scene) else batch.privileged_observations()
 
     def gain(self, observations: Floats) -> Floats:
         """Way to go that coasting would save [m], shape (n_robots,)."""
-        layout, length = self.coasting.layout, self.env.unwrapped.scene.robot.limb_length
+        scene = self.env.unwrapped.scene
+        layout, length = Layout.of(scene), scene.robot.limb_length
         current, following = (observations[:, at] * length for at in (layout.current_waypoint, layout.next_waypoint))
         here, there = (
             self.weights.way_to_next(place, current, following, WAYPOINT_RADIUS)
-            for place in (np.zeros_like(current), length * self.coasting(observations))
+            for place in (np.zeros_like(current), length * coasted(self.coasting, observations))
         )
         return np.asarray(here - there)
 
@@ -286,7 +276,9 @@ def make_training_env(
     """
     env = make_training_batch(hyperparameters, path, random_heading, fidelity, threads, **options)
     if hyperparameters.coasting:
-        env = with_coasting(env, hyperparameters.reward)
+        inner: Any = env.unwrapped
+        coasting = fit_coasting(inner.scene, inner.decision_period, np.random.default_rng(0))
+        env = CoastingProgress(env, coasting, hyperparameters.reward)
     return BatchVecEnv(VectorSymmetryReduction(env) if hyperparameters.symmetry else env)
 
 
@@ -317,13 +309,7 @@ def make_training_batch(
     )
 
 
-def make_model(
-    env: BatchVecEnv,
-    hyperparameters: Hyperparameters,
-    seed: int,
-    device: str = "cpu",
-    tensorboard_log: str | os.PathLike[str] | None = None,
-) -> PPO:
+def make_model(env: BatchVecEnv, hyperparameters: Hyperparameters, seed: int, device: str = "cpu") -> PPO:
     """New learner on an environment."""
     require_kind("env", env, BatchVecEnv, "a BatchVecEnv, as make_training_env gives it")
     require_kind("hyperparameters", hyperparameters, Hyperparameters, "Hyperparameters")
@@ -341,7 +327,6 @@ def make_model(
         clip_range=hyperparameters.clip_range,
         ent_coef=hyperparameters.entropy,
         policy_kwargs={"net_arch": list(hyperparameters.hidden)},
-        tensorboard_log=None if tensorboard_log is None else os.fspath(tensorboard_log),
         seed=int(seed),
         device=device,
     )
@@ -384,4 +369,4 @@ def policy_of(model: PPO) -> LearnedPolicy:
 
 def actor(weights: Mapping[str, torch.Tensor]) -> Weights:
     """Weights of the policy in Stable-Baselines3's network, under the names of `LearnedPolicy`."""
-    return checkpoint.actor({name: tensor.detach().cpu().numpy().copy() for name, tensor in weights.items()})
+    return learned.actor({name: tensor.detach().cpu().numpy().copy() for name, tensor in weights.items()})

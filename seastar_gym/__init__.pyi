@@ -99,7 +99,7 @@ from .scene import Vortex as Vortex
 from .scene import Water as Water
 from .scene import relaxation_time as relaxation_time
 from .scene.serial import register_part as register_part
-from .scene.terms import register_term as register_term
+from .scene.serial import register_term as register_term
 from .schemes import register_scheme as register_scheme
 from .simulator import Simulator as Simulator
 from .simulator import SolverStatus as SolverStatus

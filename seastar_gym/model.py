@@ -42,10 +42,11 @@ from seastar_gym.rods.terms.current import GRID, LINEAR, VORTEX, Current, curren
 from seastar_gym.rods.terms.gravity import heaviness
 from seastar_gym.scene import Scene
 from seastar_gym.scene.body import GIVEN_DRAG, Body, Outline
-from seastar_gym.scene.limb import AlongLimb, LimbShape, Stiffening, natural_hub_angle, turn_per_hinge
+from seastar_gym.scene.limb import AlongLimb, LimbShape, Stiffening
 from seastar_gym.scene.number import chosen, frame_of, of_robot, profile_at
 from seastar_gym.scene.numerics import ADAPTATION, MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP
 from seastar_gym.scene.robot import Seastar
+from seastar_gym.scene.shape import natural_hub_angle, turn_per_hinge
 from seastar_gym.scene.water import AnyCurrent, GridCurrent, ShearCurrent, UniformCurrent, Vortex, Water
 
 Floats = NDArray[np.float64]

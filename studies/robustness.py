@@ -116,7 +116,7 @@ def examine(name: str, condition: Condition) -> dict[str, Any] | None:
 def examine_seed(seed: int) -> dict[str, Any]:
     """Mean times [s] of a training for the camera by condition, and how many arrive."""
     from agents.distillation import ENOUGH
-    from agents.tasks.learning import imitate
+    from agents.tasks import imitate
 
     policy = imitate(ID, seed, ENOUGH, FIDELITY, None)
     return {name: swum(policy, CONDITIONS[name], PERIODS[CAMERA], "pose") for name in OF_SEEDS}

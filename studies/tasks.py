@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from seastar_gym import TASKS
 from seastar_gym.controllers.contract import Policy
-from seastar_gym.controllers.greedy import Searcher, displacement_map, waypoints_of
+from seastar_gym.controllers.search import Searcher, displacement_map, waypoints_of
 from seastar_gym.envs.options import RewardWeights
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.tasks.obst_trap import ObstTrap, rims

@@ -38,8 +38,8 @@ MADE_BY_THE_PACKAGE = {
 UNCALLED = {*MADE_BY_THE_PACKAGE, "RayTasks", "SlurmJobs", "dask_client", "chapters_certificate",
             "LinePlant", "open_serial", "serve"}  # fmt: skip
 """What takes no arguments, or needs Ray, submitit or a serial line, is not called either."""
-UNCHECKED = {"route", "tensorboard_log"}
-"""Arguments that are not checked where they are given: those of `Sweep` and `make_model`."""
+UNCHECKED = {"route"}
+"""Argument of `Sweep` that is not checked where it is given."""
 
 
 def documented() -> dict[str, str]:
@@ -176,7 +176,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     rng = np.random.default_rng
     for name, arguments in {
         **{name: dict(decision_period=0.1) for name in ("lagged_gait", "lagged_pentagon", "thrifty_gait")},
-        **{name: {} for name in ("Layout", "Limits", "Motion", "pair_gait")},
+        **{name: {} for name in ("Layout", "Limits", "pair_gait")},
         **{name: {} for name in ("pentagon_gait", "pretrained", "straight_gait")},
         **{name: dict(scene=FAST) for name in ("GreedyPolicy", "symmetry_of")},
         "turning_wave": dict(decision_period=0.1),

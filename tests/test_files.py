@@ -20,11 +20,10 @@ from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.results import results, write_csv
 from seastar_gym.evaluation.scores import Scores
 from seastar_gym.evaluation.swim import Swim
-from seastar_gym.files import beside, is_left_behind, part_name, read_json, write_atomically, write_json
+from seastar_gym.files import beside, is_left_behind, part_name, read_json, read_rows, write_atomically, write_json
 from seastar_gym.identify.measurement import Measurement
 from seastar_gym.plant.swim import Logs
-from seastar_gym.scene.csv_rows import read_rows
-from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.scene.scene import load_scene
 
 ROOT = Path(__file__).resolve().parents[1]
 

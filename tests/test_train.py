@@ -27,14 +27,14 @@ from later import Later
 from refusals import assert_told
 from seastar_gym import DomainRandomization, Numerics, Scene, Seastar, Sight, SmaWires, Uniform
 from seastar_gym.controllers import learned as policies
-from seastar_gym.controllers.checkpoint import load
 from seastar_gym.controllers.contract import actions_of, require_fit
+from seastar_gym.controllers.learned import load
 from seastar_gym.files import part_name
 
 train = Later("train")
-publishing = Later("agents.training.publishing")
-training = Later("agents.training.options")
-run_folder = Later("agents.training.run")
+publishing = Later("agents.cards")
+training = Later("agents.options")
+run_folder = Later("agents.run")
 
 REPOSITORY = Path(__file__).parents[1]
 TINY = shlex.split(
@@ -54,7 +54,7 @@ def finished(tmp_path_factory):
 @pytest.fixture
 def short_swims(monkeypatch):
     """Swims that are given up after 20 s: what is measured of them stands in the folder of `finished`."""
-    monkeypatch.setattr("agents.training.options.TIME_LIMIT", 20.0)
+    monkeypatch.setattr("agents.options.TIME_LIMIT", 20.0)
 
 
 OWN_ROBOT = """
@@ -214,7 +214,7 @@ def test_a_run_that_is_not_finished_teaches_no_policy_for_a_camera(has_policy, f
 
 def test_a_policy_for_a_camera_is_compared_with_that_of_its_run(tmp_path, short_swims, monkeypatch):
     """Here of limbs and without symmetry; ways/test_tank.py has that of a plain run."""
-    monkeypatch.setattr("agents.training.camera.ENOUGH", 3 * 4096)
+    monkeypatch.setattr("agents.distillation.ENOUGH", 3 * 4096)
     folder, file = tmp_path / "run", tmp_path / "camera.json"
     own = ["--actions", "limbs", "--no-symmetry"]
     assert train.main([*TINY, *own, "--strokes", "256", "--out", str(folder)]) == 0
@@ -411,7 +411,7 @@ def box(tmp_path, monkeypatch):
     """The box with the policy that swims best, to be overwritten without regret."""
     file = tmp_path / "box" / "strokes.safetensors"
     shutil.copytree(policies.BUNDLED.parent, file.parent)
-    monkeypatch.setattr("agents.training.publishing.BUNDLED", file)
+    monkeypatch.setattr("agents.cards.BUNDLED", file)
     return file
 
 
@@ -421,7 +421,7 @@ def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_pa
     before = box.read_bytes()
     assert train.main(["--resume", str(folder), "--publish"]) == 1
     printed = capsys.readouterr().err
-    assert re.search(r"stays: it takes 1[0-9.]+ strokes on 64 held-out random paths, the new one [0-9.]+", printed)
+    assert re.search(r"stays: it takes 1[0-9.]+ strokes on 1 held-out random paths, the new one [0-9.]+", printed)
     assert f"--resume {folder} --publish --publish-anyway" in printed
     assert box.read_bytes() == before
     assert train.main(["--resume", str(folder)]) == 0 and box.read_bytes() == before
@@ -433,7 +433,7 @@ def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_pa
 
 
 def test_only_a_policy_no_worse_than_a_readable_one_in_the_box_needs_no_second_word(finished, box, monkeypatch):
-    monkeypatch.setattr("agents.training.publishing.HELD_OUT_PATHS", 2)
+    monkeypatch.setattr("agents.cards.HELD_OUT_PATHS", 2)
     policy, options = policies.load(finished / "policy.safetensors"), training.saved_options(finished)
     policies.save(policy, box)
     assert publishing.why_not(policy, options) is None
@@ -510,34 +510,34 @@ def lost_process(command, **options):
 
 def test_the_script_is_filmed_beside_the_training_and_else_afterwards(tmp_path, monkeypatch):
     """The film has the same bytes wherever it is made: beside, here on one processor, and where a process is lost."""
-    monkeypatch.setattr("agents.training.options.TIME_LIMIT", 3.0)
-    monkeypatch.setattr("agents.training.run.processors", lambda: 2)
+    monkeypatch.setattr("agents.options.TIME_LIMIT", 3.0)
+    monkeypatch.setattr("agents.comparison.processors", lambda: 2)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     there, made = {}, train.compare
 
-    def compare(options, folder, remarks, film):
-        there[folder] = film()
-        made(options, folder, remarks, film)
+    def compare(agents, options, robot, remarks, folder, filmed):
+        there[folder] = filmed["script"]()
+        made(agents, options, robot, remarks, folder, filmed)
 
     monkeypatch.setattr("train.compare", compare)
     beside = filmed(tmp_path / "beside", "--decision-period", "0.5")
     assert there[tmp_path / "beside"] is not None
     for name, popen in {"none": no_process, "lost": lost_process}.items():
-        monkeypatch.setattr("agents.training.run.subprocess", SimpleNamespace(DEVNULL=subprocess.DEVNULL, Popen=popen))
+        monkeypatch.setattr("agents.comparison.subprocess", SimpleNamespace(DEVNULL=subprocess.DEVNULL, Popen=popen))
         assert filmed(tmp_path / name, "--decision-period", "0.5") == beside
-    monkeypatch.setattr("agents.training.run.processors", lambda: 1)
+    monkeypatch.setattr("agents.comparison.processors", lambda: 1)
     assert filmed(tmp_path / "alone", "--decision-period", "0.5") == beside
     assert [there[tmp_path / name] for name in ("none", "lost", "alone")] == [None] * 3
     assert not list(tmp_path.glob("seastar-film-*"))
 
 
 def test_a_training_that_is_stopped_ends_the_process_that_films(tmp_path, monkeypatch):
-    monkeypatch.setattr("agents.training.run.processors", lambda: 2)
+    monkeypatch.setattr("agents.comparison.processors", lambda: 2)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    from agents.training.run import _begun as begin
+    from agents.comparison import _begun as begin
 
     begun = []
-    monkeypatch.setattr("agents.training.run._begun", lambda words: begun.append(begin(words)) or begun[-1])
+    monkeypatch.setattr("agents.comparison._begun", lambda words: begun.append(begin(words)) or begun[-1])
     monkeypatch.setattr("train.train", lambda *given: (_ for _ in ()).throw(KeyboardInterrupt))
     options = [word for word in TINY if word != "--no-video"]
     assert train.main([*options, "--out", str(tmp_path / "run")]) == 130
@@ -559,8 +559,8 @@ def test_a_timed_training_is_evaluated_and_kept_in_its_own_decisions(tmp_path, m
     assert float(rows["learned"]["simulated_time_s"]) <= 400.0
     assert "--decision-period 0.5" in (folder / "evaluation" / "report.html").read_text()
     assert training.saved_options(folder).ppo.decision_period == 0.5
-    monkeypatch.setattr("agents.training.publishing.BUNDLED", tmp_path / "box" / "strokes.safetensors")
-    monkeypatch.setattr("agents.training.publishing.HELD_OUT_PATHS", 2)
+    monkeypatch.setattr("agents.cards.BUNDLED", tmp_path / "box" / "strokes.safetensors")
+    monkeypatch.setattr("agents.cards.HELD_OUT_PATHS", 2)
     assert train.main(["--resume", str(folder), "--publish"]) == 0
     shipped = policies.bundled_file(0.5, tmp_path / "box" / "strokes.safetensors")
     assert policies.load(shipped).decision_period == 0.5

@@ -33,7 +33,7 @@ from seastar_gym.scene.checks import (
 )
 from seastar_gym.scene.numerics import Resolution, SchemeName
 from seastar_gym.scene.robot import Discretisation
-from seastar_gym.scene.summary import html_table
+from seastar_gym.scene.serial import html_table
 from seastar_gym.version import __version__
 
 MARGIN = 1.5

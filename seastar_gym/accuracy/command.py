@@ -22,7 +22,7 @@ from seastar_gym.accuracy.resonance import told as told_of
 from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.files import require_extra, save_figure, write_json
 from seastar_gym.scene.checks import require_error
-from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.scene.scene import load_scene
 
 
 def as_text(certificate: Certificate) -> str:

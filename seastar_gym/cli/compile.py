@@ -20,7 +20,7 @@ from seastar_gym.rods.potential import energies
 from seastar_gym.scene import Scene
 from seastar_gym.scene.number import numbers_of, with_numbers
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.scene.scene import load_scene
 from seastar_gym.simulator import Simulator
 
 

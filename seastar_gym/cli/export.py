@@ -14,8 +14,7 @@ from pathlib import Path
 
 from seastar_gym.command import answered, command_parser
 from seastar_gym.controllers import learned
-from seastar_gym.controllers.export.c_code import to_c
-from seastar_gym.controllers.export.onnx_graph import to_onnx
+from seastar_gym.controllers.export import to_c, to_onnx
 from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy
 from seastar_gym.controllers.registry import learned_policy
 from seastar_gym.files import write_atomically

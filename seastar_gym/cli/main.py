@@ -1,38 +1,32 @@
 """Swim, play and measure with the seastar robot. `seastar COMMAND --help` tells the options of a command."""
 
 import importlib
+import runpy
 import sys
 from collections.abc import Sequence
-from typing import NamedTuple
+from pathlib import Path
 
 from seastar_gym.command import command_parser, run_command
 from seastar_gym.files import MissingExtra
 from seastar_gym.version import __version__
 
-
-class Command(NamedTuple):
-    """A subcommand. module: Has `main(arguments)`, which returns the exit code. help: What it does, in a line."""
-
-    module: str
-    help: str
-
-
 COMMANDS = {
-    "swim": Command("seastar_gym.cli.swim", "watch an agent on a path or a task, in a window or as a film"),
-    "play": Command("seastar_gym.cli.play", "steer the robot with the keyboard"),
-    "drive": Command("seastar_gym.cli.drive", "let a policy drive a robot in a tank, or a simulated one in its place"),
-    "evaluate": Command(
-        "seastar_gym.cli.evaluate",
+    "swim": ("seastar_gym.cli.swim:main", "watch an agent on a path or a task, in a window or as a film"),
+    "play": ("seastar_gym.cli.play:main", "steer the robot with the keyboard"),
+    "drive": ("seastar_gym.cli.drive:main", "let a policy drive a robot in a tank, or a simulated one in its place"),
+    "evaluate": (
+        "seastar_gym.cli.evaluate:main",
         "compare agents on paths or registered tasks: a table, a file, a picture",
     ),
-    "train": Command("seastar_gym.cli.train", "train a policy, in a checkout of the repository"),
-    "export": Command("seastar_gym.cli.export", "write a learned policy as a file of C or ONNX"),
-    "certify": Command("seastar_gym.accuracy.command", "measure what speed costs a scene in accuracy"),
-    "sweep": Command("seastar_gym.sweep.command", "simulate thousands of designs, here or on a cluster"),
-    "compile": Command("seastar_gym.cli.compile", "compile the simulator before it is needed, as for a container"),
-    "track2csv": Command("seastar_gym.identify.tracks.command", "make what identify reads from a tracker's file"),
-    "identify": Command("seastar_gym.identify.command", "fit numbers of a scene to measured trajectories"),
+    "train": ("seastar_gym.cli.main:train", "train a policy, in a checkout of the repository"),
+    "export": ("seastar_gym.cli.export:main", "write a learned policy as a file of C or ONNX"),
+    "certify": ("seastar_gym.accuracy.command:main", "measure what speed costs a scene in accuracy"),
+    "sweep": ("seastar_gym.sweep.command:main", "simulate thousands of designs, here or on a cluster"),
+    "compile": ("seastar_gym.cli.compile:main", "compile the simulator before it is needed, as for a container"),
+    "track2csv": ("seastar_gym.identify.tracks.command:main", "make what identify reads from a tracker's file"),
+    "identify": ("seastar_gym.identify.command:main", "fit numbers of a scene to measured trajectories"),
 }
+"""Functions of subcommands, "module:function", from words to the exit code; and what each does, in a line."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -41,15 +35,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = command_parser("seastar", __doc__)
     parser.add_argument("--version", action="version", version=f"seastar-gym {__version__}")
     commands = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND", required=True)
-    for name, command in COMMANDS.items():
-        commands.add_parser(name, help=command.help, add_help=False)
-    name = parser.parse_args(given[:1]).command
+    for name, (_, help) in COMMANDS.items():
+        commands.add_parser(name, help=help, add_help=False)
+    function, _ = COMMANDS[parser.parse_args(given[:1]).command]
     try:
-        answer: int = importlib.import_module(COMMANDS[name].module).main(given[1:])
+        module, name = function.split(":")
+        answer: int = getattr(importlib.import_module(module), name)(given[1:])
     except MissingExtra as missing:
         print(missing, file=sys.stderr)
         return 2
     return answer
+
+
+def train(arguments: Sequence[str]) -> int:
+    """Run `train.py` of the checkout that this is started in, or that the package is installed from; the exit code."""
+    places = (Path.cwd(), Path(__file__).resolve().parents[2])
+    found = [place for place in places if (place / "train.py").is_file() and (place / "agents").is_dir()]
+    if not found:
+        print(
+            "Training needs a checkout of the repository, with train.py and agents/: start there, after pip install -e "
+            '".[train]".',
+            file=sys.stderr,
+        )
+        return 2
+    file = found[0] / "train.py"
+    sys.path.insert(0, str(found[0]))
+    sys.argv = [str(file), *arguments]
+    try:
+        runpy.run_path(str(file), run_name="__main__")
+    except SystemExit as ended:
+        if isinstance(ended.code, str):
+            print(ended.code, file=sys.stderr)
+            return 1
+        return ended.code or 0
+    return 0
 
 
 def run() -> None:

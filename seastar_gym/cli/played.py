@@ -1,11 +1,11 @@
 """The environment of `seastar play`: its pictures say what the keys do, and number the limbs."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.cli.keys import ALONG, MINUS, PLUS
 from seastar_gym.envs.canvas import INK, WATER, Colour, import_pygame
 from seastar_gym.envs.rendering import FAINT_INK, limb_nodes
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -19,10 +19,13 @@ CORNER = (16, 44)
 
 
 class PlayedEnv(SeastarSwimEnv):
-    """`SeastarSwimEnv` whose pictures have the numbers of the limbs and, while `help` is True, the keys."""
+    """`SeastarSwimEnv` whose pictures have the numbers of the limbs and, while `help` is True, lines of keys.
 
-    def __init__(self, **arguments: Any):
-        self.help = True
+    keys: Keys and what they do, line by line.
+    """
+
+    def __init__(self, keys: Sequence[tuple[str, str]], **arguments: Any):
+        self.keys, self.help = keys, True
         super().__init__(render_mode="rgb_array_list", **arguments)
 
     def limb_directions(self) -> NDArray[np.float64]:
@@ -53,7 +56,7 @@ class PlayedEnv(SeastarSwimEnv):
 
         for limb, (x, y) in self._numbers():
             write(str(limb + 1), x - 5, y - TEXT / 2, FAINT_INK)
-        for number, (keys, meaning) in enumerate(keys_help(self.scene.robot.n_limbs) if self.help else ()):
+        for number, (keys, meaning) in enumerate(self.keys if self.help else ()):
             write(keys, CORNER[0], CORNER[1] + LINE * number)
             write(meaning, CORNER[0] + COLUMN, CORNER[1] + LINE * number, FAINT_INK)
         return np.frombuffer(pygame.image.tobytes(surface, "RGB"), np.uint8).reshape(picture.shape)
@@ -66,15 +69,3 @@ class PlayedEnv(SeastarSwimEnv):
         return [
             (limb, tips[limb] + outward[limb]) for limb in np.flatnonzero(self._robots.last_commands[0] == 0.0).tolist()
         ]
-
-
-def keys_help(n_limbs: int) -> list[tuple[str, str]]:
-    """Keys and what they do, in lines."""
-    spaced = [" ".join(row[:n_limbs].upper()) for row in (PLUS, MINUS, ALONG)]
-    return [
-        (spaced[0], f"limbs 1 to {n_limbs} turn +, anti-clockwise"),
-        (spaced[1], f"limbs 1 to {n_limbs} turn \u2212, clockwise"),
-        (spaced[2], f"swim along limb 1 to {n_limbs}"),
-        ("arrows", "swim that way"),
-        ("Z  F1  Esc", "begin anew, hide this, end"),
-    ]

@@ -24,7 +24,7 @@ from seastar_gym.evaluation.rollout import make_task, require_seen, rollout
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.scene.scene import load_scene
 
 if TYPE_CHECKING:
     import gymnasium as gym

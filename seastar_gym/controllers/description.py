@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any, NamedTuple, cast, get_args
+from typing import Any, NamedTuple, get_args
 
 from seastar_gym.envs import TASKS
 from seastar_gym.envs.commands import Actions, Discrete, checked_decision_period, choices
@@ -90,48 +90,37 @@ class Description(NamedTuple):
         for name, ours in (("format", FORMAT), ("observation_layout", OBSERVATION_LAYOUT)):
             if facts[name] != ours or isinstance(facts[name], bool):
                 raise ValueError(f"Its {name} is {shown(facts[name])}, this version of seastar_gym knows {ours}.")
-        return cls._of(facts, Scene.from_dict(facts["scene"]))
-
-    @classmethod
-    def _of(cls, facts: Mapping[str, Any], scene: Scene) -> Description:
-        """Description from its entries, with the scene of its own."""
-        actions: Any = facts["actions"]
-        symmetry, hidden, task, past = (facts[name] for name in ("symmetry", "hidden", "task", "past"))
-        if not isinstance(actions, str) or actions not in get_args(Discrete):
-            known = ", ".join(map(repr, get_args(Discrete)))
-            raise ValueError(f"Its actions must be one of {known}, not {shown(actions)}.")
-        if not isinstance(symmetry, bool):
-            raise ValueError(f"Its symmetry must be true or false, not {shown(symmetry)}.")
-        if not isinstance(hidden, list):
-            raise ValueError(f"Its hidden must be a list of widths, not {shown(hidden)}.")
-        for width in hidden:
-            require_count("a width of its hidden layers", width, 1, WIDEST)
-        if facts["decision_period"] is not None:
-            checked_decision_period(facts["decision_period"], scene)
-        if task is not None and (not isinstance(task, str) or task not in NAMES_OF_TASKS):
-            raise ValueError(f"Its task must be one of {', '.join(NAMES_OF_TASKS)}, not {shown(task)}.")
-        require_count("its past", past, 0, MOST_PAST)
-        if past and not symmetry:
-            raise ValueError("A policy without symmetry has no past.")
-        mirror = None if facts["limb_mirror"] is None else _mirror(facts["limb_mirror"])
-        sight, action_delay = read(facts["sight"], Sight), read(facts["action_delay"], object)
-        require_kind("its sight", sight, Sight | None, "a Sight, or null")
-        require_action_delay(action_delay)
-        require_kind("its path", facts["path"], str | None, "the name of a path, or null")
-        entries = tuple(facts["entries"]) if isinstance(facts["entries"], list) else facts["entries"]
-        found = cls(
-            cast(Discrete, actions), symmetry, scene, tuple(hidden), facts["decision_period"], task, mirror, entries,
-            facts["shows_limbs"], past, facts["stations"], sight, action_delay, facts["path"],
-        )  # fmt: skip
-        _ = found.layout  # refuses the entries that are its own
+        own = {name: _as_tuples(facts[name]) for name in cls._fields}
+        own |= {"scene": Scene.from_dict(facts["scene"]), "sight": read(facts["sight"], Sight)}
+        found = cls(**own | {"action_delay": read(facts["action_delay"], object)})
+        found.check()
         return found
 
     def check(self) -> None:
         """ValueError, with one sentence, where an entry is none of its kind."""
         require_kind("scene", self.scene, Scene, "a Scene")
-        require_kind("hidden", self.hidden, tuple, "a tuple of widths")
-        rows = None if self.limb_mirror is None else _rows(self.limb_mirror)
-        self._of({**self._asdict(), "limb_mirror": rows, "hidden": list(self.hidden)}, self.scene)
+        if not isinstance(self.actions, str) or self.actions not in get_args(Discrete):
+            known = ", ".join(map(repr, get_args(Discrete)))
+            raise ValueError(f"Its actions must be one of {known}, not {shown(self.actions)}.")
+        if not isinstance(self.symmetry, bool):
+            raise ValueError(f"Its symmetry must be true or false, not {shown(self.symmetry)}.")
+        if not isinstance(self.hidden, tuple):
+            raise ValueError(f"Its hidden must be a tuple of widths, a list in JSON, not {shown(self.hidden)}.")
+        for width in self.hidden:
+            require_count("a width of its hidden layers", width, 1, WIDEST)
+        if self.decision_period is not None:
+            checked_decision_period(self.decision_period, self.scene)
+        if self.task is not None and (not isinstance(self.task, str) or self.task not in NAMES_OF_TASKS):
+            raise ValueError(f"Its task must be one of {', '.join(NAMES_OF_TASKS)}, not {shown(self.task)}.")
+        require_count("its past", self.past, 0, MOST_PAST)
+        if self.past and not self.symmetry:
+            raise ValueError("A policy without symmetry has no past.")
+        if self.limb_mirror is not None:
+            _require_mirror(self.limb_mirror)
+        require_kind("its sight", self.sight, Sight | None, "a Sight, or null")
+        require_action_delay(self.action_delay)
+        require_kind("its path", self.path, str | None, "the name of a path, or null")
+        _ = self.layout  # refuses the entries that are its own
 
     @property
     def mirror(self) -> Mirror:
@@ -183,23 +172,21 @@ NAMES_OF_TASKS = tuple(dict.fromkeys(str(row.task) for row in TASKS.values()))
 """Names of tasks that policies are trained for."""
 
 
-def _rows(mirror: object) -> object:
-    """Mirror as it is written."""
-    pairs = isinstance(mirror, tuple) and all(isinstance(row, tuple) for row in mirror)
-    return [list(row) for row in mirror] if pairs else mirror  # type: ignore[attr-defined]
+def _as_tuples(value: Any) -> Any:
+    """Lists of JSON as tuples, at any depth."""
+    return tuple(map(_as_tuples, value)) if isinstance(value, list) else value
 
 
-def _mirror(rows: object) -> Mirror:
-    """Mirror of the n numbers of a limb: for each, the number that takes its place, and a sign."""
-    if not isinstance(rows, list) or len(rows) > MOST_NUMBERS:
+def _require_mirror(rows: object) -> None:
+    """ValueError for what is no mirror of the n numbers of a limb: for each, which one takes its place, and a sign."""
+    if not isinstance(rows, tuple) or len(rows) > MOST_NUMBERS:
         raise ValueError(f"Its limb_mirror must be a list of pairs, not {shown(rows)}.")
     for row in rows:
-        if not isinstance(row, list) or len(row) != 2 or not is_whole_number(row[1]) or abs(row[1]) != 1:
+        if not isinstance(row, tuple) or len(row) != 2 or not is_whole_number(row[1]) or abs(row[1]) != 1:
             raise ValueError(f"Its limb_mirror has {shown(row)}, not an index and a sign.")
         require_count("an index of its limb_mirror", row[0], 0, len(rows) - 1)
-    if any(rows[index] != [place, sign] for place, (index, sign) in enumerate(rows)):
+    if any(rows[index] != (place, sign) for place, (index, sign) in enumerate(rows)):
         raise ValueError(f"Its limb_mirror is no mirror, which undoes itself: {shown(rows)}.")
-    return tuple((index, sign) for index, sign in rows)
 
 
 def read_facts(text: str | bytes) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Learned policies on disk: weights in a safetensors file, and a description in JSON beside it.
+"""Learned policies on disk: weights in a safetensors file with a description in JSON beside it, or a training's zip.
 
     from seastar_gym.controllers import load, pretrained
 
@@ -8,14 +8,19 @@
     )
 
 The network is plain numpy: layers `W x + b` with tanh between them (`0.weight`, `0.bias`, `1.weight`, ...), whose last
-outputs are the logits of the actions. Nothing is unpickled, and neither torch nor Stable-Baselines3 is needed.
+outputs are the logits of the actions. The `model.zip` of a training is Stable-Baselines3's own file with entries that
+hold no pickles, of which `policy.json` and `learner.safetensors` are read here. Nothing is unpickled, and neither torch
+nor Stable-Baselines3 is needed.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,7 +35,7 @@ from seastar_gym.controllers.description import Description, read_facts
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.sight import FOR_CAMERA, Sight, told
 from seastar_gym.envs.symmetry import FrameStack
-from seastar_gym.files import read_whole, write_atomically
+from seastar_gym.files import LARGEST_FILE, read_whole, write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number, require_file, require_flag, require_kind, require_period, shown
 
@@ -285,17 +290,12 @@ def by_name() -> dict[str, Path]:
     return {file.stem: file for folder in (BUNDLED.parent, TASKS) for file in sorted(folder.glob(f"*{BUNDLED.suffix}"))}
 
 
-def file_of(name: str) -> Path | None:
-    """File of the bundled policy of a name; None if there is none."""
-    return by_name().get(name)
-
-
 def pretrained(name: str = BUNDLED.stem) -> LearnedPolicy:
     """Bundled policy of a name, such as "strokes", "timed-0.2s" or "prey".
 
     ValueError, with the names that there are, for another one.
     """
-    file = file_of(name) if isinstance(name, str) else None
+    file = by_name().get(name) if isinstance(name, str) else None
     if file is None:
         raise ValueError(f"There is no bundled policy {shown(name)}: take one of {', '.join(by_name())}.")
     return load(file)
@@ -308,10 +308,13 @@ def of_task(task: str, decision_period: float | None, folder: Path = TASKS) -> P
 
 
 def load(path: str | os.PathLike[str] = BUNDLED) -> LearnedPolicy:
-    """Policy that `save` wrote; by default the bundled one of strokes.
+    """Policy that `save` wrote, or of a training's model.zip; by default the bundled one of strokes.
 
     FileNotFoundError or ValueError, with one sentence, if there is none.
     """
+    require_file("path", path)
+    if Path(path).suffix == ".zip":
+        return _of_training(Path(path))
     path = _checked_suffix(path)
     for file in (path, path.with_suffix(".json")):
         if not file.is_file():
@@ -353,3 +356,51 @@ def _checked_suffix(path: str | os.PathLike[str]) -> Path:
     if path.suffix != ".safetensors":
         raise ValueError(f"A policy is in a file named .safetensors, not in {path}.")
     return path
+
+
+DESCRIPTION, LEARNER = "policy.json", "learner.safetensors"
+NETWORK = "network."
+"""Beginning of the names of the network's arrays."""
+ACTOR = "mlp_extractor.policy_net."
+"""Beginning of the names of the policy's hidden layers, as Stable-Baselines3 calls them."""
+
+
+def _of_training(path: Path) -> LearnedPolicy:
+    """Policy of a training's model.zip."""
+    with opened(path) as archive:
+        description = Description.from_json(archive.read(DESCRIPTION).decode())
+        arrays = safetensors.numpy.load(archive.read(LEARNER))
+        network = {name.removeprefix(NETWORK): one for name, one in arrays.items() if name.startswith(NETWORK)}
+        return LearnedPolicy(description, actor(network))
+
+
+def actor(network: Mapping[str, NDArray[Any]]) -> Weights:
+    """Weights of the policy in Stable-Baselines3's network, under the names of `LearnedPolicy`."""
+    hidden = sorted({int(name.split(".")[2]) for name in network if name.startswith(ACTOR)})
+    layers = [*(f"{ACTOR}{number}" for number in hidden), "action_net"]
+    return {
+        f"{layer}.{kind}": network[f"{name}.{kind}"] for layer, name in enumerate(layers) for kind in ("weight", "bias")
+    }
+
+
+@contextmanager
+def opened(path: str | os.PathLike[str]) -> Iterator[zipfile.ZipFile]:
+    """The archive, whose faults are said in one sentence."""
+    if not os.path.isfile(path):
+        raise FileNotFoundError(f"There is no trained policy at {os.fspath(path)}.")
+    with one_sentence(path), zipfile.ZipFile(path) as archive:
+        if sum(member.file_size for member in archive.infolist()) > LARGEST_FILE:
+            raise ValueError(f"It unpacks to more than {LARGEST_FILE:,} bytes")
+        yield archive
+
+
+@contextmanager
+def one_sentence(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Context in which any fault of the file's contents becomes a ValueError with one sentence."""
+    try:
+        yield
+    except (zipfile.BadZipFile, EOFError, zlib.error, KeyError, safetensors.SafetensorError) as damaged:
+        reason = str(damaged.args[0]).rstrip(".")
+        raise ValueError(f"{os.fspath(path)} is damaged, or no policy saved by this project: {reason}.") from damaged
+    except (AttributeError, IndexError, OverflowError, RuntimeError, TypeError, ValueError) as mismatch:
+        raise ValueError(f"{os.fspath(path)} does not fit: {reason_of(mismatch)}.") from mismatch

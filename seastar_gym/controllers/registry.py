@@ -31,19 +31,18 @@ from typing import Any, get_args
 
 import numpy as np
 
-from seastar_gym.controllers import checkpoint, learned
+from seastar_gym.controllers import learned
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit
-from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.learned import reason_of
 from seastar_gym.controllers.open_loop import GAITS, scripted
-from seastar_gym.controllers.planner import Planner, gait_planner
+from seastar_gym.controllers.search import GreedyPolicy, Planner, gait_planner
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import OneRobotEnv, SeastarSwimEnv
 from seastar_gym.envs.tasks import name_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, require_kind, require_period, require_seed, require_texts, shown
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene_file import search
+from seastar_gym.scene.scene import find_modules_in
 
 _FUNCTION = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
@@ -56,7 +55,7 @@ def is_function(name: str) -> bool:
 def module_file(name: str) -> Path:
     """File of the module of a function of this name. ValueError if there is none."""
     module = name.partition(":")[0]
-    search(Path.cwd())
+    find_modules_in(Path.cwd())
     try:
         spec = importlib.util.find_spec(module)
     except ModuleNotFoundError:
@@ -73,7 +72,7 @@ def call_function(name: str, env: OneRobotEnv) -> Policy:
     ValueError, with one sentence, if there is no such function or it returns no policy.
     """
     module, _, function = name.partition(":")
-    search(Path.cwd())
+    find_modules_in(Path.cwd())
     try:
         make = getattr(importlib.import_module(module), function, None)
     except ModuleNotFoundError as missing:
@@ -253,8 +252,7 @@ def _known(seed: int, fidelity: Fidelity, decision_period: float | None, scene: 
     """Scene that agents know."""
     require_seed(seed)
     require_choice("fidelity", fidelity, get_args(Fidelity))
-    known = make_scene(None, fidelity) if scene is None else scene
-    require_kind("scene", known, Scene, "a Scene, or None")
+    require_kind("scene", scene, Scene | None, "a Scene, or None")
     require_period(decision_period)
     return make_scene(None, fidelity, decision_period) if scene is None else scene
 
@@ -309,7 +307,7 @@ def learned_file(name: str, decision_period: float | None = None) -> Path | None
 
     decision_period: As of `files_of`.
     """
-    bundled = learned.bundled_file(decision_period) if name == "learned" else learned.file_of(name)
+    bundled = learned.bundled_file(decision_period) if name == "learned" else learned.by_name().get(name)
     return bundled or (Path(name) if name.endswith(".safetensors") else None)
 
 
@@ -318,9 +316,9 @@ def learned_policy(name: str, decision_period: float | None = None) -> learned.L
 
     decision_period: As of `files_of`.
     """
-    if name.endswith(".zip"):
-        return None if is_model(name) else checkpoint.load(name)
     file = learned_file(name, decision_period)
+    if name.endswith(".zip"):
+        file = None if is_model(name) else Path(name)
     return None if file is None else learned.load(file)
 
 
@@ -339,9 +337,8 @@ def _load_agent(
 ) -> Policy:
     if name in AGENTS:
         return AGENTS[name](scene, decision_period, task)
-    bundled = learned.file_of(name)
-    if bundled is not None:
-        return learned.load(bundled)
+    if (policy := learned_policy(name)) is not None:
+        return policy
     if is_function(name):
         return call_function(name, make_env())
     return _load_file(name) if is_file(name) else _scripted(name, seed, decision_period, scene.robot.n_limbs)
@@ -359,12 +356,9 @@ def _scripted(name: str, seed: int, decision_period: float | None, n_limbs: int)
 
 
 def _load_file(name: str) -> Policy:
-    if not name.endswith(".zip"):
-        return learned.load(name)
-    if not is_model(name):
-        return checkpoint.load(name)
+    """Policy of a file that is no policy of this project, unless it is one that is refused."""
     try:
-        return load_model(name)
+        return load_model(name) if is_model(name) else learned.load(name)
     except ModuleNotFoundError as missing:
         raise ValueError(
             f'A model.zip of Stable-Baselines3 needs {missing.name}: pip install "seastar-gym[train]".'

@@ -33,7 +33,7 @@ from seastar_gym.scene.checks import as_float, is_finite_number, require_flag, r
 from seastar_gym.scene.number import check_numbers, make_floats, not_negative, within
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.robot import SILICONE
-from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.scene.scene import load_scene
 from seastar_gym.scene.serial import read, register_part
 
 Plain = Mapping[str, Any]

@@ -23,8 +23,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.files import read_numbers
 from seastar_gym.scene.checks import require_callable, require_few, require_kind, require_unmasked, shown
-from seastar_gym.scene.csv_rows import read_numbers
 
 Floats: TypeAlias = NDArray[np.float64]
 Point: TypeAlias = Sequence[float]

@@ -24,7 +24,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import Policy, actions_in, require_fit, require_policy
-from seastar_gym.controllers.greedy import Searcher
+from seastar_gym.controllers.search import Searcher
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.robots import Split, Task
@@ -34,7 +34,7 @@ from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.scene.checks import require_callable, require_count, require_kind, require_texts
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene_file import search
+from seastar_gym.scene.scene import find_modules_in
 
 Floats = NDArray[np.float64]
 Batch = gym.vector.VectorEnv[Any, Any, Any]
@@ -213,7 +213,7 @@ def known_id(task: str) -> str:
     """
     module, _, id = task.rpartition(":")
     if module:
-        search(Path.cwd())
+        find_modules_in(Path.cwd())
         try:
             importlib.import_module(module)
         except ModuleNotFoundError as missing:

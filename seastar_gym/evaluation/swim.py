@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit, require_policy
-from seastar_gym.controllers.greedy import turned
+from seastar_gym.controllers.search import turned
 from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.layout import VELOCITY_SCALE
 from seastar_gym.envs.options import SwimOptions

@@ -14,8 +14,8 @@ from seastar_gym.controllers.learned import camera_of
 from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.results import MEANS, Row, number, statistics, text_table
 from seastar_gym.evaluation.swim import CURRENT_DIRECTIONS, DISTURBANCES, swim_many
-from seastar_gym.scene.csv_rows import Row as CsvRow
-from seastar_gym.scene.csv_rows import read_table
+from seastar_gym.files import Row as CsvRow
+from seastar_gym.files import read_table
 from seastar_gym.scene.numerics import Fidelity
 
 NOMINAL: tuple[str, ...] = ("pentagon", "square", "triangle", "figure-eight")

@@ -1,5 +1,8 @@
 """Derivatives of swims.
 
+In come a scene of one robot, commands and names of unknowns; out go the swim, to the bits of `Simulator`, and its
+derivatives or a gradient. `swim.py` and `adjoint.py` have the two ways, the other files what they do with kernels.
+
     from seastar_gym.gradients import differentiate, gradient
 
     found = differentiate(Scene(), commands, by=["fluid.drag_coefficient", "commands"])

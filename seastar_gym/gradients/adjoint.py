@@ -16,8 +16,10 @@ from seastar_gym.gradients.swim import (
     COUNTS,
     Motion,
     WorkOfGradient,
+    advanced,
     as_rows_of_tape,
     checked_swim,
+    n_rows_of_a,
     require_names,
     sentence_of,
     slopes_of_heading,
@@ -33,7 +35,7 @@ from seastar_gym.lanes.tape import ENTRY, ROW
 from seastar_gym.model import make_limits, make_rods
 from seastar_gym.rods.bundles import make_work
 from seastar_gym.rods.interval import advance
-from seastar_gym.rods.step import MOMENTS, REPORT_ROWS, SCHEMES, SMALLEST_HUB_T, WORK
+from seastar_gym.rods.step import REPORT_ROWS, SCHEMES, WORK
 from seastar_gym.rods.terms.hub import Actuation
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_floats, require_callable, shown
@@ -120,7 +122,7 @@ class Record:
         self._scene, self._commands, self._state, self._duration = scene, commands, state, duration
         self._rods, self._limits = make_rods(scene), make_limits(scene)
         self._scheme = scheme_for(scene)
-        self._n_limbs = scene.robot.n_limbs
+        self._n_limbs, self._n_a = scene.robot.n_limbs, n_rows_of_a(self._rods, self._scheme.n_stages)
         self._held = np.array([2 * node + axis for node in scene.held_nodes for axis in (0, 1)], dtype=int)
         self._start = start_of(scene, state)
         drives = Rotations(scene, state, commands, ())
@@ -222,18 +224,6 @@ class Record:
     def _counts(self, name: str) -> NDArray[np.int64]:
         return np.array([report[name] for report in self._reports], dtype=np.int64)
 
-    def _lanes(self, k: int) -> tuple[Floats, Floats, Floats]:
-        """q, v and a at the beginning of interval k, shape (n_rows, N_LANES)."""
-        q, v = (aligned_rows(self._start.q.size, N_LANES) for _ in range(2))
-        q[:], v[:] = (rows[:, None] for rows in self._states[k])
-        v[self._held] = 0.0
-        return q, v, aligned_rows(self._n_a, N_LANES)
-
-    @property
-    def _n_a(self) -> int:
-        stages, has_body = self._scheme.n_stages, self._rods.body is not None
-        return (2 * self._rods.n_free + 1) * stages + 2 + (stages if has_body else 0)
-
     def history(self, k: int) -> Floats:
         """Every step of interval k and where the last one ended, shape (n_steps + 1, n_numbers), see history.py."""
         kept = self._kept[k]
@@ -242,40 +232,33 @@ class Record:
     def _swim(self, k: int) -> tuple[float, dict[str, float], tuple[Floats, Floats], Floats]:
         """Swim through interval k: the actuators' work [J], the report, (q, v) at its end, and its history."""
         times, turned = self._turns[k]
-        n_q, stages = self._start.q.size, self._scheme.n_stages
-        n_rows = n_numbers(n_q, self._n_a, stages, self._rods.n_points)
-        rows = aligned_rows(n_rows, N_LANES)
+        n_q, n_a, stages = self._start.q.size, self._n_a, self._scheme.n_stages
+        n_rows = n_numbers(n_q, n_a, stages, self._rods.n_points)
+        rows, n_lanes = aligned_rows(n_rows, N_LANES), (1, n_q, N_LANES)
         shape = np.repeat(turned.ravel()[:, None], N_LANES, axis=1)
         capacity = len(times) + SPARE_STEPS
         while True:
-            q, v, a = self._lanes(k)
-            report, effort = np.zeros((1, len(REPORT_ROWS), N_LANES)), np.zeros((1, MOMENTS + self._n_limbs, N_LANES))
-            report[:, SMALLEST_HUB_T] = np.inf
-            peaks, failed = np.ones((1, self._n_limbs, N_LANES)), np.zeros((1, 1, N_LANES))
+            q, v = (aligned_rows(*n_lanes) for _ in range(2))
+            q[:], v[:] = (of_state[:, None] for of_state in self._states[k])
+            v[0, self._held], failed = 0.0, np.zeros((1, 1, N_LANES))
             counters, found = np.zeros(COUNTERS), np.empty((capacity + 1, n_rows))
             counters[CAPACITY] = capacity
-            kept = Kept(counters, rows, rows.ravel(), found.ravel(), n_rows, n_q, self._n_a)
-            advance.at(KEPT)(
-                self._rods, WorkOfGradient(*self._work, kept, None), self._scheme,  # type: ignore[call-arg]
-                SCHEMES["implicit-euler"], _actuation(self._n_limbs, N_LANES), q[None], v[None], a[None], peaks, times,
-                shape[None], self._n_limbs, failed, report, self._limits, effort,
-            )  # fmt: skip
+            kept = Kept(counters, rows, rows.ravel(), found.ravel(), n_rows, n_q, n_a)
+            work = WorkOfGradient(*self._work, kept, None)  # type: ignore[call-arg]
+            counts, effort = advanced(
+                advance.at(KEPT), self._scene, self._rods, work, (q, v), times, shape[None], failed
+            )
             n = int(counters[N_STEPS])
             if n < capacity:
                 break
             capacity *= 2
         found[n] = 0.0
         found[n, INTERVAL] = len(times) - 1
-        found[n, OF_STEP : OF_STEP + n_q], found[n, OF_STEP + n_q : OF_STEP + 2 * n_q] = q[:, 0], v[:, 0]
-        if failed[0, 0, 0] > 0.0:
+        found[n, OF_STEP : OF_STEP + n_q], found[n, OF_STEP + n_q : OF_STEP + 2 * n_q] = q[0, :, 0], v[0, :, 0]
+        if counts["status"] > 0.0:
             q[:] = v[:] = effort[:] = np.nan
-        q[self._held, 0], v[self._held] = self._states[k][0][self._held], 0.0
-        counts = {**dict(zip(REPORT_ROWS, report[0, :, 0].tolist(), strict=True)), "status": float(failed[0, 0, 0])}
-        return float(effort[0, WORK, 0]), counts, (q[:, 0].copy(), v[:, 0].copy()), found[: n + 1].copy()
-
-
-def _actuation(n_limbs: int, n: int) -> Actuation:
-    return Actuation(*(np.zeros((n_limbs, n)) for _ in range(2)))
+        q[0, self._held, 0], v[0, self._held] = self._states[k][0][self._held], 0.0
+        return float(effort[0, WORK, 0]), counts, (q[0, :, 0].copy(), v[0, :, 0].copy()), found[: n + 1].copy()
 
 
 class _Sweep:

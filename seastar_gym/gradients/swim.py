@@ -6,7 +6,7 @@ Memory of a tape: bundles of coefficients and of work whose rows of robots stand
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -213,26 +213,52 @@ def require_names(by: Sequence[str]) -> None:
         raise ValueError("by must name one unknown or more, each once.")
 
 
+def n_rows_of_a(rods: Any, n_stages: int) -> int:
+    """Rows of accelerations at the stages of a step."""
+    return (2 * rods.n_free + 1) * n_stages + 2 + (n_stages if rods.body is not None else 0)
+
+
+def advanced(
+    entry: Callable[..., None],
+    scene: Scene,
+    rods: Any,
+    work: Any,
+    places: tuple[Floats, Floats],
+    times: Floats,
+    shape: Floats,
+    failed: Floats,
+) -> tuple[dict[str, float], Floats]:
+    """Advance a robot's rows q and v, shape (1, n_rows, n), through an interval; the report's counts, and the effort.
+
+    times: Ends of the time steps [s]. shape: Rotations then [rad], shape (1, n_times * n_limbs, n).
+    failed: SolverStatus, shape (1, 1, n).
+    """
+    n_limbs, scheme, n = scene.robot.n_limbs, scheme_for(scene), shape.shape[-1]
+    report, peaks = np.zeros((1, len(REPORT_ROWS), n)), np.zeros((1, n_limbs, n))
+    report[:, SMALLEST_HUB_T, :N_LANES], peaks[..., :N_LANES] = np.inf, 1.0
+    a, effort = aligned_rows(1, n_rows_of_a(rods, scheme.n_stages), n), np.zeros((1, MOMENTS + n_limbs, n))
+    actuation = Actuation(*(np.zeros((n_limbs, n)) for _ in range(2)))
+    entry(
+        rods, work, scheme, SCHEMES["implicit-euler"], actuation, *places, a, peaks, times, shape, n_limbs, failed,
+        report, make_limits(scene), effort,
+    )  # fmt: skip
+    status = float(failed[0, 0, 0])
+    return {**dict(zip(REPORT_ROWS, report[0, :, 0].tolist(), strict=True)), "status": status}, effort
+
+
 class _Group:
     """A robot in N_LANES lanes, with a direction in each. columns: Of the slopes that its lanes carry."""
 
     def __init__(self, scene: Scene, start: Start, slopes: Start, columns: slice):
-        self._columns, self._scheme = columns, scheme_for(scene)
-        one, n_limbs = make_rods(scene), scene.robot.n_limbs
+        self._scene, self._columns, one = scene, columns, make_rods(scene)
         self._rods = widened(side_by_side([one] * N_LANES), 2 * N_LANES)
         for rows, rise in zip(arrays_of(self._rods), slopes.coefficients, strict=True):
             if rows.ndim == 2:
                 rows[:, N_LANES : N_LANES + self._n] = rise[:, columns]
             elif rise[:, columns].any():
                 raise ValueError("There are no derivatives in numbers on a grid.")
-        self._work, self._limits = widened(make_work(one, self._scheme.n_stages), 2 * N_LANES), make_limits(scene)
-        self._actuation = Actuation(*(np.zeros((n_limbs, 2 * N_LANES)) for _ in range(2)))
+        self._work = widened(make_work(one, scheme_for(scene).n_stages), 2 * N_LANES)
         self._q, self._v = (self._rows(value, rise) for value, rise in zip(start[1:3], slopes[1:3], strict=True))
-        stages, n_free = self._scheme.n_stages, 2 * one.n_free
-        n_rows = (n_free + 1) * stages + 2 + (stages if one.body is not None else 0)
-        self._a = aligned_rows(1, n_rows, 2 * N_LANES)
-        self._peaks = np.zeros((1, n_limbs, 2 * N_LANES))
-        self._peaks[..., :N_LANES] = 1.0
         self._failed = np.zeros((1, 1, 2 * N_LANES))
         self._held = np.array([2 * node + axis for node in scene.held_nodes for axis in (0, 1)], dtype=int)
         self._reports: list[dict[str, float]] = []
@@ -250,22 +276,16 @@ class _Group:
 
     def advance(self, times: Floats, turned: Floats, rises: Floats) -> None:
         """Advance through the intervals between `times` [s] with rotations, shape (n_times, n_limbs) [rad]."""
-        report = np.zeros((1, len(REPORT_ROWS), 2 * N_LANES))
-        report[:, SMALLEST_HUB_T, :N_LANES] = np.inf
-        effort = np.zeros((1, MOMENTS + turned.shape[1], 2 * N_LANES))
-        shape = self._rows(turned.ravel(), rises.reshape(turned.size, -1))
-        self._a[:] = 0.0
         held = self._q[0, self._held]
         self._v[0, self._held] = 0.0
-        advance_slopes()(
-            self._rods, self._work, self._scheme, SCHEMES["implicit-euler"], self._actuation, self._q, self._v,
-            self._a, self._peaks, times, shape, turned.shape[1], self._failed, report, self._limits, effort,
+        report, effort = advanced(
+            advance_slopes(), self._scene, self._rods, self._work, (self._q, self._v), times,
+            self._rows(turned.ravel(), rises.reshape(turned.size, -1)), self._failed,
         )  # fmt: skip
         self._q[0, self._held], self._v[0, self._held] = held, 0.0
-        status = float(self._failed[0, 0, 0])
-        if status > 0.0:
+        if report["status"] > 0.0:
             self._q[:] = self._v[:] = effort[:] = np.nan
-        self._reports.append({**dict(zip(REPORT_ROWS, report[0, :, 0].tolist(), strict=True)), "status": status})
+        self._reports.append(report)
         self.states.append((self._q[0].copy(), self._v[0].copy()))
         self.work.append(effort[0, WORK].copy())
 

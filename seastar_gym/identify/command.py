@@ -27,7 +27,7 @@ from seastar_gym.files import require_extra, save_figure, write_json
 from seastar_gym.identify.fit import DOUBT, Estimate, identify
 from seastar_gym.identify.measurement import ARM, ORIENTATION, Measurement
 from seastar_gym.scene import Numerics
-from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.scene.scene import load_scene
 
 FITTED = ["fluid.drag_coefficient", "robot.youngs_modulus", "actuator.peak_angle"]
 """Parameters that are fitted unless others are named."""

@@ -18,41 +18,36 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from seastar_gym.identify.measurement import ORIENTATION, Measurement, get_parameter, uncertainty_of, with_parameters
+from seastar_gym.identify.measurement import Measurement, uncertainty_of, with_parameters
 from seastar_gym.identify.search import (
     SUSPICIOUS,
     Found,
+    Residuals,
     ends_of_search,
-    noise_of,
     require_clocks,
     require_places,
     require_rest,
     search,
 )
-from seastar_gym.identify.trajectories import LONGEST_DELAY, at_rest, delayed_trajectories, trajectories
+from seastar_gym.identify.trajectories import LONGEST_DELAY, at_rest
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number, require_kind, require_within, shown
 
 Floats = NDArray[np.float64]
 
-DIFFERENCE = 1e-4
-"""Relative change of a parameter for a column of the Jacobian. Trajectories are accurate to about its square."""
 UNTOLD = 0.5
 """Relative standard error above which a combination of parameters is undetermined."""
 SHARE = 0.3
 """Component of such a combination, a unit vector, above which a parameter belongs to it."""
 LARGEST_FACTOR = 20.0
 """Largest factor between a parameter and its first guess."""
-DELAYS_APART = 0.02
-"""Distance between delays that are tried for a first guess [s]."""
 SHORTEST_DELAY = 1e-3
 """Least bound of a delay that is fitted [s]."""
 TOLERANCE = 1e-7
@@ -206,115 +201,11 @@ def identify(
     )  # fmt: skip
 
 
-class Residuals:
-    """Simulated minus measured coordinates [m], as a function of the logarithms of parameters over their first guess.
-
-    names: Names of the p parameters.
-    guess: First guess of the parameters, shape (p,).
-    delayed: Whether a delay [s] follows the logarithms.
-    seen: Whether each coordinate was measured, shape (n, n_nodes_seen, 2).
-    """
-
-    def __init__(self, scene: Scene, names: tuple[str, ...], measurement: Measurement, delayed: bool = False):
-        self.names, self.measurement, self.delayed, self._scene = names, measurement, delayed, scene
-        self.guess = np.array([get_parameter(scene, name) for name in names])
-        robot, n_fitted = scene.robot, len(names) + delayed
-        if measurement.commands.shape[1] != robot.n_limbs or max(measurement.nodes) >= robot.n_nodes:
-            raise ValueError(
-                f"Commands and nodes must be those of a robot of {robot.n_limbs} limbs and {robot.n_nodes} nodes."
-            )
-        if ORIENTATION in measurement.nodes and robot.body is None:
-            raise ValueError("An orientation is that of a body: give the scene a robot.body, or leave theta out.")
-        self.seen = np.isfinite(measurement.positions)
-        if self.seen.sum() <= n_fitted:
-            raise ValueError(f"{self.seen.sum()} coordinates are too few for {n_fitted} parameters.")
-        self._changes = DIFFERENCE * np.vstack([np.zeros(n_fitted), np.eye(n_fitted)])
-        per_node = np.nan_to_num(noise_of(measurement.positions)) / math.sqrt(len(measurement.nodes))
-        self._frame = np.array([per_node, per_node, per_node / robot.limb_length])  # its errors [m, m, rad]
-        self._simulate = lru_cache(maxsize=1)(self._trajectories)  # for residuals and Jacobian at once
-
-    def scenes(self, fitted: ArrayLike) -> list[Scene]:
-        """Scene with these parameters, and scenes in which one of what is fitted is changed a little."""
-        p = len(self.names)
-        values = self.guess * np.exp((np.asarray(fitted) - self._changes)[:, :p])
-        return [with_parameters(self._scene, self.names, row) for row in values]
-
-    def _delays(self, fitted: ArrayLike) -> Floats:
-        """Delays of these scenes [s]."""
-        return (np.asarray(fitted) - self._changes)[:, -1] if self.delayed else np.zeros(len(self._changes))
-
-    def _trajectories(self, *fitted: float) -> Floats:
-        return trajectories(self.scenes(fitted), self.measurement, self._delays(fitted))
-
-    def trajectory(self, fitted: Floats) -> Floats:
-        """Simulated positions [m], shape (n, n_nodes_seen, 2)."""
-        return np.asarray(self._simulate(*fitted)[0])
-
-    def likely_delay(self, largest: float) -> float:
-        """Delay up to `largest` by which the scene as it is fits best, of some that are DELAYS_APART [s]."""
-        delays = np.linspace(-largest, largest, 2 * math.ceil(largest / DELAYS_APART) + 1)[1:-1]
-        found = delayed_trajectories(self._scene, self.measurement, delays)
-        errors = np.nansum((found - self.measurement.positions) ** 2, axis=(1, 2, 3))
-        return float(delays[np.argmin(errors)])
-
-    def __call__(self, fitted: Floats) -> Floats:
-        """Residuals of the coordinates that were measured [m]; infinite where the simulation is impossible."""
-        try:
-            here = self.trajectory(fitted)
-        except ValueError:  # beyond what can be modelled: least_squares takes a shorter step
-            return np.full(self.seen.sum(), np.inf)
-        return self._less_frame(here, (here - self.measurement.positions)[self.seen])
-
-    def jacobian(self, fitted: Floats) -> Floats:
-        """Derivative of the residuals by what is fitted, shape (n_seen, p), or (n_seen, p + 1) with a delay."""
-        here, *changed = self._simulate(*fitted)
-        return self._less_frame(here, np.stack([(here - other)[self.seen] / DIFFERENCE for other in changed], axis=1))
-
-    def _less_frame(self, here: Floats, found: Floats) -> Floats:
-        """Residuals, shape (n_seen,), or their derivatives, (n_seen, p), without what an error of the frame explains.
-
-        It is the square root of their precision where the frame has errors of its own. here: Simulated positions.
-        """
-        finite = np.where(np.isfinite(found), found, np.inf)
-        if not self._frame.any() or not np.isfinite(finite).all():
-            return finite
-        axes = np.zeros((3, *here.shape))
-        placed = [node != ORIENTATION for node in self.measurement.nodes]
-        axes[0, :, placed, 0] = axes[1, :, placed, 1] = self._frame[0]
-        axes[2] = self._frame[2] * np.stack([-here[..., 1], here[..., 0]], axis=-1)
-        noise = self._frame[0] * math.sqrt(len(self.measurement.nodes))
-        U, s, _ = np.linalg.svd(axes[:, self.seen].T / noise, full_matrices=False)
-        share = (1.0 - 1.0 / np.sqrt(1.0 + s**2)).reshape(-1, *[1] * (found.ndim - 1))
-        return found - U @ (share * (U.T @ found))
-
-    def at(self, rows: Floats) -> tuple[Floats, Floats]:
-        """Residuals of several rows, shape (n, n_seen), and their derivatives, (n, n_seen, p); infinite and zero where
-        a simulation is impossible. All are simulated side by side."""
-        scenes, delays, possible = list[Scene](), list[Floats](), np.zeros(len(rows), bool)
-        for k, row in enumerate(rows):
-            with suppress(ValueError):
-                scenes += self.scenes(row)
-                delays.append(self._delays(row))
-                possible[k] = True
-        values = np.full((len(rows), self.seen.sum()), np.inf)
-        slopes = np.zeros((*values.shape, rows.shape[1]))
-        if possible.any():
-            found = trajectories(scenes, self.measurement, np.concatenate(delays))
-            found = found.reshape(-1, len(self._changes), *self.seen.shape)
-            here = found[:, 0, self.seen]
-            apart = np.moveaxis(here[:, None] - found[:, 1:, self.seen], 1, 2) / DIFFERENCE
-            for k, row in enumerate(np.flatnonzero(possible)):
-                values[row] = self._less_frame(found[k, 0], here[k] - self.measurement.positions[self.seen])
-                slopes[row] = self._less_frame(found[k, 0], apart[k])
-        return values, slopes
-
-
 def estimate_of(found: Found, confidence: float) -> Estimate:
     """Estimates with confidence intervals, from the end of a search."""
     from scipy.stats import t as student  # takes half a second
 
     fit, residuals = found.fit, found.residuals
-    assert isinstance(residuals, Residuals)
     names, guess, p = residuals.names, residuals.guess, len(residuals.names)
     freedom = residuals.seen.sum() - len(fit.x)
     times = residuals.measurement.time[np.nonzero(residuals.seen)[0]]

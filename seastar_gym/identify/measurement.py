@@ -28,7 +28,7 @@ from typing import Any, NamedTuple, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.files import write_lines
+from seastar_gym.files import read_numbers, read_table, write_lines
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import (
     as_finite,
@@ -41,7 +41,6 @@ from seastar_gym.scene.checks import (
     require_unmasked,
     shown,
 )
-from seastar_gym.scene.csv_rows import read_numbers, read_table
 from seastar_gym.scene.number import MISSING, at, numbers_of, with_numbers
 
 Floats = NDArray[np.float64]

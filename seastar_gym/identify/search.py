@@ -11,14 +11,18 @@ a scene that lacks something.
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
-from typing import Any, NamedTuple, Protocol
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
-from seastar_gym.identify.measurement import ORIENTATION, Measurement
+from seastar_gym.identify.measurement import ORIENTATION, Measurement, get_parameter, with_parameters
+from seastar_gym.identify.trajectories import delayed_trajectories, trajectories
+from seastar_gym.scene import Scene
 
 Floats = NDArray[np.float64]
 
@@ -44,22 +48,115 @@ LEAST_NOISE = 5e-4
 """Noise, over the length of a limb, below which errors of the simulation count more."""
 MOST_PERIODS, MOST_PAUSES = 3.0, 100.0
 """Longest times, in strokes, between pictures with which the strokes' motion is seen, and between commands."""
+DIFFERENCE = 1e-4
+"""Relative change of a parameter for a column of the Jacobian. Trajectories are accurate to about its square."""
+DELAYS_APART = 0.02
+"""Distance between delays that are tried for a first guess [s]."""
 LONGEST_PAUSE = 60.0
 """Longest time between the first picture and the first command [s]."""
 
 
-class Residual(Protocol):
-    """What is searched with, see `fit.Residuals`."""
+class Residuals:
+    """Simulated minus measured coordinates [m], as a function of the logarithms of parameters over their first guess.
 
-    names: tuple[str, ...]
-    measurement: Measurement
-    seen: NDArray[np.bool_]
+    names: Names of the p parameters.
+    guess: First guess of the parameters, shape (p,).
+    delayed: Whether a delay [s] follows the logarithms.
+    seen: Whether each coordinate was measured, shape (n, n_nodes_seen, 2).
+    """
 
-    def __call__(self, fitted: Floats) -> Floats: ...
+    def __init__(self, scene: Scene, names: tuple[str, ...], measurement: Measurement, delayed: bool = False):
+        self.names, self.measurement, self.delayed, self._scene = names, measurement, delayed, scene
+        self.guess = np.array([get_parameter(scene, name) for name in names])
+        robot, n_fitted = scene.robot, len(names) + delayed
+        if measurement.commands.shape[1] != robot.n_limbs or max(measurement.nodes) >= robot.n_nodes:
+            raise ValueError(
+                f"Commands and nodes must be those of a robot of {robot.n_limbs} limbs and {robot.n_nodes} nodes."
+            )
+        if ORIENTATION in measurement.nodes and robot.body is None:
+            raise ValueError("An orientation is that of a body: give the scene a robot.body, or leave theta out.")
+        self.seen = np.isfinite(measurement.positions)
+        if self.seen.sum() <= n_fitted:
+            raise ValueError(f"{self.seen.sum()} coordinates are too few for {n_fitted} parameters.")
+        self._changes = DIFFERENCE * np.vstack([np.zeros(n_fitted), np.eye(n_fitted)])
+        per_node = np.nan_to_num(noise_of(measurement.positions)) / math.sqrt(len(measurement.nodes))
+        self._frame = np.array([per_node, per_node, per_node / robot.limb_length])  # its errors [m, m, rad]
+        self._simulate = lru_cache(maxsize=1)(self._trajectories)  # for residuals and Jacobian at once
 
-    def jacobian(self, fitted: Floats) -> Floats: ...
+    def scenes(self, fitted: ArrayLike) -> list[Scene]:
+        """Scene with these parameters, and scenes in which one of what is fitted is changed a little."""
+        p = len(self.names)
+        values = self.guess * np.exp((np.asarray(fitted) - self._changes)[:, :p])
+        return [with_parameters(self._scene, self.names, row) for row in values]
 
-    def at(self, rows: Floats) -> tuple[Floats, Floats]: ...
+    def _delays(self, fitted: ArrayLike) -> Floats:
+        """Delays of these scenes [s]."""
+        return (np.asarray(fitted) - self._changes)[:, -1] if self.delayed else np.zeros(len(self._changes))
+
+    def _trajectories(self, *fitted: float) -> Floats:
+        return trajectories(self.scenes(fitted), self.measurement, self._delays(fitted))
+
+    def trajectory(self, fitted: Floats) -> Floats:
+        """Simulated positions [m], shape (n, n_nodes_seen, 2)."""
+        return np.asarray(self._simulate(*fitted)[0])
+
+    def likely_delay(self, largest: float) -> float:
+        """Delay up to `largest` by which the scene as it is fits best, of some that are DELAYS_APART [s]."""
+        delays = np.linspace(-largest, largest, 2 * math.ceil(largest / DELAYS_APART) + 1)[1:-1]
+        found = delayed_trajectories(self._scene, self.measurement, delays)
+        errors = np.nansum((found - self.measurement.positions) ** 2, axis=(1, 2, 3))
+        return float(delays[np.argmin(errors)])
+
+    def __call__(self, fitted: Floats) -> Floats:
+        """Residuals of the coordinates that were measured [m]; infinite where the simulation is impossible."""
+        try:
+            here = self.trajectory(fitted)
+        except ValueError:  # beyond what can be modelled: least_squares takes a shorter step
+            return np.full(self.seen.sum(), np.inf)
+        return self._less_frame(here, (here - self.measurement.positions)[self.seen])
+
+    def jacobian(self, fitted: Floats) -> Floats:
+        """Derivative of the residuals by what is fitted, shape (n_seen, p), or (n_seen, p + 1) with a delay."""
+        here, *changed = self._simulate(*fitted)
+        return self._less_frame(here, np.stack([(here - other)[self.seen] / DIFFERENCE for other in changed], axis=1))
+
+    def _less_frame(self, here: Floats, found: Floats) -> Floats:
+        """Residuals, shape (n_seen,), or their derivatives, (n_seen, p), without what an error of the frame explains.
+
+        It is the square root of their precision where the frame has errors of its own. here: Simulated positions.
+        """
+        finite = np.where(np.isfinite(found), found, np.inf)
+        if not self._frame.any() or not np.isfinite(finite).all():
+            return finite
+        axes = np.zeros((3, *here.shape))
+        placed = [node != ORIENTATION for node in self.measurement.nodes]
+        axes[0, :, placed, 0] = axes[1, :, placed, 1] = self._frame[0]
+        axes[2] = self._frame[2] * np.stack([-here[..., 1], here[..., 0]], axis=-1)
+        noise = self._frame[0] * math.sqrt(len(self.measurement.nodes))
+        U, s, _ = np.linalg.svd(axes[:, self.seen].T / noise, full_matrices=False)
+        share = (1.0 - 1.0 / np.sqrt(1.0 + s**2)).reshape(-1, *[1] * (found.ndim - 1))
+        return found - U @ (share * (U.T @ found))
+
+    def at(self, rows: Floats) -> tuple[Floats, Floats]:
+        """Residuals of several rows, shape (n, n_seen), and their derivatives, (n, n_seen, p); infinite and zero where
+        a simulation is impossible. All are simulated side by side."""
+        scenes, delays, possible = list[Scene](), list[Floats](), np.zeros(len(rows), bool)
+        for k, row in enumerate(rows):
+            with suppress(ValueError):
+                scenes += self.scenes(row)
+                delays.append(self._delays(row))
+                possible[k] = True
+        values = np.full((len(rows), self.seen.sum()), np.inf)
+        slopes = np.zeros((*values.shape, rows.shape[1]))
+        if possible.any():
+            found = trajectories(scenes, self.measurement, np.concatenate(delays))
+            found = found.reshape(-1, len(self._changes), *self.seen.shape)
+            here = found[:, 0, self.seen]
+            apart = np.moveaxis(here[:, None] - found[:, 1:, self.seen], 1, 2) / DIFFERENCE
+            for k, row in enumerate(np.flatnonzero(possible)):
+                values[row] = self._less_frame(found[k, 0], here[k] - self.measurement.positions[self.seen])
+                slopes[row] = self._less_frame(found[k, 0], apart[k])
+        return values, slopes
 
 
 class Found(NamedTuple):
@@ -71,7 +168,7 @@ class Found(NamedTuple):
     """
 
     fit: OptimizeResult
-    residuals: Residual
+    residuals: Residuals
     noise: float
     least: float
     left_out: int = 0
@@ -100,7 +197,7 @@ def noise_of(positions: Floats, order: int = 4) -> float:
 
 
 def search(
-    residuals_of: Callable[[Measurement], Residual],
+    residuals_of: Callable[[Measurement], Residuals],
     measurement: Measurement,
     period: float,
     start: Floats,
@@ -130,7 +227,7 @@ def search(
     return found
 
 
-def least(residuals: Residual, x: Floats, bound: Floats, *, prior: float = 0.0, **options: Any) -> OptimizeResult:
+def least(residuals: Residuals, x: Floats, bound: Floats, *, prior: float = 0.0, **options: Any) -> OptimizeResult:
     """Least residual near x. prior: Residual of each parameter that is twice its first guess, 0 for none [m]."""
     weights = np.diag(np.where(np.arange(len(x)) < len(residuals.names), prior / math.log(2.0), 0.0))
     options = {"xtol": 1e-6, "ftol": 1e-8, **options}
@@ -160,7 +257,7 @@ def beginning(measurement: Measurement, duration: float, period: float, margin: 
     )  # fmt: skip
 
 
-def without_outliers(residuals_of: Callable[[Measurement], Residual], found: Found, bound: Floats) -> Found:
+def without_outliers(residuals_of: Callable[[Measurement], Residuals], found: Found, bound: Floats) -> Found:
     """Fit of the points that a robust fit comes near to, if what is left fits as well as its noise; else as found."""
     robust = least(found.residuals, found.fit.x, bound, loss="soft_l1", f_scale=2.0 * np.fmax(found.noise, found.least))
     measured, table = found.residuals.measurement, np.zeros(found.residuals.seen.shape)
@@ -190,7 +287,7 @@ def least_of_others(found: Found, start: Floats, bound: Floats) -> Found:
     return found._replace(fit=best)
 
 
-def descended(residuals: Residual, rows: Floats, bound: Floats) -> tuple[Floats, Floats]:
+def descended(residuals: Residuals, rows: Floats, bound: Floats) -> tuple[Floats, Floats]:
     """Rows after some steps of Levenberg and Marquardt, all of them side by side, and their costs."""
     best, costs = rows.copy(), np.full(len(rows), np.inf)
     damping, steps = np.full(len(rows), 1e-2), np.zeros_like(rows)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,33 +87,27 @@ def delayed_trajectories(scene: Scene, measurement: Measurement, delays: Floats)
     return np.stack([motion(measurement.time - delay) for delay in delays])
 
 
-class Motion:
-    """Motion of tracked nodes, from which positions [m] follow at any time of the commands' clock [s].
-
-    times: Of known positions x [m] and velocities v [m/s], since the first command [s]; x[k] has shape (n_nodes, 2).
-    """
-
-    def __init__(self, begin: float, times: Floats, x: Floats, v: Floats, failed: bool):
-        self._begin, self._failed = begin, failed
-        self._spline = CubicHermiteSpline(times, x, v)
-
-    def __call__(self, time: Floats) -> Floats:
-        """Positions [m], shape (n, n_nodes, 2). Before the first command they are those at rest."""
-        found = self._spline(np.maximum(time - self._begin, 0.0))
-        return np.full_like(found, np.nan) if self._failed else np.asarray(found)
+Motion = Callable[[Floats], Floats]
+"""Function from times of the commands' clock [s], shape (n,), to positions of tracked nodes [m], (n, n_nodes, 2)."""
 
 
-class Interval(NamedTuple):
-    """A stretch of time. duration: [s]. command: Given at its beginning, shape (n_limbs,); None to coast."""
+def _motion(begin: float, times: Floats, x: Floats, v: Floats, failed: bool) -> Motion:
+    """Motion by known positions x [m] and velocities v [m/s], since the first command [s]; x[k] is (n_nodes, 2)."""
+    spline = CubicHermiteSpline(times, x, v)
 
-    duration: float
-    command: Floats | None
+    def positions(time: Floats) -> Floats:
+        found = spline(np.maximum(time - begin, 0.0))  # before the first command they are those at rest
+        return np.full_like(found, np.nan) if failed else np.asarray(found)
+
+    return positions
 
 
 def _intervals(
     scene: Scene, last: float, commands: Floats, command_times: Floats | None, delay: float
-) -> list[Interval]:
-    """Intervals between commands, until the last time [s] that was measured.
+) -> list[tuple[float, Floats | None]]:
+    """Lengths [s] of intervals between commands, until the last time [s] that was measured, and their commands.
+
+    A command has shape (n_limbs,), and is None to coast.
 
     delay: Of the clock that measured, see `batch_of_trajectories` [s].
     """
@@ -127,8 +120,8 @@ def _intervals(
     else:
         end = max(command_times[-1] + period, last - delay)
         lengths, coasting = np.diff(command_times, append=end).tolist(), 0.0
-    intervals = [Interval(length, command) for length, command in zip(lengths, commands, strict=True)]
-    return [*intervals, Interval(coasting, None)] if coasting > SHORTEST * scene.numerics.step else intervals
+    intervals = list[tuple[float, Floats | None]](zip(lengths, commands, strict=True))
+    return [*intervals, (coasting, None)] if coasting > SHORTEST * scene.numerics.step else intervals
 
 
 def _motions(
@@ -152,7 +145,7 @@ def _motions(
     x, v = (np.array(values) for values in zip(*seen, strict=True))
     begin = 0.0 if command_times is None else float(command_times[0])
     failed = enumerate(simulator.failed)
-    return [Motion(begin, np.array(times), x[:, k], v[:, k], bool(gave_up)) for k, gave_up in failed]
+    return [_motion(begin, np.array(times), x[:, k], v[:, k], bool(gave_up)) for k, gave_up in failed]
 
 
 def at_rest(scene: Scene, nodes: Sequence[int]) -> Floats:

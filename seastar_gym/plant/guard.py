@@ -16,7 +16,7 @@ import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Annotated
 
 import numpy as np
@@ -44,10 +44,23 @@ NOISES = 8.0
 """How many standard deviations of a camera two of its pictures may differ by."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Motion:
-    """How a robot can move in pictures.
+LATENESS = 0.03
+"""By how much lines to a plant may be late [s]: so much sooner may pulses follow each other there than here."""
+WIRE = ThermalSma()
+"""Whose numbers wires have unless somebody says others."""
 
+
+@dataclass(frozen=True)
+class Limits:
+    """What a guard allows, and how a robot can move in pictures.
+
+    longest_pulse: Longest pulse [s].
+    shortest_rest: Shortest time between the end of a wire's pulse and its next [s].
+    patience: Time without a new sighting after which sight is lost and wires are stopped [s].
+    oldest: Age of a picture beyond which sight is lost, too [s].
+    hottest: Temperature that no wire may pass [deg C], see `Heat`.
+    antagonists: Whether the wires + and - of a limb may be heated at once.
+    wire: Whose thermal numbers wires have; None: the scene's `ThermalSma`, or one of default numbers.
     fastest: Largest speed of the hub [m/s].
     fastest_turn: Largest rate at which the heading turns [rad/s].
     blur: How far apart two pictures may see a hub that lies still [m].
@@ -58,6 +71,14 @@ class Motion:
     still: Time within which a heated wire moves what is seen [s].
     """
 
+    longest_pulse: Annotated[float, positive("s")] = 0.12
+    shortest_rest: Annotated[float, not_negative("s")] = 0.1
+    patience: Annotated[float, positive("s")] = 0.12
+    oldest: Annotated[float, positive("s")] = 0.5
+    hottest: Annotated[float, finite("deg C")] = 100.0
+    antagonists: bool = False
+    wire: ThermalSma | None = None
+    _: KW_ONLY
     fastest: Annotated[float, positive("m/s")] = 0.3
     fastest_turn: Annotated[float, positive("rad/s")] = 3.0
     blur: Annotated[float, positive("m")] = 0.03
@@ -68,6 +89,12 @@ class Motion:
 
     def __post_init__(self) -> None:
         check_numbers(self, "Limits.")
+        require_flag("Limits.antagonists", self.antagonists)
+        if self.wire is not None:
+            require_kind("Limits.wire", self.wire, ThermalSma, "a ThermalSma")
+        water = np.max((self.wire or WIRE).water_temperature)
+        if self.hottest <= water:
+            raise ValueError(f"Limits.hottest must be above the water's {water:g} deg C, not {self.hottest:g}.")
         match self.tank:
             case None:
                 return
@@ -86,7 +113,7 @@ class Plausibility:
     span: Distance of the farthest point of the robot from its hub, at rest [m].
     """
 
-    def __init__(self, limits: Motion, n_limbs: int, span: float):
+    def __init__(self, limits: Limits, n_limbs: int, span: float):
         self._limits, self._span = limits, span
         self._directions = np.exp(2j * np.pi * np.arange(n_limbs) / n_limbs)
         self._heat = np.zeros((n_limbs, 2))  # of every wire since the pictures have changed [s]
@@ -178,47 +205,36 @@ def _is_same(seen: Sighting, other: Sighting) -> bool:
     )
 
 
-LATENESS = 0.03
-"""By how much lines to a plant may be late [s]: so much sooner may pulses follow each other there than here."""
 OVERTIME = 0.005
 """By how much a pulse may be too long before it is turned off [s]."""
 LONGEST_STEP = 0.1
 """Longest time between two looks that is believed [s], unless this computer's clock says that it has passed."""
 START = 0.5
 """Time that whoever heats or asks takes to start at least [s], for which wires of earlier drives have cooled."""
-WIRE = ThermalSma()
-"""Whose numbers wires have unless somebody says others."""
 ROUNDING = 1e-9
 
 
 class Heat:
-    """Heat of the wires + and - of every limb, shape (n_limbs, 2), and the limits of `Limits`.
+    """Heat of the wires + and - of every limb, shape (n_limbs, 2), within limits.
 
-    wire: Whose thermal numbers wires have. margin: By how much pulses may follow each other sooner [s] where they heat
-    than they do here. A wire is taken to cool no sooner than so long after its pulse.
+    margin: By how much pulses may follow each other sooner [s] where they heat than they do here: `LATENESS` for
+        whoever asks a plant. A wire is taken to cool no sooner than so long after its pulse. A plant itself demands
+        `LATENESS` less of rests, so that it takes what it was asked for in time.
 
     The clock of heat is that of the plant, but it stands still where that goes back, or on by more than `LONGEST_STEP`
     and than this computer's clock: no jump is a rest.
     """
 
-    def __init__(
-        self,
-        n_limbs: int,
-        wire: ThermalSma,
-        *,
-        hottest: float,
-        longest_pulse: float,
-        shortest_rest: float,
-        antagonists: bool,
-        margin: float = 0.0,
-    ):
+    def __init__(self, n_limbs: int, limits: Limits, margin: float = 0.0):
+        wire = limits.wire or WIRE
         self._steady = float(np.max(wire.steady_rise))
         self._water = float(np.max(wire.water_temperature))
         self._heats, self._cools = float(np.min(wire.time_constant)), float(np.max(wire.time_constant))
-        self._hottest, self._longest, self._shortest_rest = hottest, longest_pulse, shortest_rest
-        self._antagonists, self._margin = antagonists, margin
-        self._rise = np.full((n_limbs, 2), min(hottest - self._water, self._steady) * math.exp(-START / self._cools))
-        self._left, self._rested = np.zeros((n_limbs, 2)), np.full((n_limbs, 2), shortest_rest)
+        self._hottest, self._longest, self._antagonists = limits.hottest, limits.longest_pulse, limits.antagonists
+        self._shortest_rest, self._margin = max(limits.shortest_rest - LATENESS, 0.0) + margin, margin
+        rise = min(self._hottest - self._water, self._steady) * math.exp(-START / self._cools)
+        self._rise = np.full((n_limbs, 2), rise)
+        self._left, self._rested = np.zeros((n_limbs, 2)), np.full((n_limbs, 2), self._shortest_rest)
         self._clock, self._wall, self._passed = math.nan, time.monotonic(), 0.0
 
     def tick(self, now: float) -> None:
@@ -304,52 +320,6 @@ MOST_STOOD = 100
 """Waits after which a clock that has not moved stands still."""
 
 
-@dataclass(frozen=True)
-class Limits(Motion):
-    """What a guard allows, besides the `Motion` that it takes for possible.
-
-    longest_pulse: Longest pulse [s].
-    shortest_rest: Shortest time between the end of a wire's pulse and its next [s].
-    patience: Time without a new sighting after which sight is lost and wires are stopped [s].
-    oldest: Age of a picture beyond which sight is lost, too [s].
-    hottest: Temperature that no wire may pass [deg C], see `Heat`.
-    antagonists: Whether the wires + and - of a limb may be heated at once.
-    wire: Whose thermal numbers wires have; None: the scene's `ThermalSma`, or one of default numbers.
-    """
-
-    longest_pulse: Annotated[float, positive("s")] = 0.12
-    shortest_rest: Annotated[float, not_negative("s")] = 0.1
-    patience: Annotated[float, positive("s")] = 0.12
-    oldest: Annotated[float, positive("s")] = 0.5
-    hottest: Annotated[float, finite("deg C")] = 100.0
-    antagonists: bool = False
-    wire: ThermalSma | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_flag("Limits.antagonists", self.antagonists)
-        if self.wire is not None:
-            require_kind("Limits.wire", self.wire, ThermalSma, "a ThermalSma")
-        water = np.max((self.wire or WIRE).water_temperature)
-        if self.hottest <= water:
-            raise ValueError(f"Limits.hottest must be above the water's {water:g} deg C, not {self.hottest:g}.")
-
-    def heat(self, n_limbs: int, margin: float = 0.0) -> Heat:
-        """Heat of a robot's wires within these limits. margin: See `Heat`: `LATENESS` for whoever asks a plant.
-
-        A plant itself demands `LATENESS` less of rests, so that it takes what it was asked for in time.
-        """
-        return Heat(
-            n_limbs,
-            self.wire or WIRE,
-            hottest=self.hottest,
-            longest_pulse=self.longest_pulse,
-            shortest_rest=max(self.shortest_rest - LATENESS, 0.0) + margin,
-            antagonists=self.antagonists,
-            margin=margin,
-        )
-
-
 class Guard:
     """Watches a plant: every pulse and every sighting goes through it, and whatever is wrong stops all wires.
 
@@ -366,7 +336,7 @@ class Guard:
         self.plausibility = Plausibility(limits, self.n_limbs, span)
         self._judged_at = -np.inf  # when the last picture was taken that was looked at [s]
         self._clock, self._changed_at = plant.now(), plant.now()
-        self._heat = limits.heat(plant.n_limbs, LATENESS)
+        self._heat = Heat(plant.n_limbs, limits, LATENESS)
         self._heat.tick(self._clock)
         self._stood = 0  # waits in which the clock has not moved
 

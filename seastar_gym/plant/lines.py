@@ -20,7 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from seastar_gym.files import require_extra
-from seastar_gym.plant.guard import Limits
+from seastar_gym.plant.guard import Heat, Limits
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
 from seastar_gym.scene.checks import MOST_LIMBS, require_kind, shown
 
@@ -293,7 +293,7 @@ class Server:
         require_kind("limits", limits, Limits, "Limits")
         self.plant, self._wires = plant, Lines(wires)
         self._tracker = self._wires if tracker is None else Lines(tracker)
-        self._heat = limits.heat(plant.n_limbs)
+        self._heat = Heat(plant.n_limbs, limits)
         self._heard_at = self._turned_at = plant.now()
         self._is_late, self._greeted, self._told = False, False, -np.inf
         self._say_hello()

@@ -31,7 +31,7 @@ from seastar_gym.envs.seastar_swim import Observation, OneRobotEnv, RenderMode
 from seastar_gym.envs.sight import Sight, bounds_of, stations_seen
 from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.files import LineFile
-from seastar_gym.plant.guard import NOISES, Guard, Limits
+from seastar_gym.plant.guard import NOISES, Guard, Heat, Limits
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
 from seastar_gym.scene import Seastar
 from seastar_gym.scene.actuators.wires import ThermalSma
@@ -161,7 +161,7 @@ class PlantRobot(Robots):
         self._can_be_masked = True
         if limits.wire is None and isinstance(self.scene.actuator, ThermalSma):
             limits = replace(limits, wire=self.scene.actuator)
-        if (reached := limits.heat(1).from_cold(self.pulse)) > limits.hottest:
+        if (reached := Heat(1, limits).from_cold(self.pulse)) > limits.hottest:
             raise ValueError(
                 f"A full command heats a cold wire to {reached:.0f} deg C, the guard allows {limits.hottest:g} deg C: "
                 "use an actuator with a shorter heating_time, or other Limits."

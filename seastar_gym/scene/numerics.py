@@ -8,8 +8,7 @@ from typing import Annotated, Literal, NamedTuple, get_args
 from seastar_gym.scene.checks import require_choice, require_flag, require_number, shown
 from seastar_gym.scene.number import check_numbers, positive, whole, within
 from seastar_gym.scene.robot import NODES, Discretisation
-from seastar_gym.scene.serial import register_part
-from seastar_gym.scene.summary import html_table, short_repr
+from seastar_gym.scene.serial import html_table, register_part, short_repr
 
 SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
 SCHEME_NAMES: list[str] = [*get_args(SchemeName)]

@@ -15,15 +15,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene.body import Body
 from seastar_gym.scene.checks import MOST_LIMBS, require_choice, require_number, shown
-from seastar_gym.scene.limb import (
-    AlongLimb,
-    Limb,
-    LimbShape,
-    Stiffening,
-    limbs_that_may_touch,
-    rest_positions,
-    turn_per_hinge,
-)
+from seastar_gym.scene.limb import AlongLimb, Limb, LimbShape, Stiffening
 from seastar_gym.scene.number import (
     Numbers,
     UnnamedChoice,
@@ -39,7 +31,7 @@ from seastar_gym.scene.number import (
 )
 from seastar_gym.scene.section import Disc
 from seastar_gym.scene.serial import register_part
-from seastar_gym.scene.symmetry import PointGroup, point_group
+from seastar_gym.scene.shape import PointGroup, limbs_that_may_touch, point_group, rest_positions, turn_per_hinge
 
 HubHinge = Literal["opening", "turning"]
 Discretisation = Literal["chapter", "continuum"]

@@ -4,32 +4,45 @@ Each part checks itself, and a `Scene` checks the parts together. What cannot be
 that says why in one sentence. Those of the type `Numbers` may be arrays of shape (n_robots,), one for each robot
 of a batch.
 
-`Contact`: forces between limbs that touch each other or a body.
+`Contact`: forces between limbs that touch each other or a body. `load_scene`: a scene of a file of Python or JSON.
 """
 
 from __future__ import annotations
 
+import importlib
 import math
+import runpy
+import sys
+import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from operator import itemgetter
+from os import PathLike
+from pathlib import Path
 from typing import Annotated, Any, cast, get_args
 
 import numpy as np
 
+from seastar_gym.files import read_json
 from seastar_gym.scene.actuators.base import Actuator, check_actuator, complete, is_actuator
 from seastar_gym.scene.actuators.curves import SmaPulse
 from seastar_gym.scene.body import Body
-from seastar_gym.scene.checks import is_finite_number, require_choice, require_count, require_numbers, shown
-from seastar_gym.scene.limb import AlongLimb, cross_at_rest, n_hub_hinges, natural_hub_angle, turn_per_hinge
+from seastar_gym.scene.checks import (
+    is_finite_number,
+    require_choice,
+    require_count,
+    require_file,
+    require_numbers,
+    shown,
+)
+from seastar_gym.scene.limb import AlongLimb
 from seastar_gym.scene.number import Numbers, as_tuple, batch_size, check_numbers, chosen, make_floats, positive
 from seastar_gym.scene.numerics import DEFAULT, DEFAULT_FIDELITY, MAX_STEPS, PRESETS, Fidelity, Numerics
 from seastar_gym.scene.robot import Seastar
 from seastar_gym.scene.section import Disc
-from seastar_gym.scene.serial import from_dict, register_part, to_dict
-from seastar_gym.scene.summary import scene_html, short_repr
-from seastar_gym.scene.terms import is_term
+from seastar_gym.scene.serial import from_dict, is_term, register_part, scene_html, short_repr, to_dict
+from seastar_gym.scene.shape import cross_at_rest, n_hub_hinges, natural_hub_angle, touching_at_rest, turn_per_hinge
 from seastar_gym.scene.water import Water
 
 LARGEST_OVERLAP = 0.5
@@ -212,8 +225,6 @@ class Scene:
             )
 
     def _check_contact_with_body(self, body: Body, contact: Contact) -> None:
-        from seastar_gym.scene.at_rest import touching_at_rest  # few scenes need it
-
         robot, pairs = self.robot, self.robot.limbs_that_may_touch()
         for index in range(batch_size(robot) or 1):
             limbs = robot.limb_shapes(index)
@@ -412,3 +423,48 @@ def _span(numbers: Iterable[float]) -> str:
     found = sorted(numbers)
     ends = dict.fromkeys(f"{end:.4g}" for end in (found[0], found[-1]))
     return " to ".join(ends)
+
+
+def load_scene(file: str | PathLike[str] | None) -> Scene:
+    """Scene of a file of Python or JSON, the chapter's for none.
+
+    A file of Python is executed and defines `scene`; it may import modules of its folder and of the current one. One of
+    JSON is as `Scene.to_dict` writes it.
+    """
+    if file is None:
+        return Scene()
+    require_file("file", file)
+    file = Path(file)
+    if not file.is_file():
+        raise ValueError(f"{file} is no file.")
+    if file.suffix == ".json":
+        try:
+            return Scene.from_dict(read_json(file))
+        except ValueError as wrong:
+            raise ValueError(f"{file} is no scene: {str(wrong).rstrip('.')}.") from wrong
+    find_modules_in(file.parent, Path.cwd())
+    try:
+        found = runpy.run_path(str(file)).get("scene")
+    except SyntaxError as wrong:
+        raise ValueError(f"{file}, line {wrong.lineno}, is not Python: {wrong.msg}.") from wrong
+    except ValueError:
+        raise  # a sentence of ours, as of a robot without limbs
+    except Exception as wrong:  # the file is anybody's code
+        raise ValueError(f"{file}, {_line(wrong, file)}{type(wrong).__name__}: {str(wrong).rstrip('.')}.") from wrong
+    if not isinstance(found, Scene):
+        raise ValueError(f"{file} must define `scene`, a Scene.")
+    return found
+
+
+def find_modules_in(*folders: Path) -> None:
+    """Have modules of folders found, after all others."""
+    for folder in map(str, map(Path.absolute, folders)):
+        if folder not in sys.path:
+            sys.path.append(folder)
+            importlib.invalidate_caches()
+
+
+def _line(wrong: Exception, file: Path) -> str:
+    """Last line of a file at which something went wrong, as the beginning of a sentence."""
+    lines = [frame.lineno for frame in traceback.extract_tb(wrong.__traceback__) if frame.filename == str(file)]
+    return f"line {lines[-1]}: " if lines else ""

@@ -7,19 +7,23 @@ A part of a scene is a dict of its `kind` and its constructor's arguments. Those
 chooses them, are None. Arguments that are left out have their defaults. A tuple is a list, and numbers of each robot
 are a kind of their own. The outermost dict also has the `version` of this form. What could not be read back is refused
 when it is written. Reading constructs parts of registered classes only: it evaluates no text and imports nothing.
+
+Summaries fit a screen: a part as a line of Python, and a scene as a table for notebooks.
 """
 
+import html
 import inspect
 import json
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import MISSING, Field, fields, is_dataclass
 from typing import Any, TypeVar
 
 import numpy as np
 
 from seastar_gym.scene.checks import is_finite_number, require_few, require_unmasked, shown
-from seastar_gym.scene.number import MOST_ENTRIES, PerRobot, Unnamed
+from seastar_gym.scene.number import MOST_ENTRIES, PerRobot, Unnamed, declared
 
 VERSION = 1
 """Version of the plain form."""
@@ -169,3 +173,89 @@ def _made(kind: type, where: str, *arguments: Any, **fields: Any) -> Any:
         return kind(*arguments, **fields)
     except (TypeError, ArithmeticError) as unfit:
         raise ValueError(f"{where} is no {kind.__name__}: {' '.join(str(unfit).split()).rstrip('.')}.") from unfit
+
+
+Term = TypeVar("Term")
+
+FUNCTIONS = "energy", "dissipation"
+"""What a term may have, at least one of them."""
+
+
+def register_term(kind: type[Term]) -> type[Term]:
+    """Register a force of your own on the nodes of limbs, for `Scene(terms=(kind(...),))`. A decorator.
+
+    The class is a frozen dataclass, as for `register_part`, and has
+
+    coefficients(self, mesh): One number per node, shape (n_nodes,), or a tuple of such. `mesh.dl` is the length of
+        every node [m], `mesh.per_node(mesh.at_nodes.width)` its diameter [m]; see seastar_gym/rods/star.py.
+    dissipation(c, wx, wy): Static; a convex dissipation potential D [W] of a node's velocity relative to the water
+        [m/s], least at rest. The force is -grad D.
+    energy(c, x, y): Static; the energy U [J] of a node at (x, y) [m]. The force is -grad U.
+
+    One of the two is enough. Each returns (value, (slope in the first, in the second number), (second slopes xx, xy,
+    yy)) of c, a node's coefficients as `coefficients` gives them, with the operators and functions of
+    seastar_gym/lanes/registers.py alone; other functions that it calls are kernels (seastar_gym/lanes/compile.py).
+    isotropic = True in the class tells wrappers of symmetry that turns and mirrors do not change it.
+    """
+    has = [name for name in FUNCTIONS if callable(getattr(kind, name, None))] if isinstance(kind, type) else []
+    if not (has and callable(getattr(kind, "coefficients", None)) and is_dataclass(kind)):
+        raise ValueError(
+            f"A term is a frozen dataclass with coefficients(self, mesh) and a static energy(c, x, y) or "
+            f"dissipation(c, wx, wy), or both, which {shown(kind)} is not."
+        )
+    for name in has:
+        if not isinstance(vars(kind).get(name, None), staticmethod | None):
+            raise ValueError(f"{kind.__name__}.{name} must be a staticmethod: compiled code has no self.")
+    return register_part(kind)
+
+
+def is_term(value: Any) -> bool:
+    """Whether a value is of a class that `register_term` has registered."""
+    kind = type(value)
+    return KINDS.get(kind.__name__) is kind and any(hasattr(kind, name) for name in FUNCTIONS)
+
+
+def short_repr(part: Any) -> str:
+    """Call that makes a part, without arguments that have their defaults; values are cut where they are long."""
+    if isinstance(part, tuple) and part and all(map(is_dataclass, part)):
+        inner = [short_repr(one) for one in part]
+        return f"({inner[0]},) * {len(part)}" if len(part) > 1 and len(set(inner)) == 1 else f"({', '.join(inner)},)"
+    if not is_dataclass(part) or isinstance(part, type):
+        return shown(part)
+    named = [each.name for each in fields(part) if each.compare and not _is_usual(part, each)]
+    return f"{type(part).__name__}({', '.join(f'{name}={short_repr(getattr(part, name))}' for name in named)})"
+
+
+def _is_usual(part: Any, each: Field[Any]) -> bool:
+    """Whether a field has its default, or a value that nobody named."""
+    value = getattr(part, each.name)
+    usual = each.default if each.default_factory is MISSING else each.default_factory()
+    return isinstance(value, Unnamed) or bool(value == usual)
+
+
+def html_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table as HTML, with a title."""
+
+    def line(cells: Sequence[str], tag: str) -> str:
+        style = ' style="text-align: left; vertical-align: top"'
+        return "<tr>" + "".join(f"<{tag}{style}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+
+    lines = [line(heads, "th"), *(line(row, "td") for row in rows)]
+    return f"<table><caption>{html.escape(title)}</caption>{''.join(lines)}</table>"
+
+
+def scene_html(scene: Any) -> str:
+    """Parts of a scene with all numbers that are set, and their units, as a table."""
+    rows = [(each.name, *_kind_and_numbers(getattr(scene, each.name))) for each in fields(scene)]
+    return html_table(type(scene).__name__, ("part", "kind", "numbers"), [row for row in rows if row[2]])
+
+
+def _kind_and_numbers(part: Any) -> tuple[str, str]:
+    if not is_dataclass(part):
+        return "", "" if part in (None, ()) else short_repr(part)
+    units = {name: each.number.unit for name, each in declared(part.__class__).items()}
+    values = {each.name: getattr(part, each.name) for each in fields(part) if each.compare}
+    return type(part).__name__, ", ".join(
+        f"{name} {short_repr(value)}" + (f" {units[name]}" if units.get(name, "1") != "1" else "")
+        for name, value in values.items() if value is not None and value != ()
+    )  # fmt: skip

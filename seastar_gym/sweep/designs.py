@@ -20,9 +20,9 @@ import hashlib
 import itertools
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym import gaits
 from seastar_gym.controllers.contract import Policy, require_fit
 from seastar_gym.controllers.learned import load
-from seastar_gym.controllers.open_loop import scripted
+from seastar_gym.controllers.open_loop import GAITS, scripted
 from seastar_gym.controllers.registry import AGENTS, files_of, learned_file, load_agent
 from seastar_gym.envs.commands import checked_decision_period, decisions_in
 from seastar_gym.envs.paths import make_path
@@ -157,12 +157,8 @@ class Gait(NamedTuple):
     interval: float | None = None
 
 
-def _lagged(n_limbs: int) -> gaits.Floats:
-    return gaits.lagged_gait(DECISION, n_limbs)
-
-
-STROKES: dict[str, Callable[[int], gaits.Floats]] = {"straight": gaits.straight_gait}
-TIMED: dict[str, Callable[[int], gaits.Floats]] = {"lagged": _lagged, "thrifty": partial(gaits.thrifty_gait, DECISION)}
+TIMED = "lagged", "thrifty"
+"""Gaits in time."""
 
 
 def gait_of(what: str | ArrayLike, scene: Scene) -> Gait:
@@ -179,8 +175,8 @@ def gait_of(what: str | ArrayLike, scene: Scene) -> Gait:
     if what in TIMED:
         if not complete(scene.actuator).has_memory:
             raise ValueError(f'The gait "{what}" heats limbs in the middle of strokes: use an actuator like SmaWires.')
-        return Gait(_rows(TIMED[what](n_limbs)), DECISION)
-    return Gait(_rows(STROKES[what](n_limbs) if what in STROKES else _stroke(what, n_limbs)))
+        return Gait(_rows(GAITS[what](n_limbs, DECISION)), DECISION)
+    return Gait(_rows(gaits.straight_gait(n_limbs) if what == "straight" else _stroke(what, n_limbs)))
 
 
 def _rows(commands: gaits.Floats) -> tuple[tuple[float, ...], ...]:
@@ -193,7 +189,7 @@ def _stroke(text: str, n_limbs: int) -> gaits.Floats:
     for limb in text.split(","):
         number, sign = limb[:-1], limb[-1:]
         if sign not in ("+", "-") or not number.isdecimal() or not 1 <= int(number) <= n_limbs:
-            known = ", ".join([*STROKES, *TIMED])
+            known = ", ".join(["straight", *TIMED])
             raise ValueError(f"A gait is one of {known}, or limbs of {n_limbs} such as 1+,2-, not {shown(text)}.")
         command[0, int(number) - 1] = 1.0 if sign == "+" else -1.0
     return command
@@ -276,25 +272,18 @@ FORM = 2
 
 
 @dataclass(frozen=True)
-class Swim:
-    """How long robots swim. settling, measured: Intervals of a gait before and during the measurement."""
-
-    settling: int
-    measured: int
-
-
-@dataclass(frozen=True)
 class Configuration:
     """Scene and gait, or controller, of a lane batch, before its robots get their own numbers.
 
-    gait, swim: Of robots without a controller.
+    gait: Of robots without a controller. settling, measured: Its intervals before and during the measurement.
     labels: What was chosen, by the name of the axis: texts or numbers.
     controller: Controller, None for a gait.
     """
 
     scene: Scene
     gait: Gait
-    swim: Swim
+    settling: int
+    measured: int
     labels: tuple[tuple[str, Any], ...]
     controller: Controller | None = None
 
@@ -303,7 +292,8 @@ class Configuration:
         """All that results depend on except the numbers of robots, as JSON."""
         told = {"scene": self.scene.to_dict(), "labels": self.labels, "version": __version__, "form": FORM}
         if self.controller is None:
-            told |= {"commands": self.gait.commands, "interval": self.gait.interval, **asdict(self.swim)}
+            told |= {"commands": self.gait.commands, "interval": self.gait.interval}
+            told |= {"settling": self.settling, "measured": self.measured}
         else:
             told["pilot"] = asdict(self.controller)
         return json.dumps(told, sort_keys=True)
@@ -311,30 +301,12 @@ class Configuration:
     @property
     def intervals(self) -> int:
         """Intervals, such as strokes, that every robot swims; 0 for controllers, which end when they arrive."""
-        return self.swim.settling + self.swim.measured if self.controller is None else 0
+        return self.settling + self.measured if self.controller is None else 0
 
     @cached_property
     def digest(self) -> bytes:
         """SHA-256 of the text."""
         return hashlib.sha256(self.text.encode()).digest()
-
-
-def configuration_with(
-    scene: Scene, gait: Any, swim: Swim, choices: dict[str, tuple[Any, Any]], route: Route = Route()
-) -> Configuration:
-    """Configuration of a scene in which choices, (value, label) by the name of the axis, have replaced what was there.
-
-    route: What controllers swim.
-    """
-    values = {name: value for name, (value, _) in choices.items()}
-    try:
-        changed = scene_with(scene, values)
-        controller = controller_of(values["controller"], route, changed) if "controller" in values else None
-        chosen_gait = gait_of(values.get("gait", gait), changed) if controller is None else Gait(())
-    except TypeError as unfit:
-        raise ValueError(f"{shown(values)} do not fit the scene: {unfit}.") from None
-    labels = tuple((name, label) for name, (_, label) in choices.items())
-    return Configuration(changed, chosen_gait, swim, labels, controller)
 
 
 def scene_with(scene: Scene, values: dict[str, Any]) -> Scene:
@@ -500,11 +472,16 @@ class Sweep:
 
     def configuration(self, places: tuple[int, ...]) -> Configuration:
         """Configuration of one combination. places: Which value of every one of `of_configurations`."""
-        choices = {
-            axis.name: (axis.values[place], axis.labels[place])
-            for axis, place in zip(self.of_configurations, places, strict=True)
-        }
-        frame = configuration_with(self.scene, self.gait, Swim(self.settling, self.measured), choices, self.route)
+        chosen = list(zip(self.of_configurations, places, strict=True))
+        values = {axis.name: axis.values[place] for axis, place in chosen}
+        try:
+            scene = scene_with(self.scene, values)
+            controller = controller_of(values["controller"], self.route, scene) if "controller" in values else None
+            gait = gait_of(values.get("gait", self.gait), scene) if controller is None else Gait(())
+        except TypeError as unfit:
+            raise ValueError(f"{shown(values)} do not fit the scene: {unfit}.") from None
+        labels = tuple((axis.name, axis.labels[place]) for axis, place in chosen)
+        frame = Configuration(scene, gait, self.settling, self.measured, labels, controller)
         of_robots: tuple[Axis, ...] = (*self.ranges, *self.of_robots)
         missing = {axis.name for axis in of_robots} - set(numbers_of(frame.scene))
         if missing:

@@ -21,8 +21,7 @@ from seastar_gym.processors import processors
 from seastar_gym.scene.checks import require_choice, require_count, require_number
 from seastar_gym.sweep.designs import Batch, Range, Sweep
 from seastar_gym.sweep.executors import Outcome, Work, outcomes, sentence_of
-from seastar_gym.sweep.run import OnProgress, Progress, ResultFiles, result_file_of
-from seastar_gym.sweep.swimming import units_of
+from seastar_gym.sweep.run import OnProgress, Progress, ResultFiles, result_file_of, units_of
 
 if TYPE_CHECKING:
     import optuna

@@ -22,7 +22,7 @@ from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.numerics import PRESETS
-from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.scene.scene import load_scene
 
 SMALL_ROBOT = Seastar(limb_length=0.08)
 SCENE = Scene(SMALL_ROBOT)

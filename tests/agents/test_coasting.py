@@ -34,7 +34,9 @@ def batch(n_robots, **arguments):
 def test_it_foretells_where_other_robots_come_to_rest(fitted):
     env, simulator = batch(64), Simulator(SCENE, 64, threads=1)
     observations, _ = env.reset(seed=5)
-    assert np.abs(SCENE.robot.limb_length * fitted(observations)).max() < 2e-4  # who is at rest goes nowhere
+    assert (
+        np.abs(SCENE.robot.limb_length * ppo.coasted(fitted, observations)).max() < 2e-4
+    )  # who is at rest goes nowhere
     env.action_space.seed(6)
     for _ in range(7):
         observations, *_ = env.step(env.action_space.sample())
@@ -43,7 +45,7 @@ def test_it_foretells_where_other_robots_come_to_rest(fitted):
     moved = simulator.hub_position() - env.simulator.hub_position()
     heading = body_heading(env.simulator.positions, SCENE.robot)
     along = (moved * np.stack([np.cos(heading), np.sin(heading)], axis=1)).sum(axis=1)
-    foretold = SCENE.robot.limb_length * fitted(observations)
+    foretold = SCENE.robot.limb_length * ppo.coasted(fitted, observations)
     assert np.sqrt(np.mean(moved**2)) > 1e-3
     assert np.mean((foretold[:, 0] - along) ** 2) < 0.1 * np.mean(along**2)
     np.testing.assert_allclose(np.mean(foretold**2), np.mean(moved**2), rtol=0.2)

@@ -13,10 +13,9 @@ from gymnasium.vector import AutoresetMode
 from later import Later
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar, Sight, SmaWires, Water
-from seastar_gym.controllers import checkpoint
-from seastar_gym.controllers.checkpoint import load
+from seastar_gym.controllers import learned
 from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.learned import LearnedPolicy, pretrained
+from seastar_gym.controllers.learned import LearnedPolicy, load, pretrained
 from seastar_gym.envs.symmetry import VectorFrameStack
 from seastar_gym.evaluation.rollout import make_batch
 
@@ -32,7 +31,7 @@ OTHER = {
     "max_episode_time": 5.0,
 }  # fmt: skip
 """Hyperparameters."""
-POLICY, FACTS, TENSORS = checkpoint.DESCRIPTION, "learner.json", checkpoint.LEARNER
+POLICY, FACTS, TENSORS = learned.DESCRIPTION, "learner.json", learned.LEARNER
 """Entries of a file: the description, the learner's facts, and its tensors."""
 OTHER_SCENE = Scene(robot=Seastar(n_limbs=4, nodes_per_limb=4), fluid=Water(drag_coefficient=1.5), numerics=FAST)
 
@@ -253,11 +252,12 @@ def test_advice_is_the_teachers_own_action_whatever_the_student_turns(actions, s
     given = {"fidelity": "fast", "threads": 1, "num_envs": 16, "sight": Sight(delay=0.1)}
     robots = VectorFrameStack(ppo.make_training_batch(hyperparameters, "random", True, **given), 2)
     robots.reset(seed=0)
-    guide, elements = distillation.Teacher(teacher, robots.frame_stack.symmetry), set()
+    student, elements = robots.frame_stack.symmetry, set()
     for _ in range(8):
         state = robots.unwrapped.privileged_observations()
         theirs, _ = teacher.predict(state, deterministic=True)  # in the world
-        advice = np.argmax(guide.logits(state, robots.elements), axis=-1)  # as the student sees it
+        logits = distillation.advice(teacher, student, state, robots.elements)
+        advice = np.argmax(logits, axis=-1)  # as the student sees it
         advice = advice if actions == "limbs" else advice[:, 0]
         np.testing.assert_array_equal(robots.frame_stack.symmetry.restore(advice, robots.elements), theirs)
         elements |= set(robots.elements.tolist())
@@ -276,10 +276,10 @@ def test_a_student_learns_and_the_same_seed_learns_the_same(teacher):
     robots = batch(64)
     observations, _ = robots.reset(seed=7)
     symmetry, agreed = robots.frame_stack.symmetry, []
-    guide = distillation.Teacher(teacher, symmetry)
     for _ in range(20):
         chosen = first.logits(observations)[:, 0].argmax(axis=1)
-        advice = guide.logits(robots.unwrapped.privileged_observations(), robots.elements)[:, 0]
+        state = robots.unwrapped.privileged_observations()
+        advice = distillation.advice(teacher, symmetry, state, robots.elements)[:, 0]
         agreed.append(advice.argmax(axis=1) == chosen)
         observations, *_ = robots.step(chosen)
     assert np.mean(agreed) > 0.2  # by chance 1 of 21

@@ -18,23 +18,17 @@ from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.evaluation.rollout import make_batch, require_seen, swim_episodes
 from seastar_gym.evaluation.swim import swim
 
-command = Later("agents.tasks.command")
-learning = Later("agents.tasks.learning")
+tasks = Later("agents.tasks")
 ppo = Later("agents.ppo")
-
-
-def learning_env(id):
-    return learning.make_learning_env(id, learning.LEARNERS["PPO, memory"], "fast", 1)
 
 
 @pytest.mark.parametrize("id", ["SeastarFailBlind-v0", "SeastarObstTrap-v0", "SeastarMiswiredTimed-v0"])
 def test_a_policy_on_disk_remembers_as_its_learner_does(id, tmp_path):
     """Through episodes of several lengths side by side, whose past begins anew with each."""
-    task, _, period, *_ = TASKS[id]
-    model = ppo.make_model(learning_env(id), learning.hyperparameters(task, period), seed=0)
-    save(ppo.policy_of(model), tmp_path / "policy.safetensors")
+    model = tasks.new_model(id, 0, "fast", 1)
+    save(tasks.swims(ppo.policy_of(model), id), tmp_path / "policy.safetensors")
     policy = load(tmp_path / "policy.safetensors")
-    assert policy.description.past == 8 and policy.description.task == task
+    assert policy.description.past == 8 and policy.description.task == TASKS[id].task
     plain, inner = (
         make_batch(id, 5, split="test", fidelity="fast", threads=1, max_episode_steps=4, autoreset_mode="SameStep")
         for _ in range(2)
@@ -52,7 +46,7 @@ def test_a_policy_on_disk_remembers_as_its_learner_does(id, tmp_path):
 
 
 def test_a_memory_beneath_other_wrappers_is_described():
-    env = learning_env("SeastarFailBlind-v0")
+    env = tasks.new_model("SeastarFailBlind-v0", 0, "fast", 1).get_env()
     beneath = ppo.describe(type(env)(RecordEpisodeStatistics(env.env)), (64,))
     assert beneath == ppo.describe(env, (64,)) and beneath.past == 8
 
@@ -73,24 +67,24 @@ def test_a_policy_of_another_task_is_refused_with_observations_as_long_too():
 
 
 def test_the_command_trains_compares_seeds_and_writes_a_card(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr("agents.tasks.command.VALIDATION", 4)
-    monkeypatch.setattr("agents.tasks.command.EPISODES", 4)
+    monkeypatch.setattr("agents.tasks.VALIDATION", 4)
+    monkeypatch.setattr("agents.tasks.EPISODES", 4)
     done = ["--tasks", "SeastarPrey-v0", "--seeds", "0", "1", "--decisions", "8192", "--out", str(tmp_path)]
-    assert command.main([*done, "--num-threads", "1"]) == 0
+    assert tasks.main([*done, "--num-threads", "1"]) == 0
     policy = load(tmp_path / "prey.safetensors")
     assert policy.training["seeds"] == [0, 1] and policy.training["id"] == "SeastarPrey-v0"
     card = (tmp_path / "prey.md").read_text(encoding="utf-8")
     assert "| `fast` |" in card and "prey caught" in card and "the best of seeds 0, 1" in card
     assert capsys.readouterr().out.count("mean return") == 2
     with pytest.raises(SystemExit):
-        command.main(["--tasks", "SeastarSwim-v0"])
+        tasks.main(["--tasks", "SeastarSwim-v0"])
     assert "has no bundled policy" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("id", TASKS)
 def test_the_box_has_a_policy_of_every_task_that_is_kept(id):
     """With the card of its weights, found by its name, and better than a robot at rest."""
-    file = command.file_of(id, learned.TASKS)
+    file = tasks.file_of(id, learned.TASKS)
     policy, card = load(file), file.with_suffix(".md").read_text(encoding="utf-8")
     assert hashlib.sha256(file.read_bytes()).hexdigest() in card and f"{policy.training['strokes']:,}" in card
     env = gym.make(id, fidelity="fast").unwrapped

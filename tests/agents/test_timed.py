@@ -9,7 +9,7 @@ from seastar_gym import Simulator
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.controllers.open_loop import scripted
-from seastar_gym.controllers.planner import Budget, Planner
+from seastar_gym.controllers.search import Budget, Planner
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv

@@ -12,8 +12,8 @@ from PIL import Image
 
 from seastar_gym import Scene, Seastar, Sight
 from seastar_gym.cli import compile, played, screen
-from seastar_gym.cli.keys import Steering, known_keys, typed
 from seastar_gym.cli.main import COMMANDS, main
+from seastar_gym.cli.play import Steering, known_keys, typed
 from seastar_gym.controllers.open_loop import GAITS
 from seastar_gym.controllers.registry import AGENTS
 from seastar_gym.envs.paths import PATHS
@@ -303,9 +303,7 @@ def test_policies_are_exported(folder, monkeypatch, capsys):
 
 
 def test_training_runs_the_checkout_s_own_script_and_says_where_there_is_none(folder, monkeypatch, capsys):
-    from seastar_gym.cli import train
-
-    monkeypatch.setattr(train, "__file__", str(folder / "lib" / "seastar_gym" / "cli" / "train.py"))
+    monkeypatch.setattr("seastar_gym.cli.main.__file__", str(folder / "lib" / "seastar_gym" / "cli" / "main.py"))
     assert main(["train"]) == 2
     assert "Training needs a checkout" in capsys.readouterr().err
     (folder / "agents").mkdir()

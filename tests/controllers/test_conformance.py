@@ -16,8 +16,8 @@ from seastar_gym.controllers import registry
 from seastar_gym.controllers.contract import actions_of, require_fit
 from seastar_gym.controllers.learned import by_name, load
 from seastar_gym.controllers.open_loop import GAITS, RandomPolicy, scripted
-from seastar_gym.controllers.planner import Budget, Planner, gait_planner
 from seastar_gym.controllers.registry import load_agents
+from seastar_gym.controllers.search import Budget, Planner, gait_planner
 from seastar_gym.envs.commands import action_space, to_commands
 from seastar_gym.envs.tasks import NAMED
 from seastar_gym.evaluation.swim import swim_many

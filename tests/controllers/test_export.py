@@ -16,8 +16,7 @@ from seastar_gym import Body, Limb, Numerics, Scene, Seastar, SmaWires
 from seastar_gym.cli.export import load_policy
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.export.c_code import CODE, to_c
-from seastar_gym.controllers.export.onnx_graph import to_onnx
+from seastar_gym.controllers.export import CODE, to_c, to_onnx
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.layout import VELOCITY_SCALE, Layout

@@ -150,7 +150,7 @@ CHANGED = [
     ({"actions": "continuous"}, "actions must be one of"),
     *(({"hidden": widths}, "its weights have the shapes ") for widths in ([16, 9], [])),
     *(({"hidden": widths}, "a width of its hidden layers must be a whole number") for widths in ([0], [10**6 + 1])),
-    ({"hidden": "wide"}, "hidden must be a list of widths"),
+    ({"hidden": "wide"}, "hidden must be a tuple of widths"),
     ({"scene": {"robot": {"n_arms": 5}}}, "a dict with a version"),
     ({"symmetry": "False"}, "symmetry must be true or false, not 'False'"),
     ({"decision_period": 0.5}, "decision_period"),

@@ -19,14 +19,11 @@ import seastar_gym
 from later import Later
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar
-from seastar_gym.controllers import checkpoint
 from seastar_gym.controllers import registry as third_party
 from seastar_gym.controllers.contract import actions_of, observed, require_fit, require_policy, starts
 from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.greedy import GreedyPolicy
-from seastar_gym.controllers.learned import BUNDLED, bundled_file, by_name, of_task, pretrained
+from seastar_gym.controllers.learned import BUNDLED, bundled_file, by_name, load, of_task, pretrained
 from seastar_gym.controllers.open_loop import OpenLoopPolicy, RandomPolicy, scripted
-from seastar_gym.controllers.planner import Planner
 from seastar_gym.controllers.registry import (
     AGENTS,
     RobotByRobot,
@@ -36,6 +33,7 @@ from seastar_gym.controllers.registry import (
     load_agent,
     load_agents,
 )
+from seastar_gym.controllers.search import GreedyPolicy, Planner
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.swim import swim, swim_many
 
@@ -174,10 +172,10 @@ def test_policies_have_names_and_files(monkeypatch):
     assert pretrained().decision_period == 1.0
     assert load_agents(["timed-0.2s"], decision_period=0.2)["timed-0.2s"].decision_period == 0.2
     monkeypatch.setattr("seastar_gym.controllers.registry.is_model", lambda file: False)
-    monkeypatch.setattr("seastar_gym.controllers.checkpoint.load", lambda file: file)
     monkeypatch.setattr("seastar_gym.controllers.learned.load", lambda file: file)
     named = load_agents(["best.zip", "runs/last.safetensors", "runs/best.zip"])
-    assert named == {"best": "best.zip", "last": "runs/last.safetensors", "runs/best": "runs/best.zip"}
+    files = {"best": "best.zip", "last": "runs/last.safetensors", "runs/best": "runs/best.zip"}
+    assert named == {label: Path(file) for label, file in files.items()}
 
 
 # Zips: models of Stable-Baselines3, which are unpickled, and those of this project, which are not.
@@ -219,7 +217,7 @@ def test_a_zip_that_is_no_model_is_refused_in_a_sentence_and_ours_is_not_unpickl
         damage()
         assert not third_party.is_model(file)
         with pytest.raises(error, match=r"model\.zip.*\.$"):
-            checkpoint.load(file)
+            load(file)
 
 
 def test_a_damaged_model_is_refused_in_a_sentence(tmp_path):

@@ -5,8 +5,8 @@ import pytest
 
 from seastar_gym import Scene
 from seastar_gym.cli.main import main
-from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.open_loop import scripted
+from seastar_gym.controllers.search import GreedyPolicy
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import SwimOptions, make_scene
 from seastar_gym.envs.robots import Robots

@@ -20,7 +20,7 @@ def main() -> int:
     fate, at, folder, *arguments = sys.argv[1:]
     sys.path.insert(0, str(Path(__file__).parents[2]))
     import train  # takes seconds, and touches no file of the folder
-    from agents.training import options
+    from agents import options
 
     options.TIME_LIMIT = SECONDS
 

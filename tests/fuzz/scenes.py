@@ -44,9 +44,9 @@ from seastar_gym import (
     Water,
 )
 from seastar_gym.scene.actuators.base import Actuator
-from seastar_gym.scene.limb import n_hub_hinges, natural_hub_angle
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.robot import Discretisation, HubHinge
+from seastar_gym.scene.shape import n_hub_hinges, natural_hub_angle
 from seastar_gym.scene.water import AnyCurrent
 from seastar_gym.simulator.state import best_fit_heading
 

@@ -24,7 +24,7 @@ pytest.importorskip("tensorboard", reason="train.py writes its log for TensorBoa
 from fuzz.killed_training import SECONDS
 from later import Later
 from seastar_gym.controllers import learned as policies
-from seastar_gym.controllers.checkpoint import load
+from seastar_gym.controllers.learned import load
 from seastar_gym.evaluation.report.charts import read_progress
 
 train = Later("train")
@@ -40,7 +40,7 @@ TINY = shlex.split(
 @pytest.fixture(scope="module", autouse=True)
 def short_swims():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("agents.training.options.TIME_LIMIT", SECONDS)
+        patch.setattr("agents.options.TIME_LIMIT", SECONDS)
         yield
 
 

@@ -34,12 +34,12 @@ from seastar_gym import (
 from seastar_gym.identify import Measurement, get_parameter, identify, synthetic, trajectory, with_parameters
 from seastar_gym.identify import command as its_command
 from seastar_gym.identify.command import main
-from seastar_gym.identify.fit import Residuals, estimate_of
+from seastar_gym.identify.fit import estimate_of
 from seastar_gym.identify.measurement import uncertainty_of
-from seastar_gym.identify.search import Found
+from seastar_gym.identify.search import Found, Residuals
 from seastar_gym.identify.trajectories import batch_of_trajectories, trajectories
 from seastar_gym.scene.number import numbers_of
-from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.scene.scene import load_scene
 
 stats = Later("scipy.stats")
 

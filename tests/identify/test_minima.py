@@ -58,7 +58,7 @@ def test_points_that_were_taken_for_others_are_left_out():
 
 
 def test_a_scene_that_lacks_something_is_told_and_its_intervals_are_not_trained_on(tmp_path):
-    from agents.training.run import read_intervals
+    from agents.run import read_intervals
 
     seen, some = track(replace(RINGING, limb_strengths=(0.5, 1.0, 1.0)), n_strokes=2), NAMES[::2]
     found = identify(RINGING, some, seen)

@@ -9,8 +9,8 @@ import pytest
 from refusals import assert_refused
 from seastar_gym import Body, Limb, MeasuredCurve, Numerics, Scene, Seastar, Water
 from seastar_gym.identify import Measurement, get_parameter, identify, synthetic, trajectory, with_parameters
-from seastar_gym.identify.fit import Residuals
 from seastar_gym.identify.measurement import ARM, ORIENTATION
+from seastar_gym.identify.search import Residuals
 
 SCENE = Scene(Seastar(nodes_per_limb=4), numerics=Numerics("implicit-midpoint", 0.02, newton_tolerance=1e-6))
 TRUTH = {"actuator.peak_angle": 0.5, "fluid.drag_coefficient": 1.2}

@@ -15,8 +15,7 @@ from seastar_gym.cli.main import main
 from seastar_gym.identify import Measurement, identify, trajectory, with_parameters
 from seastar_gym.identify.measurement import ORIENTATION, pointer
 from seastar_gym.identify.tracks import Track, read_deeplabcut, read_motive, read_sleap, read_table
-from seastar_gym.identify.tracks.plane import homography, mapped, read_homography, turned
-from seastar_gym.identify.tracks.track import Seen, from_rest, seen_nodes
+from seastar_gym.identify.tracks.track import Seen, from_rest, homography, mapped, read_homography, seen_nodes, turned
 
 POSE = "time,x,y,theta\n0,0.1,0.2,0.3\n0.033,,,\n0.067,nan,NaN,nan\n0.1,0.11,0.2,0.31\n"
 DEEPLABCUT = """\

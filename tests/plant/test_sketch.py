@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from faults import COLD_WITHIN, LIES, Heated, garbage, greedy
-from seastar_gym.plant.guard import LATENESS, Limits
+from seastar_gym.plant.guard import LATENESS, Heat, Limits
 from seastar_gym.plant.lines import LinePlant, sealed
 
 pytestmark = pytest.mark.skipif(
@@ -104,7 +104,7 @@ def test_pulses_heat_their_wires_for_their_time(wires):
 def held(rng, milliseconds):
     """Events of a driver with a guard that holds the heat, and whose lines are late."""
     limits, events, sent = Limits(), [("say", sealed("hello 1")), ("go", 20)], []
-    heat, time = limits.heat(5, LATENESS), 0
+    heat, time = Heat(5, limits, LATENESS), 0
     while time < milliseconds:
         pulse = int(rng.choice([120, 100, 50]))
         free = ~heat.resting(pulse / 1000.0) & (rng.random((5, 2)) < 0.7)

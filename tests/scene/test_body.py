@@ -9,7 +9,7 @@ import pytest
 from seastar_gym import Attachment, Body, Limb, Scene, Seastar, Water
 from seastar_gym.model import make_rods
 from seastar_gym.scene.body import Outline, is_convex
-from seastar_gym.scene.limb import lines_cross
+from seastar_gym.scene.shape import lines_cross
 
 TRIANGLE = ((0.03, -0.01), (-0.01, 0.02), (-0.02, -0.02))
 HEXAGON = tuple((0.02 * math.cos(a), 0.02 * math.sin(a)) for a in np.arange(6) * math.pi / 3.0)

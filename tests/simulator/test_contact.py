@@ -14,8 +14,8 @@ from hubs import TEN
 from seastar_gym import Attachment, Body, Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Strip, Water
 from seastar_gym.model import make_mesh, make_rods
 from seastar_gym.rods.contact.forces import tapered
-from seastar_gym.scene.limb import rest_positions
 from seastar_gym.scene.scene import LARGEST_OVERLAP
+from seastar_gym.scene.shape import rest_positions
 from seastar_gym.simulator.report import report_of_pieces
 from simulator.test_conservation import CURLED
 from strokes import finished

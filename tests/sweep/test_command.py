@@ -13,9 +13,9 @@ from seastar_gym.command import INTERRUPTED
 from seastar_gym.scene import Scene, Seastar
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.scene.serial import to_dict
-from seastar_gym.sweep.command import as_text, main
+from seastar_gym.sweep.command import as_text, axis_of, main
 from seastar_gym.sweep.designs import Choices, Range
-from seastar_gym.sweep.run import Progress, ResultFiles, axis_of, read_results
+from seastar_gym.sweep.run import Progress, ResultFiles, read_results
 
 ROOT = Path(__file__).resolve().parents[2]
 SEVEN = Seastar(n_limbs=7)

@@ -18,8 +18,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.sweep.command import main
 from seastar_gym.sweep.designs import Choices, Route, Sweep
 from seastar_gym.sweep.executors import Processes
-from seastar_gym.sweep.run import ResultFiles, read_results, result_file_of, run
-from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS, swim
+from seastar_gym.sweep.run import OF_CONTROLLERS, UNITS, ResultFiles, read_results, result_file_of, run, swim
 
 TESTS = Path(__file__).resolve().parents[1]
 FAST = Scene.preset("fast")

@@ -12,7 +12,7 @@ from seastar_gym.scene import Limb, Numerics, Scene, Seastar, SmaPulse
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.simulator import Simulator
 from seastar_gym.sweep.designs import Batch, Choices, Range, Sweep, gait_of
-from seastar_gym.sweep.swimming import REFUSED, UNITS, swim, ways
+from seastar_gym.sweep.run import REFUSED, UNITS, swim, ways
 
 FAST = Scene.preset("fast")
 LENGTH = Range("robot.limb_length", 0.05, 0.15)

@@ -6,8 +6,8 @@ import numpy as np
 
 from refusals import assert_refused
 from seastar_gym.scene import Scene, Seastar, SmaPulse
+from seastar_gym.sweep.command import axis_of
 from seastar_gym.sweep.designs import Choices, Range, Route, Sweep, gait_of
-from seastar_gym.sweep.run import axis_of
 
 FAST = Scene.preset("fast")
 LENGTH = Range("robot.limb_length", 0.05, 0.15)

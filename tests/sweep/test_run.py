@@ -19,8 +19,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.sweep.command import as_text
 from seastar_gym.sweep.designs import Choices, Range, Sweep
 from seastar_gym.sweep.executors import Outcome, Processes, RayTasks, SlurmJobs, dask_client, outcomes
-from seastar_gym.sweep.run import ATTEMPTS, ResultFiles, read_results, result_file_of, run
-from seastar_gym.sweep.swimming import swim
+from seastar_gym.sweep.run import ATTEMPTS, ResultFiles, read_results, result_file_of, run, swim
 
 ROOT = Path(__file__).resolve().parents[2]
 

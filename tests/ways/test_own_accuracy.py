@@ -19,7 +19,7 @@ import gymnasium as gym
 import seastar_gym
 from seastar_gym import Certificate, Scene, scene_for
 from seastar_gym.controllers.learned import load
-from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.scene.scene import load_scene
 
 certificate, policy = Certificate.load("certificate.json"), load("runs/mine/policy.safetensors")
 scene = scene_for({error}, certificate="certificate.json")

@@ -19,7 +19,7 @@ from seastar_gym.envs.layout import Layout
 from seastar_gym.scene import Scene, checks
 from seastar_gym.scene.actuators.base import Actuator, Mirror, complete, is_actuator
 from seastar_gym.scene.checks import MOST_LIMBS, is_whole_number, require_choice, require_count, require_kind, shown
-from seastar_gym.scene.symmetry import SAME, PointGroup
+from seastar_gym.scene.shape import SAME, PointGroup
 
 Elements = NDArray[np.intp]
 Group = int | PointGroup

@@ -20,7 +20,7 @@ from seastar_gym.envs.symmetry.symmetry import FrameStack, Symmetry, memory_mirr
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.base import Mirror, complete
 from seastar_gym.scene.checks import require_kind
-from seastar_gym.scene.symmetry import PointGroup
+from seastar_gym.scene.shape import PointGroup
 
 if TYPE_CHECKING:
     _VectorWrapper = gym.vector.VectorWrapper[Any, Any, Any, Any, Any]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.evaluation.pictures import COLOURS, FAINT_INK, FLOW, INK, MM, PLANNED, STROKES_PER_DOT, flow_in, view
 from seastar_gym.evaluation.swim import Swim
-from seastar_gym.scene.csv_rows import read_rows
+from seastar_gym.files import read_rows
 from seastar_gym.scene.water import AnyCurrent
 
 Floats = NDArray[np.float64]

@@ -18,42 +18,27 @@ something was not seen have empty fields.
 
 import argparse
 from collections.abc import Callable, Sequence
+from inspect import signature
+from itertools import chain
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from seastar_gym.command import DEFAULT, answered, command_parser
+from seastar_gym.files import UNITS
 from seastar_gym.identify.measurement import write_trajectory
-from seastar_gym.identify.tracks.motive import read_motive
-from seastar_gym.identify.tracks.table import LENGTHS, read_table
+from seastar_gym.identify.tracks.table import LENGTHS, read_motive, read_table
 from seastar_gym.identify.tracks.track import Track
 from seastar_gym.identify.tracks.videos import read_deeplabcut, read_sleap
-from seastar_gym.scene.csv_rows import UNITS
-from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.scene.scene import load_scene
 
 Options = argparse.Namespace
 
 
-class Format(NamedTuple):
-    """Reader of a format, and the options that it takes."""
-
-    read: Callable[..., Track]
-    options: tuple[str, ...]
-
-
-OF_TEXT, OF_VIDEOS = ("separator", "decimal"), ("rate", "individual", "likelihood")
-TABLE = Format(read_table, (
-    "x", "y", "theta", "time", "time_unit", "unit", "degrees", "y_down", "rate", "score", "likelihood", "only", "skip",
-    "headers", *OF_TEXT,
-))  # fmt: skip
-FORMATS = {
-    "table": TABLE,
-    "deeplabcut": Format(read_deeplabcut, (*OF_VIDEOS, *OF_TEXT)),
-    "sleap": Format(read_sleap, (*OF_VIDEOS, *OF_TEXT)),
-    "motive": Format(read_motive, ("up",)),
-}
-"""Formats by their names."""
+FORMATS: dict[str, Callable[..., Track]] = {
+    "table": read_table, "deeplabcut": read_deeplabcut, "sleap": read_sleap, "motive": read_motive
+}  # fmt: skip
+"""Readers of formats by their names; the options of a format are its reader's arguments."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -109,14 +94,15 @@ def pairs(option: str, texts: Sequence[str] | None) -> dict[str, str] | None:
 
 def read(options: Options) -> Track:
     """Track of the file, as it is there."""
-    chosen, given = FORMATS[options.format], vars(options) | {"only": pairs("--only", options.only)}
-    every = {name for each in FORMATS.values() for name in each.options}
-    unused = [name for name in sorted(every - {*chosen.options}) if given[name] is not None]
+    taken = {name: list(signature(reader).parameters)[1:] for name, reader in FORMATS.items()}
+    given = vars(options) | {"only": pairs("--only", options.only)}
+    unused = [name for name in sorted({*chain(*taken.values())} - {*taken[options.format]}) if given[name] is not None]
     if unused:
         raise ValueError(f"Files of {options.format} have no use for --{unused[0].replace('_', '-')}.")
     if options.rate is None and options.format in ("deeplabcut", "sleap"):
         raise ValueError(f"Files of {options.format} have no times: give --rate, pictures per second.")
-    return chosen.read(options.file, **{name: given[name] for name in chosen.options if given[name] is not None})
+    asked = {name: given[name] for name in taken[options.format] if given[name] is not None}
+    return FORMATS[options.format](options.file, **asked)
 
 
 def begun(track: Track, options: Options) -> Track:

@@ -129,21 +129,15 @@ class Adapted(ActuatorBase):
     def __init__(self, own: Actuator):
         self.own = own
 
+    def __getattribute__(self, name: str) -> Any:
+        """What the actuator has of this name, or else the base."""
+        if name != "own" and not name.startswith("_") and hasattr(self.own, name):
+            return getattr(self.own, name)
+        return super().__getattribute__(name)
+
     @property
     def has_memory(self) -> bool:
         return all(hasattr(self.own, name) for name in ("rest", "respond", "observe"))
-
-
-def _own_or_base(name: str) -> property:
-    def answer(self: Adapted) -> Any:
-        return getattr(self.own if hasattr(self.own, name) else super(Adapted, self), name)
-
-    return property(answer)
-
-
-for _name in {name for kind in (Actuator, ActuatorBase) for name in vars(kind) if not name.startswith("_")}:
-    if _name not in vars(Adapted):
-        setattr(Adapted, _name, _own_or_base(_name))
 
 
 def complete(actuator: Actuator) -> ActuatorBase:

@@ -15,6 +15,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.files import MOST_ROWS, UNITS, read_named_numbers, read_numbers, unit_of
 from seastar_gym.scene.actuators.base import (
     WIRE_POWER,
     Actuator,
@@ -69,7 +70,7 @@ class SmaPulse(HeatingAndCooling, ActuatorBase):
     peak_angle: Largest rotation [rad].
     heating_time: Delta t_1 [s].
     cooling_time: Delta t_2 [s].
-    heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
+    heating_power: Electric power of a heated wire [W], an assumption, see `base.WIRE_POWER`.
     """
 
     peak_angle: Annotated[Numbers, not_negative("rad")] = math.pi / 5
@@ -103,7 +104,7 @@ class MeasuredCurve(ActuatorBase):
     angles: Rotation by command 1 at those times [rad]. It is 0 at both ends, to a thousandth of the largest, so that
         limbs do not jump when their command changes.
     scale: Factor of the angles [1].
-    heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
+    heating_power: Electric power of a heated wire [W], an assumption, see `base.WIRE_POWER`.
     """
 
     times: tuple[float, ...]
@@ -142,8 +143,6 @@ class MeasuredCurve(ActuatorBase):
             raise FileNotFoundError(f"There is no measured curve at {file}: give the path of a CSV file.")
         require_flag("detrend", detrend)
         require_number("thin", thin, "rad", zero_allowed=True)
-        from seastar_gym.scene.csv_rows import MOST_ROWS, read_named_numbers  # only files need it
-
         most = MOST_ROWS if thin else MOST_ENTRIES
         names, lines = read_named_numbers(file, "a time [s] and an angle [rad]", 2, most)
         try:
@@ -169,8 +168,6 @@ class MeasuredCurve(ActuatorBase):
         """
         require_number("period", period, "s")
         require_number("limb_length", limb_length, "m")
-        from seastar_gym.scene.csv_rows import read_numbers  # only files need it
-
         lines = read_numbers(file, "a phase [1] and a curvature [1/m]", 2, MOST_ENTRIES)
         phases, curvatures = np.array([line for line in lines if line[0] != 1.0] or lines).T
         if phases[0] != 0.0 or phases[-1] >= 1.0 or (np.diff(phases) <= 0.0).any():
@@ -209,8 +206,6 @@ class MeasuredCurve(ActuatorBase):
 
 def _in_units(names: tuple[str, ...], columns: Floats) -> Floats:
     """Times [s] and angles [rad], shape (2, n), of columns in any order whose names may end with a unit."""
-    from seastar_gym.scene.csv_rows import UNITS, unit_of
-
     found: dict[str, Floats] = {}
     for default, name, numbers in zip(("time", "angle"), names or ("", ""), columns, strict=True):
         unit, known = unit_of(name), ("time", "angle")

@@ -92,7 +92,7 @@ class SmaLimb(WirePair):
     rest_curvature: Curvature of the measured limb at rest [1/m]. It does not act on the robot: a limb with it is a
         `Limb(natural_curvature=...)`.
     curvature_change: By how much a wire that has recovered its shape straightens the measured limb [1/m].
-    heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
+    heating_power: Electric power of a heated wire [W], an assumption, see `base.WIRE_POWER`.
     """
 
     peak_angle: Annotated[Numbers, not_negative("rad")] = math.pi / 5

@@ -68,7 +68,7 @@ class SmaWires(WirePair):
     cooling_time: Time in which it relaxes [s].
     period: Length of a stroke [s]. None means heating_time + cooling_time.
     refractory: Whether a limb ignores commands until both its wires are cold.
-    heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
+    heating_power: Electric power of a heated wire [W], an assumption, see `base.WIRE_POWER`.
     """
 
     peak_angle: Annotated[Numbers, not_negative("rad")] = math.pi / 5
@@ -164,7 +164,7 @@ class ThermalSma(HeatingAndCooling, WirePair):
     martensite_start, martensite_finish: M_s and M_f [deg C]. T_water <= M_f <= A_s < A_f and M_f < M_s <= A_f.
     largest_temperature: A pulse ends where the wire reaches it [deg C], and a wire that hot cannot be heated. None
         means no limit: a wire that is heated for ever tends to T_water plus the steady rise.
-    heating_power: P [W], an assumption, see `heating.WIRE_POWER`.
+    heating_power: P [W], an assumption, see `base.WIRE_POWER`.
     """
 
     TEMPERATURES: ClassVar = (

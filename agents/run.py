@@ -4,8 +4,6 @@ Watch over a training: progress bar, logs, checkpoints, and an orderly stop.
 
 Sample efficiency of a training: strokes and seconds until the policy rounds the pentagon in 170 s.
 
-The film of the agent that a policy is compared with: a process of its own makes it while the policy is trained.
-
 The robot of a run: the chapter's, or that of a file, with numbers that may be drawn anew for every episode.
 """
 
@@ -14,12 +12,10 @@ import os
 import platform
 import shlex
 import signal
-import subprocess
-import sys
-import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import FrameType
@@ -36,8 +32,8 @@ from tqdm import tqdm
 
 import seastar_gym
 from agents.learner_file import save
+from agents.options import CONFIG, Options, config_of, faults_of
 from agents.ppo import policy_of
-from agents.training.options import CONFIG, Options, config_of, faults_of
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.learned import save as save_policy
 from seastar_gym.envs.options import scene_at
@@ -48,11 +44,10 @@ from seastar_gym.evaluation.report.page import ResultsTable
 from seastar_gym.evaluation.swim import Swim, swim
 from seastar_gym.files import PART, is_left_behind, is_part_of, read_json, write_atomically, write_json, write_lines
 from seastar_gym.identify.fit import DOUBT
-from seastar_gym.processors import processors
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number, shown
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene_file import load_scene, search
+from seastar_gym.scene.scene import find_modules_in, load_scene
 from seastar_gym.scene.serial import has_own_kinds
 
 TARGET = 170.0
@@ -322,7 +317,7 @@ def robot_of(options: Options, folder: Path) -> Robot:
     if options.scene is not None and file is not None and file.name == OWN_SCENE:
         if options.resume is not None and not options.run_scene:
             raise ValueError(f"{file} is Python, which --resume executes with --run-scene only: see that it is yours.")
-        search(options.scene.parent)  # for modules that it imports
+        find_modules_in(options.scene.parent)  # for modules that it imports
     return Robot(
         None if file is None else load_scene(file),
         None if options.intervals is None else read_intervals(folder / INTERVALS),
@@ -422,77 +417,21 @@ class Watch(BaseCallback):
         return done
 
 
-class Interruption:
-    """Context in which a first Ctrl-C (or a termination) asks for an orderly stop; a second one stops at once."""
+@contextmanager
+def stoppable() -> Iterator[threading.Event]:
+    """Context whose event a first Ctrl-C (or a termination) sets, for an orderly stop; a second one stops at once."""
+    asked, before = threading.Event(), dict[int, Any]()
 
-    SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
-    def __enter__(self) -> "Interruption":
-        self.requested = False
-        self._before = {number: signal.signal(number, self._request) for number in self.SIGNALS}
-        return self
-
-    def _request(self, number: int, frame: FrameType | None) -> None:
-        self.requested = True
-        self._restore()
-
-    def _restore(self) -> None:
-        for number, handler in self._before.items():
+    def restore() -> None:
+        for number, handler in before.items():
             signal.signal(number, handler)
 
-    def __exit__(self, *exception: object) -> None:
-        self._restore()
+    def ask(number: int, frame: FrameType | None) -> None:
+        asked.set()
+        restore()
 
-
-LOWEST = 19
-"""Priority of the process: it takes what the training leaves of the processors."""
-
-
-@contextmanager
-def filmed_beside(agent: str | None, options: Options, folder: Path) -> Iterator[Callable[[], Path | None]]:
-    """Context in which `seastar evaluate` films an agent round the pentagon, beside whatever else is done.
-
-    Gives a function that waits for the film and returns its file, which is there until the context ends; None where
-    there is none: no film or agent was asked for, there is one processor only, or no process could be made or it was
-    lost.
-
-    agent: Its name, None for none. folder: Of the run with these options.
-    """
-    if agent is None or not options.video or processors() < 2:
-        yield lambda: None
-        return
-    with tempfile.TemporaryDirectory(prefix="seastar-film-", ignore_cleanup_errors=True) as place:
-        words = ["--agents", agent, *physics(options, folder.resolve()), "--seconds", str(options.seconds)]
-        process = _begun([*words, "--video", "--out", place])
-
-        def film() -> Path | None:
-            file = Path(place, f"{agent}.mp4")
-            return file if process is not None and process.wait() == 0 and file.is_file() else None
-
-        try:
-            yield film
-        finally:
-            _end(process)
-
-
-def _begun(options: list[str]) -> subprocess.Popen[bytes] | None:
-    """Process of `seastar evaluate` with its own session, which Ctrl-C does not reach; None if there can be none."""
-    command = [sys.executable, "-m", "seastar_gym.cli", "evaluate", *options]
-    nowhere, root = subprocess.DEVNULL, Path(seastar_gym.__file__).parents[1]
+    before.update((number, signal.signal(number, ask)) for number in (signal.SIGINT, signal.SIGTERM))
     try:
-        process = subprocess.Popen(
-            command, cwd=root, stdin=nowhere, stdout=nowhere, stderr=nowhere, start_new_session=True
-        )
-    except OSError:
-        return None
-    with suppress(OSError):  # it has ended
-        os.setpriority(os.PRIO_PROCESS, process.pid, LOWEST)
-    return process
-
-
-def _end(process: subprocess.Popen[bytes] | None) -> None:
-    """End a process, with those that it started, if it has not ended."""
-    if process is not None and process.poll() is None:
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        yield asked
+    finally:
+        restore()

@@ -2,9 +2,10 @@
 
     python -m agents.tasks
 
-PPO is trained on a task's split "train". Of several seeds, the one with the largest mean return in other episodes of
-that split is published, with a card that says how it swims the split "test". The bundled policies are those of
-seed 0; that of `SeastarStation-v0` is the better of two.
+PPO is trained on a task's split "train", with the project's hyperparameters, the horizon of the task and a memory. Of
+several seeds, the one with the largest mean return in other episodes of that split is published, with a card that says
+how it swims the split "test". The bundled policies are those of seed 0; that of `SeastarStation-v0` is the better of
+two.
 """
 
 import hashlib
@@ -12,32 +13,52 @@ import shlex
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 import tyro
+from gymnasium.vector import AutoresetMode
+from stable_baselines3 import PPO
 
 from agents.cards import training_facts
-from agents.distillation import ENOUGH
-from agents.ppo import policy_of
-from agents.tasks.learning import LEARNERS, imitate, train
-from agents.training.run import versions_and_machine
+from agents.distillation import ENOUGH, PAST, distil
+from agents.ppo import Hyperparameters, make_model, policy_of
+from agents.run import versions_and_machine
 from seastar_gym import TASKS, SmaPulse
-from seastar_gym.command import answered
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.command import answered, run_command
 from seastar_gym.controllers import learned
-from seastar_gym.controllers.learned import LearnedPolicy, load, save
+from seastar_gym.controllers.learned import LearnedPolicy, bundled_file, load, save
+from seastar_gym.envs.symmetry import VectorFrameStack
+from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.evaluation.results import mean_with_interval
-from seastar_gym.evaluation.rollout import env_of, measure_of, swim_episodes
+from seastar_gym.evaluation.rollout import env_of, make_batch, measure_of, swim_episodes
 from seastar_gym.evaluation.swim import HELD_OUT_SEED
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
 
+OWN: dict[str, dict[str, Any]] = {
+    "miswired": {"discount": 0.9},
+    "prey": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
+    "fast-prey": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
+    "station": {"discount": 0.9},
+    "fail-blind": {"discount": 0.9},
+    "obst-trap": {"discount": 0.95},
+    "prizes": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
+    "fast-prizes": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
+    "sim-to-real": {"discount": 0.3, "gae_lambda": 0.95},
+}
+"""Hyperparameters that differ from the project's, by task: prey and prizes are met after many seconds."""
+
 IMITATION = "imitation"
 """Learner that imitates the bundled policy of waypoints, which sees the true state, see `agents.distillation`."""
-OTHERS = {"obst-trap": "PPO, memory, told the way", "sim-to-real": IMITATION}
+TOLD_THE_WAY = "PPO, memory, told the way"
+"""Learner whose reward measures the way around all discs of `ObstTrap`; its policy swims the task as it is."""
+OTHERS = {"obst-trap": TOLD_THE_WAY, "sim-to-real": IMITATION}
 """Learners of tasks that a memory alone does not serve best."""
 RECIPES: dict[str, str] = {id: OTHERS.get(str(row.task), "PPO, memory") for id, row in TASKS.items()}
 """Learner of every task that has a bundled policy."""
@@ -74,6 +95,50 @@ class Options:
             raise ValueError("There must be at least one seed.")
 
 
+def hyperparameters(task: str, decision_period: float) -> Hyperparameters:
+    """Those of the project, with the horizon of the task."""
+    return replace(Hyperparameters(), decision_period=decision_period, **OWN[task])
+
+
+def training_batch(id: str, fidelity: Fidelity, threads: int | None, told_the_way: bool = False) -> VectorFrameStack:
+    """Batch of a training, on the split "train", whose policies remember.
+
+    told_the_way: Whether the reward measures the way around all discs of `ObstTrap`.
+    """
+    task = {"task": ObstTrap(potential="geodesic")} if told_the_way else {}
+    batch = make_batch(
+        id, Hyperparameters().num_envs, split="train", fidelity=fidelity, threads=threads,
+        autoreset_mode=AutoresetMode.SAME_STEP, **task,
+    )  # fmt: skip
+    return VectorFrameStack(batch, PAST)
+
+
+def new_model(id: str, seed: int, fidelity: Fidelity, threads: int | None) -> PPO:
+    """PPO for a task that has learned nothing yet."""
+    env = BatchVecEnv(training_batch(id, fidelity, threads, RECIPES[id] == TOLD_THE_WAY))
+    batch: Any = env.env.unwrapped
+    return make_model(env, hyperparameters(str(TASKS[id].task), float(batch.decision_period)), seed)
+
+
+def train(id: str, seed: int, decisions: int, fidelity: Fidelity, threads: int | None) -> PPO:
+    """PPO after so many decisions of training."""
+    torch.set_num_threads(1)
+    model = new_model(id, seed, fidelity, threads)
+    model.learn(decisions)
+    env = model.get_env()
+    assert env is not None
+    env.close()
+    return model
+
+
+def imitate(id: str, seed: int, decisions: int, fidelity: Fidelity, threads: int | None) -> LearnedPolicy:
+    """Policy with memory after so many decisions of learning from the bundled one of waypoints, which sees all."""
+    torch.set_num_threads(1)
+    batch = training_batch(id, fidelity, threads)
+    period = float(batch.unwrapped.decision_period)  # type: ignore[attr-defined]
+    return distil(load(bundled_file(period)), batch, decisions, seed)
+
+
 def file_of(id: str, folder: Path = learned.TASKS) -> Path:
     """File of the policy of a task."""
     row = TASKS[id]
@@ -89,7 +154,7 @@ def trained(id: str, seed: int, options: Options) -> tuple[LearnedPolicy, dict[s
         decisions = min(decisions, ENOUGH)
         policy = imitate(id, seed, decisions, fidelity, threads)
     else:
-        model = train(id, LEARNERS[RECIPES[id]], seed, decisions, fidelity, threads)
+        model = train(id, seed, decisions, fidelity, threads)
         decisions, policy = model.num_timesteps, policy_of(model)
     facts = {"strokes": decisions, "seed": seed, "seconds": round(time.process_time() - began, 1)}
     return swims(policy, id), facts
@@ -147,7 +212,7 @@ def card(id: str, policy: LearnedPolicy, file: Path) -> str:
     tried = policy.training.get("seeds", ())
     seeds = f"the best of seeds {', '.join(map(str, tried))}" if len(tried) > 1 else "one seed"
     told = ""
-    if "told the way" in str(policy.training.get("learner")):
+    if policy.training.get("learner") == TOLD_THE_WAY:
         told = ' Its training\'s reward measured the way around all discs, `ObstTrap(potential="geodesic")`.'
     if policy.training.get("learner") == IMITATION:
         told = (
@@ -213,3 +278,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(write_card(id, load(file), file), flush=True)
 
     return answered(train_all)
+
+
+if __name__ == "__main__":
+    run_command(main)

@@ -5,7 +5,7 @@ import csv
 import pytest
 
 from refusals import assert_refused
-from seastar_gym.scene.csv_rows import read_numbers, read_rows
+from seastar_gym.files import read_numbers, read_rows
 
 GOOD = b"0.0,0.0\n0.1,0.6\n1.0,0.0\n"
 NUMBERS = [[0.0, 0.0], [0.1, 0.6], [1.0, 0.0]]

@@ -1,29 +1,42 @@
-"""Planner: a controller that tries sequences of commands on a batch of the simulator before every decision.
+"""Agents that search: the greedy agent by a map of what commands do, the planner by simulating what they would do.
 
-It has the observations of any agent. An observation is the whole state of the robot and its wires, to single precision,
-so a beam search can begin from it: at each of a few decisions, all pairs of limbs are tried from the best few states so
-far. The planner then swims the first command of the sequence that leaves the shortest rewarded route. `gait_planner`
-tries whole periods of evolved gaits instead, and decides once a second. A robot of more
-than ten nodes per limb is taken to lie smoothly through the stations that are observed.
+    seastar evaluate --agents greedy planner pentagon
+
+The greedy agent's map has the displacement of the hub in the body frame and the turn of the robot, per stroke of every
+command, once the repeated command swims steadily. It is computed once for every scene and kept in the user's cache
+folder. In a timed environment, commands are repeated at every decision, which heats the same wires over and over: the
+map knows no lag.
+
+The planner tries sequences of commands on a batch of the simulator before every decision. It has the observations of
+any agent. An observation is the whole state of the robot and its wires, to single precision, so a beam search can begin
+from it: at each of a few decisions, all pairs of limbs are tried from the best few states so far. The planner then
+swims the first command of the sequence that leaves the shortest rewarded route. `gait_planner` tries whole periods of
+evolved gaits instead, and decides once a second. A robot of more than ten nodes per limb is taken to lie smoothly
+through the stations that are observed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import hashlib
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.controllers.contract import can_be_decided_by, observed, starts
-from seastar_gym.controllers.greedy import Searcher, require_search, waypoints_of
-from seastar_gym.envs.commands import checked_decision_period, command_table
-from seastar_gym.envs.layout import HEADINGS, N_STATIONS, VELOCITY_SCALE, Layout, memory_size
+from seastar_gym.envs.commands import Actions, checked_decision_period, command_table, decisions_in
+from seastar_gym.envs.layout import HEADINGS, N_STATIONS, OBSERVATION_LAYOUT, VELOCITY_SCALE, Layout, memory_size
 from seastar_gym.envs.options import HeadingTargets, RewardWeights, make_scene, wrapped
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
-from seastar_gym.envs.stations import body_heading, node_weights, of_beginning
+from seastar_gym.envs.stations import body_heading, heading_of, node_weights, of_beginning
+from seastar_gym.files import beside
 from seastar_gym.gaits import evolved_gaits
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.base import complete
@@ -32,7 +45,150 @@ from seastar_gym.simulator import Simulator, State
 from seastar_gym.simulator.simulator import MAX_THREADS
 
 Floats = NDArray[np.float64]
-Look = Callable[[Floats], None]
+
+SETTLING_STROKES, MEASURED_STROKES = 6, 4
+"""A repeated command swims steadily, to 1 %, after about six strokes."""
+
+
+class Displacements(NamedTuple):
+    """Mean displacements of the hub [m] in the body frame, shape (n, 2), and turns [rad], shape (n,), of n gaits."""
+
+    hub: Floats
+    turn: Floats
+
+
+def turned(vectors: Floats, angles: Floats) -> Floats:
+    """Vectors, shape (n, 2), turned by angles [rad], shape (n,)."""
+    c, s = np.cos(angles), np.sin(angles)
+    return np.stack([c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]], axis=1)
+
+
+def measure_gaits(
+    scene: Scene, commands: Floats, settling: int, measured: int, decision_period: float | None = None
+) -> Displacements:
+    """Mean displacement and turn per stroke of periodic gaits, in the body frame when the measured strokes begin.
+
+    commands: Commands of every gait, shape (n, period, n_limbs). settling, measured: Numbers of strokes before and
+    during the measurement; `measured` is a multiple of the period. decision_period: Time between commands [s], called a
+    stroke here. None means a stroke of the actuator.
+    """
+    simulator, duration = Simulator(scene, len(commands)), checked_decision_period(decision_period, scene)
+    for stroke in range(settling + measured):
+        if stroke == settling:
+            hub, heading = simulator.hub_position(), heading_of(simulator)
+        simulator.advance(duration, commands[:, stroke % commands.shape[1]])
+    turn = heading_of(simulator) - heading
+    turn -= 2.0 * np.pi * np.rint(turn / (2.0 * np.pi))
+    return Displacements(turned(simulator.hub_position() - hub, -heading) / measured, turn / measured)
+
+
+def displacement_map(scene: Scene, actions: Actions = "joint", decision_period: float | None = None) -> Displacements:
+    """Map of a scene for the commands of an action mode, from the cache or measured now."""
+    asked: tuple[Any, ...] = scene, actions, SETTLING_STROKES, MEASURED_STROKES, OBSERVATION_LAYOUT
+    if decision_period is not None:
+        asked = *asked, decision_period
+    settling, measured_strokes = (
+        decisions_in(n * scene.actuator.period, decision_period, scene) for n in (SETTLING_STROKES, MEASURED_STROKES)
+    )
+    key = hashlib.sha256(repr(asked).encode()).hexdigest()[:24]
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "seastar-gym"
+    file = cache / f"displacements-{key}.npz"
+    with suppress(OSError, ValueError, KeyError, EOFError, BadZipFile), np.load(file, allow_pickle=False) as known:
+        return Displacements(known["hub"], known["turn"])
+    commands = command_table(actions, scene.robot.n_limbs)[:, None]
+    measured = measure_gaits(scene, commands, settling, measured_strokes, decision_period)
+    with beside(file) as part, part.open("wb") as stream:
+        np.savez(stream, hub=measured.hub, turn=measured.turn)
+    return measured
+
+
+def waypoints_of(
+    observations: NDArray[np.float32], scene: Scene, layout: Layout | None = None
+) -> tuple[Floats, Floats]:
+    """Current and next waypoint [m] relative to the hub in the body frame, (n, 2) each.
+
+    layout: Of the observations. None means that of waypoints without headings.
+    """
+    at, length = Layout.of(scene) if layout is None else layout, scene.robot.limb_length
+    observations = np.atleast_2d(observed(observations, at.size))
+    current, after = observations[:, at.current_waypoint], observations[:, at.next_waypoint]
+    return length * current.astype(np.float64), length * after.astype(np.float64)
+
+
+def require_search(scene: Scene, waypoint_radius: float, reward: object, decision_period: float | None) -> None:
+    """ValueError for what no policy can search with."""
+    require_kind("scene", scene, Scene, "a Scene")
+    if scene.n_robots is not None:
+        raise ValueError("scene must be that of one robot.")
+    require_number("waypoint_radius", waypoint_radius, "m")
+    require_kind("reward", reward, RewardWeights, "RewardWeights")
+    checked_decision_period(decision_period, scene)
+
+
+class Searcher(ABC):
+    """Base of policies that choose actions by observations alone, for one robot or for many."""
+
+    batched = True
+    actions: Actions
+    decision_period: float | None = None
+    """Time between decisions [s]. None means a stroke."""
+    scene: Scene
+    """Scene that the policy knows."""
+
+    @property
+    def n_limbs(self) -> int:
+        """Number of limbs of the robot that it drives."""
+        return self.scene.robot.n_limbs
+
+    @abstractmethod
+    def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Actions, shape (n,), for observations of shape (n, size)."""
+
+    def predict(
+        self,
+        observation: NDArray[np.float32],
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = False,
+    ) -> tuple[NDArray[np.int64], None]:
+        """Actions for observations of shape (size,) or (n, size), and None: there is no state.
+
+        A robot whose observation has a number that is NaN, infinite or beyond 1e30 rests, by action 0.
+        """
+        observations = np.atleast_2d(observed(observation, 1))
+        known = can_be_decided_by(observations)
+        chosen = np.zeros(len(observations), np.int64)
+        if known.any():
+            chosen[known] = self.choose(observations[known])
+        return (chosen[0] if np.ndim(observation) == 1 else chosen), None
+
+
+class GreedyPolicy(Searcher):
+    """Agent that chooses the command whose mean displacement leaves the shortest rewarded route.
+
+    scene: Scene in which displacements are measured; that of the environment, for a fair comparison.
+    waypoint_radius: Radius of the waypoints [m]. reward: Reward whose route is shortened. decision_period: Of the
+    environment [s]. None means a stroke.
+    """
+
+    actions = "joint"
+
+    def __init__(
+        self,
+        scene: Scene,
+        waypoint_radius: float = WAYPOINT_RADIUS,
+        reward: RewardWeights = RewardWeights(),
+        decision_period: float | None = None,
+    ):
+        require_search(scene, waypoint_radius, reward, decision_period)
+        self.scene, self.waypoint_radius, self.reward = scene, waypoint_radius, reward
+        self.decision_period = decision_period
+        self._hub = displacement_map(scene, self.actions, decision_period).hub
+
+    def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Actions, shape (n,), for observations of shape (n, size)."""
+        current, following = (waypoint[:, None] for waypoint in waypoints_of(observations, self.scene))
+        return np.argmin(self.reward.way_to_next(self._hub, current, following, self.waypoint_radius), axis=1)
 
 
 DEEPEST, WIDEST = 1000, 100_000
@@ -126,19 +282,14 @@ class Branching:
             self._simulators[n] = Simulator(self.scene, n, self.threads)
         return self._simulators[n]
 
-    def __call__(self, states: State, look: Look | None = None) -> State:
-        """States after one move, shape (states * moves, ...), those of the same state side by side.
-
-        look: Called with the positions of nodes [m], shape (states * moves, n_nodes, 2), after every decision.
-        """
+    def decisions(self, states: State) -> Iterator[State]:
+        """States after every decision of a move, shape (states * moves, ...), those of the same state side by side."""
         n_states, n_moves = len(states.time), len(self.moves)
         simulator = self._simulator(n_states * n_moves)
         simulator.set_state(states.of_robots(np.repeat(np.arange(n_states), n_moves)))
         for commands in np.moveaxis(np.tile(self.moves, (n_states, 1, 1)), 1, 0):
             simulator.advance(self._duration, commands)
-            if look is not None:
-                look(simulator.positions)
-        return simulator.get_state()._replace(commands=None, phase=None)  # the next commands take their place
+            yield simulator.get_state()._replace(commands=None, phase=None)  # the next commands take their place
 
 
 class Targets(NamedTuple):
@@ -155,22 +306,6 @@ class Targets(NamedTuple):
 
 SOONER = 1e3
 """Way that a decision since the arrival counts as [m], so that who arrives first is best."""
-
-
-class Outcome:
-    """What is found of candidates, arrays of shape (n, candidates), while they swim a move.
-
-    way: To go now [m]. passed: Whether the current waypoint is passed. since: Decisions since the arrival at the last
-    waypoint, that of the arrival included; 0 before it.
-    """
-
-    def __init__(self, passed: NDArray[np.bool_]):
-        self.way, self.passed, self.since = np.zeros(passed.shape), passed, np.zeros(passed.shape, np.int64)
-
-    def add(self, way: Floats, passed: NDArray[np.bool_], there: NDArray[np.bool_]) -> None:
-        """Take in what is judged after a decision."""
-        self.way, self.passed = way, passed
-        self.since += there
 
 
 def _checked_moves(moves: ArrayLike | None, n_limbs: int) -> Floats:
@@ -220,7 +355,7 @@ class Planner(Searcher):
         self.actions = "pairs" if moves is None else "continuous"
         self.moves = _checked_moves(moves, self.scene.robot.n_limbs)
         self._layout = Layout.of(self.scene, entries=() if headings is None else HEADINGS)
-        self._swim_all = Branching(self.scene, self.moves, threads, decision_period)
+        self._branches = Branching(self.scene, self.moves, threads, decision_period)
 
     def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
         """Best moves, shape (n,), for observations of shape (n, size)."""
@@ -271,25 +406,23 @@ class Planner(Searcher):
         first = np.zeros((n, 1), np.int64)
         chosen, arrived = np.zeros(n, np.int64), np.zeros(n, bool)
         for move in range(self.budget.depth):
-            found = Outcome(np.repeat(passed, n_moves, axis=1))
-            states = self._swim_all(states, partial(self._look, found, targets))
-            way, passed, there = found.way, found.passed, found.since > 0
+            passed = np.repeat(passed, n_moves, axis=1)
+            since = np.zeros(passed.shape, np.int64)  # decisions since the arrival at the last waypoint, itself counted
+            for states in self._branches.decisions(states):  # noqa: B020
+                way, passed, there = self._judge(states.positions, passed, targets)
+                since += there
             if self.budget.coasting > 0.0:
-                way, *_ = self._judge(self._swim_all.coasted(states, self.budget.coasting), passed, targets)
-            way = way - SOONER * found.since
+                way, *_ = self._judge(self._branches.coasted(states, self.budget.coasting), passed, targets)
+            way = way - SOONER * since
             first = np.tile(np.arange(n_moves), (n, 1)) if move == 0 else np.repeat(first, n_moves, 1)
             best = np.argsort(way, axis=1)[:, : self.budget.beam]
             # Who arrives within this move cannot arrive sooner by a longer sequence.
             chosen = np.where(arrived, chosen, first[robots[:, 0], best[:, 0]])
-            arrived |= there.any(axis=1)
+            arrived |= (since > 0).any(axis=1)
             first, passed = first[robots, best], passed[robots, best]
             rows = (robots * width * n_moves + best).reshape(-1)
             states, width = states.of_robots(rows), best.shape[1]
         return chosen
-
-    def _look(self, found: Outcome, targets: Targets, positions: Floats) -> None:
-        """Judge candidates after a decision."""
-        found.add(*self._judge(positions, found.passed, targets))
 
     def _judge(
         self, positions: Floats, passed: NDArray[np.bool_], targets: Targets

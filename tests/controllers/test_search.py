@@ -1,19 +1,108 @@
-"""The planner sees the whole state, and looks further than a stroke."""
+"""Agents that search: the displacement map and who swims by it, and the planner, who looks further than a stroke."""
 
 import numpy as np
 import pytest
 
 from every_part import ACTUATORS
-from seastar_gym import Body, HeadingTargets, Numerics, Scene, Seastar, Simulator
-from seastar_gym.controllers.greedy import waypoints_of
-from seastar_gym.controllers.planner import Budget, Planner, Targets, gait_planner, state_of
+from seastar_gym import Body, HeadingTargets, Numerics, Scene, Seastar, Simulator, SmaWires
+from seastar_gym.controllers import search
+from seastar_gym.controllers.open_loop import to_actions
+from seastar_gym.controllers.search import (
+    Budget,
+    Displacements,
+    GreedyPolicy,
+    Planner,
+    Targets,
+    displacement_map,
+    gait_planner,
+    measure_gaits,
+    state_of,
+    waypoints_of,
+)
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry import transform_commands
+from seastar_gym.envs.symmetry import action_table, transform_commands
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.swim import swim
-from seastar_gym.gaits import evolved_gaits
+from seastar_gym.gaits import evolved_gaits, pair_gait
 
 FAST = Scene(numerics=Numerics.preset("fast"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def cache(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(folder))
+        yield folder
+
+
+def test_the_map_has_the_symmetry_of_the_robot():
+    """A turned or mirrored command moves the hub the turned or mirrored way."""
+    hub, turn = displacement_map(FAST)
+    x_y = hub @ [1.0, 1.0j]
+    for k in range(1, 5):
+        np.testing.assert_allclose(x_y[action_table("joint", 5)[2 * k]], x_y * np.exp(-0.4j * np.pi * k), atol=1e-7)
+    mirrored = action_table("joint", 5)[9]
+    np.testing.assert_allclose(x_y[mirrored], x_y.conj(), atol=1e-7)
+    np.testing.assert_allclose(turn[mirrored], -turn, atol=1e-6)
+    straight = to_actions(pair_gait(2, 5), "joint", 5)[0]
+    assert hub[straight, 0] > 3e-3 and abs(hub[straight, 1]) < 1e-7
+
+
+def test_the_map_is_measured_once_for_every_scene_and_again_where_its_file_is_damaged(cache, monkeypatch):
+    first = displacement_map(FAST)
+    files = list((cache / "seastar-gym").iterdir())
+    for file in files:
+        file.write_bytes(b"no map")
+    np.testing.assert_array_equal(displacement_map(FAST).hub, first.hub)
+    monkeypatch.setattr(search, "measure_gaits", None)  # would fail if called
+    np.testing.assert_array_equal(displacement_map(FAST).hub, first.hub)
+    assert list((cache / "seastar-gym").iterdir()) == files
+    with pytest.raises(TypeError):
+        displacement_map(Scene(numerics=Numerics.preset("accurate")))
+
+
+def test_it_swims_a_path_with_a_random_heading():
+    agent = GreedyPolicy(FAST)
+    env = SeastarSwimEnv(path=[[0.05, 0.0], [0.05, 0.05]], random_heading=True, actions=agent.actions, fidelity="fast")
+    done = swim("greedy", agent, env, max_strokes=60, seed=1)
+    assert done.finished
+
+
+def test_a_map_in_time_is_measured_over_as_many_seconds_and_kept_by_itself(cache, monkeypatch):
+    calls = []
+
+    def measured(scene, commands, settling, measured, decision_period):
+        calls.append((commands.shape, settling, measured, decision_period))
+        return Displacements(np.full((len(commands), 2), decision_period or 1.0), np.zeros(len(commands)))
+
+    monkeypatch.setattr(search, "measure_gaits", measured)
+    wires = Scene(Seastar(3), actuator=SmaWires(0.4), numerics=FAST.numerics)
+    found = {period: displacement_map(wires, "pairs", period).hub[0, 0] for period in (None, 0.5, 0.2, 0.5)}
+    assert found == {None: 1.0, 0.5: 0.5, 0.2: 0.2}
+    assert calls == [((7, 1, 3), 6, 4, None), ((7, 1, 3), 12, 8, 0.5), ((7, 1, 3), 30, 20, 0.2)]
+
+
+def test_displacements_are_a_stroke_s_share_in_the_frame_in_which_they_begin(monkeypatch):
+    """Turns are the short way round, such as from a heading of 3 rad to one of -3 rad."""
+    gaits = np.array([[[1.0, 0.0, -1.0, 0.0, 0.0]]])
+    simulator = Simulator(FAST, 1)
+    simulator.stroke(gaits[:, 0])
+    hub, heading = simulator.hub_position(), search.heading_of(simulator)
+    simulator.stroke(gaits[:, 0])
+    simulator.stroke(gaits[:, 0])
+    way = (simulator.hub_position() - hub) @ [1.0, 1.0j] * np.exp(-1j * heading) / 2.0
+    found = measure_gaits(FAST, gaits, settling=1, measured=2)
+    np.testing.assert_allclose(found.hub @ [1.0, 1.0j], way, atol=1e-12)
+    np.testing.assert_allclose(found.turn, (search.heading_of(simulator) - heading) / 2.0, atol=1e-12)
+    alternation = np.concatenate([pair_gait(3, 4), pair_gait(2, 5)])[None]  # over whole periods
+    both = measure_gaits(FAST, np.concatenate([alternation, alternation[:, ::-1]]), settling=10, measured=4)
+    np.testing.assert_allclose(both.hub[0], both.hub[1], atol=1e-5)
+    assert 4.4e-3 < both.hub[0, 0] < 5.5e-3  # a stroke's share
+    headings = iter([np.array([3.0]), np.array([-3.0])])
+    monkeypatch.setattr(search, "heading_of", lambda simulator: next(headings))
+    found = measure_gaits(FAST, np.zeros((1, 1, 5)), settling=0, measured=2)
+    np.testing.assert_allclose(found.turn, np.pi - 3.0)
 
 
 def swum(n_robots=3, strokes=4, scene=FAST):
@@ -75,9 +164,9 @@ def test_an_observation_is_the_whole_state(scene, allowed):
 def test_a_search_in_time_compares_robots_that_have_coasted():
     """Without commands they swim on; the one that ends nearest counts, not the one that is nearest now."""
     planner = Planner(decision_period=0.5, budget=Budget(1, 1, 0.5), threads=1)
-    start = planner._swim_all._simulator(1).get_state()
-    later = planner._swim_all(start)
-    coasted = planner._swim_all.coasted(later, 0.5)
+    start = planner._branches._simulator(1).get_state()
+    (later,) = planner._branches.decisions(start)
+    coasted = planner._branches.coasted(later, 0.5)
     assert coasted.shape == (21, planner.scene.robot.n_nodes, 2)
     goal = np.array([[0.3, 0.1]])
     (chosen,) = planner._search(start, Targets(goal, goal))
@@ -92,7 +181,9 @@ def test_two_strokes_ahead_it_finds_what_an_exhaustive_search_finds(current):
     planner, after = Planner(FAST, 0.02, Budget(2, 21), threads=1), np.array([[0.2, 0.1]])
     states = state_of(observations, FAST)
     (chosen,) = planner._search(states, Targets(np.array([current]), after))
-    ends = planner._swim_all(planner._swim_all(states)).positions[:, 0].reshape(21, 21, 2)
+    (once,) = planner._branches.decisions(states)
+    (twice,) = planner._branches.decisions(once)
+    ends = twice.positions[:, 0].reshape(21, 21, 2)
     way = np.hypot(*np.moveaxis(ends - after, -1, 0))
     assert way[chosen].min() == pytest.approx(way.min(), abs=1e-6)
 
@@ -108,9 +199,10 @@ def test_who_can_arrive_at_the_last_waypoint_arrives_by_the_fewest_decisions():
     _, observations = swum(n_robots=5)
     planner = Planner(FAST, 0.0004, Budget(3, 21), threads=1)
     states = state_of(observations, FAST)
-    once = planner._swim_all(states)
+    (once,) = planner._branches.decisions(states)
     first = once.positions[:, 0].reshape(5, 21, 2)
-    twice = planner._swim_all(once).positions[:, 0].reshape(5, 21, 21, 2)
+    (twice,) = planner._branches.decisions(once)
+    twice = twice.positions[:, 0].reshape(5, 21, 21, 2)
     wanted = [4, 9, 16, 11]
     goals = np.stack([first[0, 4], first[1, 9], twice[2, 16, 3], twice[3, 11, 12], [1.0, 0.0]])
     chosen = planner._search(states, Targets(goals, goals))
@@ -162,7 +254,7 @@ def test_of_moves_that_arrive_the_planner_takes_the_one_that_arrives_first():
     slow[7:] = fast[:-7]
     planner = Planner(waypoint_radius=0.001, budget=Budget(1, 2), threads=1, decision_period=0.05, moves=[slow, fast])
     start, hubs = Simulator(planner.scene).get_state(), []
-    planner._swim_all(start, lambda positions: hubs.append(positions[:, 0]))
+    hubs += [state.positions[:, 0] for state in planner._branches.decisions(start)]
     goal = np.array(hubs)[10, 1][None]
     assert planner._search(start, Targets(goal, goal)) == [1]
     state = None

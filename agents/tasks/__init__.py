@@ -1,1 +1,0 @@
-"""Training on the tasks whose headroom is measured: hyperparameters of each, memory, and the bundled policies."""
