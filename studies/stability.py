@@ -7,8 +7,6 @@ more than MOST_STEPS steps are cut short: the pulse ramps as fast as the chapter
 steps. Two more runs without commands, one in the cell's fluid and one in vacuum, record the energy of randomly moving
 robots after every step.
 
-Then every fidelity simulates whole strokes of the same scenes, with its own nodes and numerics.
-
 Prints and keeps a summary, and draws what the solver needed to converge, Newton iterations per step, and the error of
 the hub's path.
 """
@@ -29,7 +27,7 @@ from tqdm import tqdm
 
 from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
-from seastar_gym.scene.numerics import PRESETS, Fidelity, SchemeName
+from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simulator import Simulator, State, StrokeReport
 from seastar_gym.simulator.drive import step_times
 from seastar_gym.simulator.simulator import completed
@@ -289,39 +287,6 @@ def atlas(sweeps: Sequence[Sweep], steps: Sequence[float], scheme: SchemeName = 
     return [cell for k in range(len(columns)) for cell in found[k]]
 
 
-# Fidelities
-
-STROKES = 3
-"""Strokes of every robot at a fidelity."""
-EXTREMES = ("fidelity", "scenes", "robots", "failed", "strokes", "with halved steps", "iterations per step (most)")
-"""Columns of `at_fidelity`."""
-
-
-def at_fidelity(fidelity: Fidelity, sweeps: Sequence[Sweep]) -> list[str]:
-    """Row of a fidelity: whole strokes of random commands in the scenes of all sweeps but that of nodes per limb."""
-    discretisation, nodes, numerics = PRESETS[fidelity]
-    cases = [sweep.case(value) for sweep in sweeps if sweep.label != "nodes per limb" for value in sweep.values]
-    robots, failed, halved, iterations = 0, 0, 0, []
-    for case in tqdm(cases, fidelity, unit="scene"):
-        robot = replace(case.robot, discretisation=discretisation, nodes_per_limb=nodes)
-        commands = case.commands()
-        simulator = Simulator(Scene(robot, case.fluid, SmaPulse(case.peak_angle), numerics), len(commands))
-        disturb(simulator, case.speed, case.shift)
-        steps = len(step_times(simulator.scene.actuator.corners, numerics.step)) - 1  # without substeps
-        rng = np.random.default_rng(3)
-        for _ in range(STROKES):
-            report = simulator.stroke(commands)
-            halved += int((report.halvings > 0).sum())
-            iterations += (report.newton_iterations / steps).tolist()
-            commands = rng.permuted(commands, axis=1)
-        state = simulator.get_state()
-        finite = (np.isfinite(state.positions) & np.isfinite(state.velocities)).all(axis=(1, 2))
-        robots, failed = robots + len(commands), failed + int((simulator.failed | ~finite).sum())
-    told = f"{np.median(iterations):.2g} ({max(iterations):.0f})"
-    counts = [len(cases), robots, failed, len(iterations), halved]
-    return [f"`{fidelity}`", *(f"{count:,}" for count in counts), told]
-
-
 # The summary
 
 SUMMARY = (
@@ -508,17 +473,9 @@ def run(options: Options, results: Results) -> None:
     cells = atlas(sweeps, steps, options.scheme)
     for name in ("needs", *NUMBERS):
         draw(cells, sweeps, steps, options.scheme, results.folder / f"stability_{name}.png")
-    extremes = [at_fidelity(fidelity, sweeps) for fidelity in PRESETS if fidelity != "chapter"]
-    results.update(
-        scheme=options.scheme, columns=list(SUMMARY), summary=summarise(cells, sweeps), extremes=extremes
-    )  # fmt: skip
+    results.update(scheme=options.scheme, columns=list(SUMMARY), summary=summarise(cells, sweeps))
 
 
 STUDY = Study(
-    "stability",
-    run,
-    Options,
-    "stability/stability.json",
-    Path("runs/stability"),
-    tables={"stability": table, "extremes": lambda results: markdown(EXTREMES, results["extremes"])},
+    "stability", run, Options, "stability/stability.json", Path("runs/stability"), tables={"stability": table}
 )
