@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaWires
+from seastar_gym import Numerics, Scene, Simulator
 from seastar_gym.controllers import greedy
-from seastar_gym.controllers.greedy import Displacements, GreedyPolicy, displacement_map, measure_gaits
+from seastar_gym.controllers.greedy import GreedyPolicy, displacement_map, measure_gaits
 from seastar_gym.controllers.open_loop import to_actions
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import action_table
@@ -54,20 +54,6 @@ def test_it_swims_a_path_with_a_random_heading():
     env = SeastarSwimEnv(path=[[0.05, 0.0], [0.05, 0.05]], random_heading=True, actions=agent.actions, fidelity="fast")
     done = swim("greedy", agent, env, max_strokes=60, seed=1)
     assert done.finished
-
-
-def test_a_map_in_time_is_measured_over_as_many_seconds_and_kept_by_itself(cache, monkeypatch):
-    calls = []
-
-    def measured(scene, commands, settling, measured, decision_period):
-        calls.append((commands.shape, settling, measured, decision_period))
-        return Displacements(np.full((len(commands), 2), decision_period or 1.0), np.zeros(len(commands)))
-
-    monkeypatch.setattr(greedy, "measure_gaits", measured)
-    wires = Scene(Seastar(3), actuator=SmaWires(0.4), numerics=FAST.numerics)
-    found = {period: displacement_map(wires, "pairs", period).hub[0, 0] for period in (None, 0.5, 0.2, 0.5)}
-    assert found == {None: 1.0, 0.5: 0.5, 0.2: 0.2}
-    assert calls == [((7, 1, 3), 6, 4, None), ((7, 1, 3), 12, 8, 0.5), ((7, 1, 3), 30, 20, 0.2)]
 
 
 def test_displacements_are_a_stroke_s_share_in_the_frame_in_which_they_begin(monkeypatch):
