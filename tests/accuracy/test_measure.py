@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -162,6 +163,11 @@ def test_equal_limbs_that_turn_alike_and_end_at_rest_gather_no_energy(n_limbs):
     simulator.stroke(-np.ones((1, n_limbs)))
     assert simulator.kinetic_energy()[0] < 1e-20
     assert endurance.energy_growth(scene) <= 1.01
+
+
+def test_the_energy_of_a_swim_that_fails_grows_without_bound(monkeypatch):
+    monkeypatch.setattr(Simulator, "stroke", lambda *_: SimpleNamespace(status=np.array([1] + [0] * 16)))
+    assert endurance.energy_growth(SCENE) == np.inf
 
 
 @pytest.mark.parametrize("kind", CURRENTS)

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from evaluation import made_up
+from faults import LIES
 from refusals import assert_refused
 from seastar_gym import Body, DomainRandomization, Scene, Seastar, Sight, Simulator, SmaPulse, SmaWires, Uniform, files
 from seastar_gym.cli import drive as drive_command
@@ -178,6 +179,28 @@ def test_a_plant_is_heated_and_seen_over_a_line(ends):
     np.testing.assert_allclose(theirs.pose, ours.pose, atol=1e-6)
     np.testing.assert_allclose(theirs.markers, ours.markers, atol=1e-6)
     assert theirs.markers.shape == (5, 1, 2)
+
+
+@pytest.mark.parametrize("bad", LIES)
+def test_bad_lines_stop_the_wires(bad, ends):
+    plant = simulated()
+    far, server = joined(ends, plant)
+    far.heat([1, 1, 1, 1, 1], 0.08)
+    server.turn(), plant.wait(0.01)
+    assert plant.heated()[:, 0].all()
+    ends[1].send(bad)
+    server.turn()
+    assert not plant.heated().any()
+    with pytest.raises(PlantError, match=r"The plant has (stopped: .*\.|restarted.*)$") as refused:
+        far.sight()
+    assert "\n" not in str(refused.value)
+    for _ in range(20):
+        server.turn(), plant.wait(0.01)
+    ends[1].send(b"\n" + sealed("beat"))  # which ends what has no end
+    server.turn(), server.turn()
+    far.heat([0, 1, 0, 0, 0], 0.08)
+    server.turn(), plant.wait(0.01)
+    assert plant.heated().any() == (b"hello 2" not in bad)
 
 
 @pytest.mark.parametrize("error", [OSError(5, "gone"), KeyboardInterrupt(), MemoryError(), SystemExit()])

@@ -19,7 +19,7 @@ import pytest
 from seastar_gym import Numerics, Scene, Simulator
 from seastar_gym.cli.shipped import keep
 from seastar_gym.lanes import compile as compilation
-from seastar_gym.lanes.compile import PACKAGE, entry_point, source_digest
+from seastar_gym.lanes.compile import PACKAGE, entry_point, kernel_sources, source_digest
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
@@ -423,6 +423,13 @@ def said(tmp_path: Path, cache: str, before: str = "") -> str:
 
 
 # The digest
+
+
+def test_digest_covers_every_file_that_defines_kernels():
+    sources = kernel_sources()
+    assert set(sources) >= {*(PACKAGE / "rods").glob("*.py"), PACKAGE / "envs" / "observation.py"}
+    texts = {path: path.read_text() for path in PACKAGE.rglob("*.py")}
+    assert {path for path, text in texts.items() if "@kernel" in text or "@entry_point" in text} <= set(sources)
 
 
 @pytest.mark.parametrize("change", ["content", "name", "new file", "numba", "numpy", "lanes"])
