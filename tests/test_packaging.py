@@ -5,7 +5,6 @@ import importlib
 import importlib.metadata
 import re
 import runpy
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -92,17 +91,6 @@ def imports_of(*paths: Path) -> set[str]:
     return {canonicalize_name(DISTRIBUTION_OF.get(package, package)) for package in packages}
 
 
-def test_every_extra_is_in_the_table_of_the_guide():
-    text = (ROOT / "docs" / "start.md").read_text(encoding="utf-8")
-    (table,) = re.findall(r"^\| extra \| for \|\n\|[-|]+\|\n((?:\|.*\n)+)", text, re.MULTILINE)
-    rows = [row.split("|")[1:3] for row in table.splitlines()]
-    names_and_uses = {name.strip(" `"): use for name, use in rows if name.strip() != "none"}
-    assert len(names_and_uses) == len(rows) - 1 and set(names_and_uses) == set(PROJECT["optional-dependencies"])
-    for extra, lines in PROJECT["optional-dependencies"].items():
-        brought = {part for line in map(Requirement, lines) if line.name == PROJECT["name"] for part in line.extras}
-        assert brought == set(re.findall(r"`([a-z-]+)`", names_and_uses[extra].partition("with ")[2])), extra
-
-
 @pytest.mark.parametrize(
     ("folders", "extras"),
     [
@@ -118,20 +106,6 @@ def test_every_extra_is_in_the_table_of_the_guide():
 )
 def test_every_import_has_its_requirement(folders, extras):
     assert imports_of(*(ROOT / folder for folder in folders)) <= names(requirements(*extras))
-
-
-NOT_NEEDED = {
-    "numba", "llvmlite", "scipy", "torch", "stable_baselines3", "matplotlib", "plotly", "pygame", "imageio", "rich",
-    "seastar_gym.accuracy",
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("code", ["import seastar_gym", "from seastar_gym.controllers import load; load()"])
-def test_importing_the_package_and_loading_a_policy_leave_out_what_they_do_not_need(code):
-    code = f"import sys; {code}; print(*sys.modules)"
-    answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    loaded = set(answer.stdout.split())
-    assert "seastar_gym" in loaded and loaded.isdisjoint(NOT_NEEDED)
 
 
 def test_names_of_the_package_are_those_of_its_modules():

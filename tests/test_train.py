@@ -22,10 +22,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from evaluation.made_up import made_up_swim
 from later import Later
 from refusals import assert_told
-from seastar_gym import DomainRandomization, Numerics, Scene, Seastar, Sight, SmaWires, Uniform
+from seastar_gym import DomainRandomization, Numerics, Scene, Seastar, SmaWires, Uniform
 from seastar_gym.controllers import learned as policies
 from seastar_gym.controllers.contract import actions_of, require_fit
 from seastar_gym.controllers.learned import load
@@ -210,21 +209,6 @@ def test_a_run_that_is_not_finished_teaches_no_policy_for_a_camera(has_policy, f
         (folder / "policy.safetensors").unlink()
     assert train.main(["--resume", str(folder), "--for-camera", str(file)]) == 2
     assert_told(capsys, "is not finished, after", "of 1024 decisions")
-
-
-def test_a_policy_for_a_camera_is_compared_with_that_of_its_run(tmp_path, short_swims, monkeypatch):
-    """Here of limbs and without symmetry; ways/test_tank.py has that of a plain run."""
-    monkeypatch.setattr("agents.distillation.ENOUGH", 3 * 4096)
-    folder, file = tmp_path / "run", tmp_path / "camera.json"
-    own = ["--actions", "limbs", "--no-symmetry"]
-    assert train.main([*TINY, *own, "--strokes", "256", "--out", str(folder)]) == 0
-    file.write_text(json.dumps({"delay": 0.1, "sees": 1}))
-    assert train.main(["--resume", str(folder), "--for-camera", str(file), "--quick", "--no-video"]) == 0
-    rows = (folder / "camera" / "evaluation" / "evaluation.csv").read_text().splitlines()
-    assert [row.partition(",")[0] for row in rows] == ["agent", "camera", "full sight"]
-    about = policies.load(folder / "camera" / "policy.safetensors").description
-    assert about.sight == Sight(delay=0.1, sees=1) and about.past and about.hidden == (16, 16)
-    assert "seastar drive" in (folder / "camera" / "evaluation" / "report.html").read_text()
 
 
 def test_a_training_that_is_asked_to_end_leaves_a_usable_model_and_says_how_to_go_on(tmp_path, short_swims):
@@ -432,15 +416,6 @@ def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_pa
     assert "not recorded" not in card
 
 
-def test_only_a_policy_no_worse_than_a_readable_one_in_the_box_needs_no_second_word(finished, box, monkeypatch):
-    monkeypatch.setattr("agents.cards.HELD_OUT_PATHS", 2)
-    policy, options = policies.load(finished / "policy.safetensors"), training.saved_options(finished)
-    policies.save(policy, box)
-    assert publishing.why_not(policy, options) is None
-    box.write_bytes(b"")
-    assert "nothing to compare with" in publishing.why_not(policy, options)
-
-
 def test_a_quick_run_is_short_and_fast_and_published_only_when_asked_twice(tmp_path, capsys):
     options = training.read_options(["--quick"])
     assert options.length < training.Options().length / 2 and options.fidelity == "fast"
@@ -462,19 +437,6 @@ def test_a_run_says_how_long_it_took_to_round_the_pentagon_in_time(finished):
     assert "strokes until the pentagon takes 170 s" in report and 'id="curves"' in report
     assert "Trained for 512 strokes, seed 4" in report
     assert html.escape(json.loads((finished / "config.json").read_text())["commands"][0]) in report
-
-
-def test_the_first_swim_in_time_counts():
-    slow, fast, lost = (
-        made_up_swim(np.zeros((2, 2)), [0, reached], np.zeros((5, 2)), time=np.array([0.0, seconds]))
-        for seconds, reached in ((171, 5), (170, 5), (100, 4))
-    )
-    found = run_folder.Efficiency()
-    for strokes, pentagon in ((1, lost), (2, slow), (3, fast), (4, slow), (5, fast)):
-        found = found.after(strokes, 0.5 * strokes, pentagon)
-    assert found == run_folder.Efficiency(5, 2.5, 3, 1.5)
-    assert str(found) == "The pentagon took 170 s or less after 3 strokes and 1.5 s of training."
-    assert str(run_folder.Efficiency().after(2, 1.0, slow)) == "The pentagon was not rounded in 170 s yet."
 
 
 def test_several_seeds_are_runs_of_their_own(tmp_path, capsys, short_swims):

@@ -1,7 +1,6 @@
 """Certificates of scenes: what they measure, promise and refuse, and when they lapse."""
 
 import json
-import math
 import warnings
 from dataclasses import fields, replace
 from functools import partial
@@ -14,14 +13,13 @@ import seastar_gym
 from drawn import drawn
 from odd_values import taken
 from refusals import assert_refused, assert_told
-from seastar_gym import Body, Certificate, Contact, Numerics, Scene, Seastar, SmaPulse, SmaWires, scene_for
+from seastar_gym import Certificate, Contact, Numerics, Scene, Seastar, SmaPulse, SmaWires, scene_for
 from seastar_gym.accuracy import command, commands, measure, timed_certificate
-from seastar_gym.accuracy.certificate import MARGIN, _digest, resolved
+from seastar_gym.accuracy.certificate import _digest, resolved
 from seastar_gym.envs.attributes import RobotsEnv
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.numerics import PRESETS
 from seastar_gym.scene.scene import load_scene
 
 SMALL_ROBOT = Seastar(limb_length=0.08)
@@ -78,28 +76,6 @@ def test_errors_of_every_class_bound_those_of_its_sequences_and_fall_with_the_no
     assert 0.0 < certificate.limit_error < fine.space_error < 0.6 * coarse.space_error
 
 
-def test_classes_of_several_batches_are_told_together_by_their_largest_and_median(monkeypatch):
-    """A typical error is the median of all sequences of a class; small commands count in no error of all."""
-    space = iter([[0.05, 0.9, 0.011], [0.012, 0.04, 7.0]])
-
-    def measured(scene, resolutions, limit, short, drawn, *_):
-        path = np.array(next(space))
-        off = measure.Errors(path, 0.5 * path, np.radians(path))
-        none = measure.Errors(*[np.zeros(3)] * 3)
-        return measure.Measured(None, 0.1 * path, [], [off], [none])
-
-    monkeypatch.setattr(measure, "measure", measured)
-    monkeypatch.setattr(measure, "real_time_factors", lambda *_: [3.0])
-    strokes = np.zeros((10, 3, 5))
-    batches = [commands.Batch({"a": strokes}), commands.Batch({"a": strokes[:, :2], "small": strokes[:, :1]})]
-    (found,), of_limit = measure.measure_settings(
-        SCENE, [PRESETS["fast"]], PRESETS["reference"], lambda *_: measure.SHORT, batches
-    )
-    assert found.errors == {"a": 0.9, "small": 7.0} and found.typical == {"a": 0.04, "small": 7.0}
-    assert (found.space_error, found.time_error, found.end_error, found.heading_error) == (0.9, 0.0, 0.45, 0.9)
-    assert found.speed == 3.0 and of_limit == 0.09 and found.promise("a") == MARGIN * 0.9
-
-
 def test_a_certificate_of_decisions_is_told_in_the_environment_of_that_period(few_settings, tmp_path):
     scene = replace(SCENE, actuator=SmaWires())
     certificate = seastar_gym.certify(scene, SAMPLES, decision_period=0.25)
@@ -116,20 +92,6 @@ def test_a_certificate_of_decisions_is_told_in_the_environment_of_that_period(fe
     for wrong, period in ((SCENE, 0.25), (scene, 1e-3), (scene, 1.5)):
         with assert_refused("need wires"):
             seastar_gym.certify(wrong, decision_period=period)
-
-
-@pytest.mark.slow
-def test_a_robot_with_a_body_has_a_certificate_of_its_own(few_settings, tmp_path):
-    robot = replace(SMALL_ROBOT, body=Body(radius=0.02, mass=0.02))
-    certificate = seastar_gym.certify(Scene(robot), SAMPLES)
-    coarse, fine = certificate.settings[0], certificate.settings[2]
-    assert 0.0 < fine.space_error < 0.6 * coarse.space_error and all(each.speed > 0.0 for each in certificate.settings)
-    certificate.save(tmp_path / "mine.json")
-    read = Certificate.load(tmp_path / "mine.json")
-    best = read.for_error(max(each.promise(certificate.promised) for each in certificate.settings))
-    assert read.of(best) is not None
-    with assert_refused("another scene"):
-        read.require_valid(replace(best, robot=replace(best.robot, body=Body(radius=0.02, mass=0.03))))
 
 
 @pytest.mark.parametrize(
@@ -260,16 +222,6 @@ def test_odd_entries_are_refused(certificate, golden):
             replace(certificate, settings=(replace(first, **change), *others))
 
 
-def test_what_a_certificate_and_a_setting_can_have(certificate):
-    for samples, confidence in ((2, 0.75), (60, 1.0 - 0.5**60), (100_000, 1.0)):
-        some = replace(certificate, samples=samples, limit_error=0.0, decision_period=0.1)
-        assert some.confidence(0.5) == pytest.approx(confidence)
-    setting = certificate.settings[0]
-    failed = replace(setting, space_error=math.inf, energy_growth=math.inf, speed=math.nan, typical={})
-    assert math.isnan(failed.typical_error(setting.errors)) and math.isnan(failed.error(()))
-    assert math.isnan(failed.error(("of yesterday",))) and not failed.is_energy_stable
-
-
 # The environment
 
 
@@ -289,20 +241,6 @@ def test_the_environment_tells_the_errors_of_a_certified_scene(certificate, file
     assert (envs.reset(seed=0)[1]["path_error"] == info["path_error"]).all()
     assert isinstance(env.unwrapped, RobotsEnv)
     assert json.loads(env.spec.to_json())["kwargs"]["certificate"] == str(file)
-
-
-def test_a_certificate_is_of_strokes_or_of_decisions(certificate):
-    wired = replace(certificate, scene=replace(certificate.scene, actuator=SmaWires()))
-    for made in BOTH:
-        for period in (None, 1.0):
-            env = made(scene=wired.at(wired.settings[0]), certificate=wired, decision_period=period)
-            assert np.all(env.reset(seed=0)[1]["gait_error"] == wired.settings[0].promise(REPEATED))
-    timed = timed_certificate(0.2)
-    info = gym.make("SeastarSwim-v0", scene=WIRED, certificate=timed, decision_period=0.2).reset(seed=0)[1]
-    assert (
-        info["gait_error"] == timed.of(WIRED).promise(timed.repeated(timed.actions))
-        and "batch_real_time_factor" not in info
-    )
 
 
 @pytest.mark.parametrize(
@@ -341,20 +279,6 @@ def test_where_nothing_is_promised_a_warning_says_what_to_do(certificate):
         warnings.simplefilter("error")
         gym.make("SeastarSwim-v0", fidelity="fast")
         gym.make("SeastarSwim-v0", scene=WIRED, **timed)
-
-
-def test_limbs_that_damp_nothing_are_told_where_decisions_are_no_strokes():
-    wires, damped = replace(Scene.preset("fast"), actuator=SmaWires()), Seastar(relaxation_time=1e-4)
-    with pytest.warns(UserWarning, match=r"damp nothing.* 5 ms .* \d.* %.*relaxation_time.*resonances\(scene, 0.2\)"):
-        env = gym.make("SeastarSwim-v0", scene=wires, decision_period=0.2)
-    known = timed_certificate(0.2, wires).of(wires)
-    assert (
-        env.reset(seed=0)[1]["gait_error"] == known.promise(timed_certificate(0.2).repeated(tuple(known.errors))) > 0.01
-    )
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        gym.make("SeastarSwim-v0", scene=replace(wires, robot=damped), decision_period=0.2)
-        gym.make("SeastarSwim-v0", scene=wires)
 
 
 # The command

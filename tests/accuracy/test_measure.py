@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from currents import CURRENTS, velocity
-from seastar_gym import Body, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires, UniformCurrent
+from seastar_gym import Body, Numerics, Scene, Seastar, Simulator, SmaWires, UniformCurrent
 from seastar_gym.accuracy import commands, measure, resonance
 from seastar_gym.accuracy import measure as endurance
 from seastar_gym.accuracy import measure as water
-from seastar_gym.accuracy.certificate import Setting, at, resolved
+from seastar_gym.accuracy.certificate import at, resolved
 from seastar_gym.scene.numerics import Resolution
 from seastar_gym.scene.robot import SILICONE
 
@@ -51,17 +51,6 @@ def test_decisions_are_what_their_classes_say(n_limbs, period):
     assert (drawn["repeated command"] == drawn["repeated command"][0]).all()
     numbers = batch.of_classes(np.arange(8 * len(drawn)))
     assert list(numbers) == list(drawn) and numbers["pairs"].tolist() == [*range(8, 16)]
-
-
-@pytest.mark.parametrize("period", [None, 0.5])
-def test_a_speed_is_the_simulated_time_of_all_robots_over_processor_time_the_best_of_three_rounds(monkeypatch, period):
-    """Of two strokes, or of two seconds of decisions, after the first."""
-    times = iter([0.0, 3.0, 3.0, 5.0, 5.0, 9.0])
-    monkeypatch.setattr(measure.time, "thread_time", lambda: next(times))
-    actuator = SmaPulse(0.3, 0.1, 0.4) if period is None else SmaWires()
-    scene = resolved(replace(SCENE, actuator=actuator), 5, Numerics("sdirk2", 2e-2, 1e-6))
-    factors = measure.real_time_factors([scene], np.zeros((commands.STROKES, 6, 5)), period)
-    assert factors == [6 * (2 * 0.5 if period is None else 2.0) / 2.0]
 
 
 def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):
@@ -160,7 +149,6 @@ def test_modes_near_a_multiple_of_the_decisions_frequency_are_named_where_nothin
 
 
 EULER = Numerics("implicit-euler", 1e-2, 1e-6)
-SETTING = Setting(7, "implicit-euler", 5e-3, 1e-6, {"small": 0.1}, {"small": 0.05}, 0.0, 0.0, 1.0, 1.0)
 
 
 def in_water(current, scene=SCENE):
@@ -177,62 +165,9 @@ def test_equal_limbs_that_turn_alike_and_end_at_rest_gather_no_energy(n_limbs):
     assert endurance.energy_growth(scene) <= 1.01
 
 
-def swims_of(energies, monkeypatch):
-    """Growth over 17 swims whose kinetic energies at ends of strokes are these, shape (200, 17); and strokes swum."""
-    strokes = []
-
-    class Scripted:
-        def __init__(self, *_):
-            pass
-
-        def stroke(self, _):
-            strokes.append(1)
-            return SimpleNamespace(status=np.zeros(17))
-
-        def kinetic_energy(self, relative_to_water):
-            assert relative_to_water
-            return energies[len(strokes) - 1]
-
-    monkeypatch.setattr(endurance, "with_the_water", Scripted)
-    return endurance.energy_growth(SCENE), len(strokes)
-
-
-EARLY, LATER, EVERYTHING = slice(0, 20), slice(20, 200), slice(None)
-GROWTHS = [
-    ([(19, 0, 2.0), (slice(20, 180), 0, 10.0), (180, 0, 3.0)], 1.5, 200),
-    ([(19, 0, 2.0), (199, 1, 7.0)], 7.0, 200),
-    *(([(stroke, 5, 20.0)], 20.0, stroke + 1) for stroke in (20, 60, 198)),
-    ([(60, 5, np.nextafter(20.0, 0.0))], 1.0, 200),
-    ([(EARLY, 1, 1e-30), (LATER, 1, 3e-6)], 3.0, 200),
-    ([(EARLY, 1, 2e-6), (LATER, 1, 3e-6)], 1.5, 200),
-    ([(EVERYTHING, EVERYTHING, 0.0)], 0.0, 200),
-]
-
-
-@pytest.mark.parametrize("energies, growth, strokes", GROWTHS)
-def test_the_last_20_of_200_strokes_are_compared_with_the_first_20(energies, growth, strokes, monkeypatch):
-    """A millionth of the largest early energy is noise. Swims end where the energy has grown 20-fold."""
-    given = np.ones((200, 17))
-    for strokes_of, robots, energy in energies:
-        given[strokes_of, robots] = energy
-    found = swims_of(given, monkeypatch)
-    assert found == (pytest.approx(growth), strokes)
-    stable = replace(SETTING, energy_growth=found[0]).is_energy_stable
-    assert stable == (growth <= 1.5) and not replace(SETTING, energy_growth=np.nextafter(1.5, 2.0)).is_energy_stable
-
-
 def test_the_energy_of_a_swim_that_fails_grows_without_bound(monkeypatch):
     monkeypatch.setattr(Simulator, "stroke", lambda *_: SimpleNamespace(status=np.array([1] + [0] * 16)))
     assert endurance.energy_growth(SCENE) == np.inf
-
-
-@pytest.mark.parametrize("n_limbs", [1, 2, 3, 5, 12])
-def test_long_swims_turn_mirrored_limbs_against_each_other(n_limbs):
-    commands = endurance.long_swims(n_limbs, samples=2, seed=0)
-    assert commands.shape == (10, 5, n_limbs) and np.abs(commands).max() == 1.0
-    pairs = endurance.mirrored_pairs(n_limbs)
-    if n_limbs > 2:
-        np.testing.assert_array_equal(pairs[:, 1:], -pairs[:, :0:-1])
 
 
 @pytest.mark.parametrize("kind", CURRENTS)

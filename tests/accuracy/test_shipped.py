@@ -23,9 +23,8 @@ from seastar_gym import (
 from seastar_gym.accuracy import Setting, chapters_certificate, timed_certificate
 from seastar_gym.accuracy.certificate import MARGIN
 from seastar_gym.accuracy.chapters import FOLDER, IN_TIME
-from seastar_gym.accuracy.commands import CLASSES, SMALL_COMMANDS, draw_classes
+from seastar_gym.accuracy.commands import CLASSES, SMALL_COMMANDS
 from seastar_gym.accuracy.measure import Swims, energy_growth, errors, path_lengths, swim_all
-from seastar_gym.accuracy.measure import swim as swim_commands
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.robot import SILICONE
 from studies import accuracy as study
@@ -94,14 +93,6 @@ def test_presets_keep_what_their_names_say():
     assert max(row.space_error for row in TABLE.settings if row.nodes_per_limb == 10 and row.damping > 0.0) < 0.03
 
 
-def test_space_errors_fall_with_the_nodes():
-    """But where errors of neighbouring meshes cancel."""
-    some = [row for row in TABLE.settings if row.discretisation == "continuum"]
-    by_nodes = {row.nodes_per_limb: row.space_error for row in some}
-    for nodes, error in by_nodes.items():
-        assert all(error > other for more, other in by_nodes.items() if more >= 1.5 * nodes)
-
-
 OTHERS = [
     replace(FAST, robot=replace(FAST.robot, youngs_modulus=2e6)),
     replace(FAST, robot=replace(FAST.robot, n_limbs=4)),
@@ -135,8 +126,6 @@ def test_another_robot_fluid_or_setting_is_promised_nothing_and_the_sentence_nam
 
 
 # Choice by error
-
-WANTED = [0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005]
 
 
 @pytest.mark.parametrize("period", [None, 1.0, 0.2, 0.35])
@@ -201,16 +190,6 @@ def test_swims_of_no_table_differ_from_reference_by_no_more_than_promised(scene,
             classes = (name,) if name == SMALL_COMMANDS else REPEATED if name in REPEATED else RANDOM
             over.append(off.max() / (row.promise(classes) + exact.promise(classes)))
     assert 0.15 < max(over) <= 1.0
-
-
-@pytest.mark.parametrize("name", ["fast", "balanced"])
-def test_newtons_tolerance_does_not_drown_slow_swims(name):
-    """Its displacements are absolute, and a tenth of the amplitude swims a hundredth of the way."""
-    scene, commands = Scene.preset(name), draw_classes(8, 5, 77)
-    slow = np.concatenate([commands[:, -8:], 0.1 * commands[:, 24:32], 0.1 * np.tile(np.eye(5), (10, 1, 1))], axis=1)
-    exact = swim_commands(replace(scene, numerics=replace(scene.numerics, newton_tolerance=1e-10)), slow)
-    errors_of_tolerance = path_errors(swim_commands(scene, slow), exact)
-    assert 1e-4 < errors_of_tolerance.max() < 0.05
 
 
 # Long swims

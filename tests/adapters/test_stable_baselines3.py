@@ -81,20 +81,6 @@ def towards_waypoint(observations):
     return np.argmax(observations[:, -4:-2] @ pushes.T, axis=1)
 
 
-def test_arrays_are_fresh_every_step():
-    batch = make_batch()
-    seen = [batch.reset()]
-    for _ in range(LIMIT + 2):  # over the ends of episodes
-        observations, rewards, dones, infos = batch.step(np.ones(N, int))
-        seen += [observations, rewards, dones, *(info["hub_position"] for info in infos)]
-        seen += [info["terminal_observation"] for info in infos if "terminal_observation" in info]
-    kept = [array.copy() for array in seen]
-    batch.step(np.zeros(N, int))
-    for number, (array, copy) in enumerate(zip(seen, kept, strict=True)):
-        np.testing.assert_array_equal(array, copy)
-        assert not any(np.shares_memory(array, other) for other in seen[:number])
-
-
 def test_seeds_and_options_of_the_next_reset_count_once():
     batch = make_batch(path="random")
     batch.seed(5)
@@ -125,30 +111,6 @@ def test_seeds_and_options_of_the_next_reset_count_once():
 def test_what_is_no_batch_of_the_adapter_is_refused(call, words):
     with assert_refused(words):
         call()
-
-
-@pytest.mark.parametrize("symmetry", [False, True])
-def test_attributes_and_methods_are_those_of_the_batch(symmetry):
-    batch = make_batch(symmetry, path="random")
-    assert batch.render_mode is None and batch.get_images() == [None] * N
-    assert batch.get_attr("actions") == ["pairs"] * N
-    assert batch.get_attr("actions", indices=[0, 2]) == ["pairs"] * 2
-    assert batch.has_attr("simulator") and not batch.has_attr("no_such_thing")
-    with pytest.raises(AttributeError, match="no_such_thing"):
-        batch.get_attr("no_such_thing")
-    batch.set_attr("max_episode_steps", 3)
-    assert batch.env.unwrapped.max_episode_steps == 3
-    batch.reset()
-    own = batch.env.unwrapped.waypoints
-    for found, expected in zip(batch.get_attr("waypoints", indices=[2, 0]), (own[2], own[0]), strict=True):
-        np.testing.assert_array_equal(found, expected)
-    assert len(batch.env_method("reset", seed=1)) == N
-    facts = batch.env_method("reset", seed=1, indices=[1])
-    assert len(facts) == 1 and facts[0][0].shape == (N, 186)
-    assert batch.env_is_wrapped(VectorSymmetryReduction) == [symmetry] * N
-    assert batch.env_is_wrapped(gym.vector.VectorObservationWrapper) == [False] * N
-    batch.close()
-    assert batch.env.unwrapped.closed
 
 
 def test_methods_give_every_robot_its_own_as_of_single_environments():
@@ -184,18 +146,6 @@ def test_normalisation_goes_on_top_and_evaluation_takes_its_statistics():
     pairs = [(info["terminal_observation"], raw["terminal_observation"]) for info, raw in ends]
     for found, raw in [(observations, raw_observations), *pairs]:
         np.testing.assert_allclose(found, raw - 1.0, rtol=1e-5, atol=1e-6)
-
-
-@pytest.mark.parametrize("symmetry", [False, True])
-def test_a_picture_of_the_batch_has_its_first_robots_side_by_side(symmetry):
-    pytest.importorskip("pygame")
-    batch = make_batch(symmetry, render_mode="rgb_array", num_envs=20)
-    batch.reset()
-    batch.step(np.zeros(20, int))
-    picture, tiles = batch.render(), batch.get_images()
-    assert len(tiles) == 16 and tiles[0].shape == (288, 384, 3)
-    assert picture.shape == (4 * 288, 4 * 384, 3)
-    np.testing.assert_array_equal(picture[:288, :384], tiles[0])
 
 
 def test_stable_baselines_records_a_video(tmp_path):

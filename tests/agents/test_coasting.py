@@ -68,20 +68,6 @@ def test_what_is_added_is_the_change_of_the_way_saved(fitted):
     assert np.abs(shaped.gain(after)).max() < swum.min() / 7.0  # at rest, but for the fit
 
 
-def test_progress_counts_before_the_way_is_swum(fitted):
-    """At the end of a pulse towards the waypoint, most of its way is still to come or to be lost."""
-    env = ppo.CoastingProgress(batch(20, path=[[0.0, 0.3]]), fitted, RewardWeights())
-    env.reset(seed=1)
-    observations, *_ = env.step(np.arange(1, 21))
-    now = env.gain(observations)
-    hubs = [env.unwrapped.simulator.hub_position()]
-    for _ in range(8):
-        env.step(np.zeros(20, int))
-    hubs.append(env.unwrapped.simulator.hub_position())
-    before, after = np.linalg.norm([0.0, 0.3] - np.array(hubs), axis=2)
-    assert np.corrcoef(now, before - after)[0, 1] > 0.95
-
-
 def test_the_last_step_of_an_episode_has_the_environment_s_own_reward(fitted):
     arguments = {"path": [[0.0, 0.0105]], "max_episode_steps": 2}
     plain, shaped = batch(4, **arguments), ppo.CoastingProgress(batch(4, **arguments), fitted, RewardWeights())

@@ -9,7 +9,6 @@ from seastar_gym import Simulator
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.controllers.open_loop import scripted
-from seastar_gym.controllers.search import Budget, Planner
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -65,20 +64,6 @@ def test_gaits_that_do_not_fit_the_decisions_are_refused(name, period):
     for other in (1.0, 0.2):
         with assert_refused("every 0.5 s", f"every {other:g} s"):
             swim("a", scripted("lagged", decision_period=0.5), SeastarSwimEnv(decision_period=other), max_strokes=1)
-
-
-def test_partial_pulses_are_continuous_actions():
-    env = SeastarSwimEnv(actions="continuous", decision_period=0.5, fidelity="fast")
-    done = swim("thrifty", scripted("thrifty", decision_period=0.5), env, max_strokes=4)
-    np.testing.assert_allclose(done.heating_time, 0.12)
-
-
-def test_the_planner_swims_faster_in_time_than_the_lagged_script():
-    planner = Planner(decision_period=0.5, budget=Budget(3, 4), threads=1)
-    env = SeastarSwimEnv([[0.1, 0.0]], actions="pairs", decision_period=0.5, fidelity="fast")
-    planned = swim("planner", planner, env, max_strokes=60)
-    lagged = swim("lagged", scripted("lagged", "pairs", decision_period=0.5), env, max_strokes=60)
-    assert planned.finished and planned.strokes <= lagged.strokes + 1
 
 
 # Training

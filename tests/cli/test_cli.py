@@ -12,11 +12,8 @@ from PIL import Image
 
 from seastar_gym import Scene, Seastar, Sight
 from seastar_gym.cli import compile, played, screen
-from seastar_gym.cli.main import COMMANDS, main
+from seastar_gym.cli.main import main
 from seastar_gym.cli.play import Steering, known_keys, typed
-from seastar_gym.controllers.open_loop import GAITS
-from seastar_gym.controllers.registry import AGENTS
-from seastar_gym.envs.paths import PATHS
 from seastar_gym.gaits import lagged_gait
 from seastar_gym.scene.serial import to_dict
 
@@ -48,17 +45,6 @@ def frames(file):
             film.seek(number)
             found.append(np.asarray(film.convert("RGB"), dtype=np.int16))
         return np.stack(found)
-
-
-@pytest.mark.parametrize("command", ["", "evaluate"])
-def test_help_tells_what_there_is(command, capsys):
-    """That every command has help, test_extras.py says."""
-    with pytest.raises(SystemExit) as ended:
-        main([*command.split(), "--help"])
-    text = " ".join(capsys.readouterr().out.replace("│", " ").split()).replace("- ", "-")  # names are parted at hyphens
-    assert ended.value.code == 0 and text.startswith(f"usage: seastar {command or '[-h]'} ")
-    names = {"": COMMANDS, "evaluate": (*AGENTS, *GAITS, *PATHS, "module:function", "load only files that you trust")}
-    assert [name for name in names.get(command, ()) if name not in text] == []
 
 
 def test_what_is_compiled_before_is_found_by_another_process(tmp_path, monkeypatch):
@@ -220,19 +206,6 @@ class Pressed:
     def get_pressed(self):
         self.now = self.held.pop(0)
         return self
-
-
-def test_something_shows_before_the_simulator_is_loaded():
-    """Numba and what it compiles take a second at best; pygame does not."""
-    script = (
-        "import sys\nfrom seastar_gym.cli import play, screen\n"
-        "def show(picture): print('numba' in sys.modules, picture.std() > 1.0); return sys.exit()\n"
-        "from contextlib import contextmanager\n"
-        "screen._window = contextmanager(lambda fps: iter([show]))\n"
-        "play.main([])\n"
-    )
-    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
-    assert result.stdout.split() == ["False", "True"], result.stderr
 
 
 def test_the_keyboard_plays_in_a_window(dummy_window, monkeypatch, capsys):

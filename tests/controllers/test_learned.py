@@ -12,7 +12,7 @@ import safetensors.numpy
 from every_part import ACTUATORS, PARTS
 from later import Later
 from refusals import assert_refused
-from seastar_gym import Numerics, Scene, Seastar, Sight, SmaPulse, SmaWires, Water
+from seastar_gym import Numerics, Scene, Seastar, Sight, SmaPulse, SmaWires
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, camera_of, load, save
 from seastar_gym.envs.commands import command_table
@@ -319,32 +319,6 @@ def test_a_policy_with_memory_sees_the_past_in_the_limbs_of_the_present():
     for wrong in (state[0], (state[0][:2],), (state[0].astype(int),), (state[0], state[0]), ([1.0],)):
         with assert_refused("past observations of shape (4, 2, 194)."):
             policy.predict(first, wrong)
-
-
-def test_a_description_of_a_task_survives_its_text_and_shapes_the_network():
-    assert Description.from_json(TASK.to_json()) == TASK
-    marked = TASK._replace(stations=3)
-    assert Description.from_json(marked.to_json()) == marked and marked.observation_size == TASK.observation_size - 120
-    size = 182 + 5 + 3 + 4
-    assert TASK.observation_size == size and TASK.input_size == size + 2 * (10 + size - 180)
-    assert TASK.shapes()["0.weight"] == (8, TASK.input_size) and TASK.distributions == (1, 243)
-    bare = Description("limbs", False, Scene(), ())
-    assert (bare.reduction, bare.frame_stack, bare.input_size) == (None, None, 186)
-    assert bare.shapes() == {"0.weight": (15, 186), "0.bias": (15,)}
-
-
-# In an environment
-
-
-def test_another_scene_is_told_but_other_numerics_are_not():
-    policy = random_policy(Description("joint", True, Scene(numerics=FAST), (16, 8)))
-    assert policy.differences(Scene(numerics=Numerics.preset("reference"))) == ""
-    other = Scene(robot=Seastar(youngs_modulus=2e6), fluid=Water(drag_coefficient=1.5))
-    assert policy.differences(other) == (
-        "trained in another scene, with fluid.drag_coefficient 1.0 (here 1.5), "
-        "robot.youngs_modulus 1000000.0 (here 2000000.0)."
-    )
-    assert "fluid.density 1000.0 (here None)" in policy.differences(Scene(fluid=None))
 
 
 # The bundled policy

@@ -6,7 +6,6 @@ import os
 import pickle
 import subprocess
 import sys
-import threading
 import zipfile
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,7 +25,6 @@ from seastar_gym.controllers.learned import BUNDLED, bundled_file, by_name, load
 from seastar_gym.controllers.open_loop import OpenLoopPolicy, RandomPolicy, scripted
 from seastar_gym.controllers.registry import (
     AGENTS,
-    RobotByRobot,
     call_function,
     default_agents,
     files_of,
@@ -275,19 +273,6 @@ def test_a_robot_in_company_swims_as_alone(here):
     for decision in range(1, 5):
         actions, state = policy.predict(observation, state, np.full(3, decision == 1))
         assert actions.tolist() == [(decision + 7 * (row[0] > 0)) % 21 for row in observation]
-
-
-def test_what_cannot_be_copied_is_shared_and_what_is_batched_is_not_wrapped(here):
-    Path("mine_of_one.py").write_text(MINE + "\nimport threading\nMine.__init__ = lambda self: vars(self).update(\n"
-                                             "    decisions=0, lock=threading.Lock())\n")  # fmt: skip
-    policy = call_function("mine_of_one:make", None)
-    assert isinstance(policy, RobotByRobot) and policy.actions == "pairs" and policy.lock is not threading.Lock()
-    actions, _ = policy.predict(np.ones((2, 40), np.float32), None, np.ones(2, bool))
-    assert actions.tolist() == [8, 9]
-    Path("mine_batched.py").write_text("def make(env):\n    from seastar_gym.gaits import pentagon_gait\n"
-                                       "    from seastar_gym.controllers.open_loop import scripted\n"
-                                       "    return scripted('pentagon')\n")  # fmt: skip
-    assert type(call_function("mine_batched:make", None)) is type(scripted("pentagon"))
 
 
 @pytest.mark.parametrize("words", [("evaluate", "--task", "SeastarSwim-v0", "--seeds", "2", "--decisions", "3"),

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from every_part import ACTUATORS
-from seastar_gym import Body, HeadingTargets, Numerics, Scene, Seastar, Simulator, SmaWires
+from seastar_gym import Body, HeadingTargets, Numerics, Scene, Seastar, Simulator
 from seastar_gym.controllers import search
 from seastar_gym.controllers.open_loop import to_actions
 from seastar_gym.controllers.search import (
     Budget,
-    Displacements,
     GreedyPolicy,
     Planner,
     Targets,
@@ -67,20 +66,6 @@ def test_it_swims_a_path_with_a_random_heading():
     env = SeastarSwimEnv(path=[[0.05, 0.0], [0.05, 0.05]], random_heading=True, actions=agent.actions, fidelity="fast")
     done = swim("greedy", agent, env, max_strokes=60, seed=1)
     assert done.finished
-
-
-def test_a_map_in_time_is_measured_over_as_many_seconds_and_kept_by_itself(cache, monkeypatch):
-    calls = []
-
-    def measured(scene, commands, settling, measured, decision_period):
-        calls.append((commands.shape, settling, measured, decision_period))
-        return Displacements(np.full((len(commands), 2), decision_period or 1.0), np.zeros(len(commands)))
-
-    monkeypatch.setattr(search, "measure_gaits", measured)
-    wires = Scene(Seastar(3), actuator=SmaWires(0.4), numerics=FAST.numerics)
-    found = {period: displacement_map(wires, "pairs", period).hub[0, 0] for period in (None, 0.5, 0.2, 0.5)}
-    assert found == {None: 1.0, 0.5: 0.5, 0.2: 0.2}
-    assert calls == [((7, 1, 3), 6, 4, None), ((7, 1, 3), 12, 8, 0.5), ((7, 1, 3), 30, 20, 0.2)]
 
 
 def test_displacements_are_a_stroke_s_share_in_the_frame_in_which_they_begin(monkeypatch):
@@ -161,19 +146,6 @@ def test_an_observation_is_the_whole_state(scene, allowed):
     np.testing.assert_allclose(np.linalg.norm(twin.hub_position(), axis=1), moved, rtol=allowed)
 
 
-def test_a_search_in_time_compares_robots_that_have_coasted():
-    """Without commands they swim on; the one that ends nearest counts, not the one that is nearest now."""
-    planner = Planner(decision_period=0.5, budget=Budget(1, 1, 0.5), threads=1)
-    start = planner._branches._simulator(1).get_state()
-    (later,) = planner._branches.decisions(start)
-    coasted = planner._branches.coasted(later, 0.5)
-    assert coasted.shape == (21, planner.scene.robot.n_nodes, 2)
-    goal = np.array([[0.3, 0.1]])
-    (chosen,) = planner._search(start, Targets(goal, goal))
-    ways = np.hypot(*(coasted[:, 0] - goal).T)
-    assert ways[chosen] == ways.min() and np.argmin(np.hypot(*(later.positions[:, 0] - goal).T)) != chosen
-
-
 @pytest.mark.parametrize("current", [(0.2, 0.1), (0.0, 0.0)])
 def test_two_strokes_ahead_it_finds_what_an_exhaustive_search_finds(current):
     """Nearest to the last waypoint; one that is not the last, and within which the robot is, is passed."""
@@ -246,21 +218,3 @@ def test_over_periods_of_gaits_it_decides_once_a_second_and_swims_round_a_corner
     done = swim("gait-planner", planner, env, max_strokes=400)
     assert done.finished and done.time[-1] < 9.0
     assert len(chosen) == np.ceil(done.time[-1])
-
-
-def test_of_moves_that_arrive_the_planner_takes_the_one_that_arrives_first():
-    """Both gaits pass the goal, which lies where the second one is after seven decisions."""
-    fast, slow = evolved_gaits(0.05)[0], 0.0 * evolved_gaits(0.05)[0]
-    slow[7:] = fast[:-7]
-    planner = Planner(waypoint_radius=0.001, budget=Budget(1, 2), threads=1, decision_period=0.05, moves=[slow, fast])
-    start, hubs = Simulator(planner.scene).get_state(), []
-    hubs += [state.positions[:, 0] for state in planner._branches.decisions(start)]
-    goal = np.array(hubs)[10, 1][None]
-    assert planner._search(start, Targets(goal, goal)) == [1]
-    state = None
-    observation = np.zeros((3, planner._layout.size), np.float32)
-    for _ in range(3):
-        actions, state = planner.predict(observation, state)
-    assert actions.shape == (3, 5) and (state[1] == 3).all()
-    _, state = planner.predict(observation, state, episode_start=np.array([False, True, False]))
-    assert state[1].tolist() == [4, 1, 4]

@@ -7,7 +7,6 @@ import pytest
 
 from seastar_gym import HeadingTargets, RewardWeights
 from seastar_gym.envs.layout import HEADINGS, Layout
-from seastar_gym.envs.options import wrapped
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import body_heading
 from seastar_gym.gaits import turning_wave
@@ -109,8 +108,3 @@ def test_headings_are_along_the_legs_or_drawn():
     np.testing.assert_array_equal(drawn[0], drawn[2])
     plain = SeastarSwimEnv()
     assert len(np.unique([*drawn[0], *drawn[1]])) == 6 and plain.task.headings_of(plain._robots, 0) is None
-
-
-@pytest.mark.parametrize("angle, turn", [(0, 0), (np.pi, -np.pi), (1.5 * np.pi, -np.pi / 2), (-7.0, 2 * np.pi - 7.0)])
-def test_turns_go_the_shortest_way_round(angle, turn):
-    assert wrapped(np.array(angle)) == pytest.approx(turn, abs=1e-12)

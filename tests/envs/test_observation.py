@@ -10,7 +10,6 @@ from hubs import TEN
 from seastar_gym import (
     Attachment,
     Body,
-    DomainRandomization,
     Numerics,
     Scene,
     Seastar,
@@ -20,7 +19,7 @@ from seastar_gym import (
     Uniform,
 )
 from seastar_gym.envs.commands import command_table
-from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
+from seastar_gym.envs.layout import VELOCITY_SCALE, Layout
 from seastar_gym.envs.observation import observe
 from seastar_gym.envs.stations import at_stations, heading_of, stations_of
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
@@ -52,21 +51,6 @@ def expected_observation(robot: Seastar, q: np.ndarray, v: np.ndarray, waypoint,
     parts = [seen_q / robot.limb_length, seen_v / 0.025, hub_v / 0.025, (targets - hub) / robot.limb_length]
     turned = np.concatenate(parts) * np.exp(-1j * angle)
     return np.stack([turned.real, turned.imag], axis=1).reshape(-1)
-
-
-@pytest.mark.parametrize("entries", [(), HEADINGS])
-@pytest.mark.parametrize("n_limbs, of_limb", [(5, 0), (5, 4), (1, 3)])
-def test_a_layout_names_every_place_once_and_in_the_order_of_the_table(n_limbs, of_limb, entries):
-    at = Layout(n_limbs, of_limb, entries)
-    places = np.arange(at.size)
-    named = (at.positions, at.velocities, at.hub_velocity, at.actuators, at.headings, at.current_waypoint,
-             at.next_waypoint)  # fmt: skip
-    each = [places[place] for place in named]
-    np.testing.assert_array_equal(np.concatenate(each), places)
-    assert [len(one) for one in each] == [2 * 9 * n_limbs] * 2 + [2, n_limbs * of_limb, len(entries), 2, 2]
-    np.testing.assert_array_equal(places[at.waypoints], places[-4:])
-    np.testing.assert_array_equal(places[at.stations_and_hub], places[: 4 * 9 * n_limbs + 2])
-    assert places[at.tips].reshape(n_limbs, 2)[:, 0].tolist() == [18 * limb - 2 for limb in range(1, n_limbs + 1)]
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -182,20 +166,6 @@ def test_a_late_picture_shows_the_robot_as_it_was():
         assert seen[layout.further][-1] == pytest.approx(0.1)
 
 
-def test_velocities_are_differences_of_what_two_decisions_saw():
-    env = env_of(sight=Sight(rate=2.0, sees="pose"), path=[[0.5, 0.0]])
-    env.reset(seed=0)
-    layout, simulator = env.unwrapped.layout, env.unwrapped.simulator
-    places = [(simulator.hub_position()[0], heading_of(simulator)[0])]
-    for action in (3, 8):
-        seen = env.step(action)[0][layout.further]
-        places.append((simulator.hub_position()[0], heading_of(simulator)[0]))
-        (before, old), (after, new) = places[-2:]
-        c, s = np.cos(new), np.sin(new)
-        velocity = np.array([[c, s], [-s, c]]) @ (after - before) / PERIOD / VELOCITY_SCALE
-        np.testing.assert_allclose(seen, [*velocity, (new - old) / PERIOD, 0.0], atol=1e-6)
-
-
 @pytest.mark.parametrize("n", [1, 3, 9])
 def test_markers_are_stations_and_their_velocities_are_differences(n):
     all_seen, some = (env_of(sight=Sight(2.0, sees=sees)) for sees in ("nodes", n))
@@ -255,21 +225,6 @@ def test_commands_reach_the_wires_after_their_delay(whole, rest):
         report = simulator.advance(PERIOD - rest, commands[[arriving]])
     np.testing.assert_array_equal(env.unwrapped.simulator.q, simulator.q)
     assert infos[0]["heating_time"] == 0.0 and infos[3]["heating_time"] == report.heating_time[0] == pytest.approx(0.2)
-
-
-# Draws
-
-
-def test_delays_and_noise_are_drawn_for_every_episode():
-    env = env_of(sight=BAD, action_delay=Uniform(0.0, 0.3))
-    names = ("sight.delay", "sight.noise", "action_delay")
-    drawn = [tuple(env.reset(seed=seed)[1][name] for name in names) for seed in (1, None, None)]
-    assert len(set(drawn)) == 3
-    assert all(0.05 <= delay <= 0.15 and noise <= 2e-3 and late <= 0.3 for delay, noise, late in drawn)
-    draws = DomainRandomization({"sight.delay": Uniform(0.1, 0.2), "robot.density": Uniform(990.0, 1010.0),
-                                 "action_delay": Uniform(0.1, 0.3)})  # fmt: skip
-    info = env_of(sight=Sight(delay=0.01), randomization=draws).reset(seed=0)[1]
-    assert 0.1 <= info["sight.delay"] <= 0.2 and 0.1 <= info["action_delay"] <= 0.3 and info["robot.density"] != 1000.0
 
 
 # Memory of past observations: in the same limbs throughout, and for one episode.

@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from refusals import assert_refused
-from seastar_gym import Attachment, Body, Scene, Seastar
+from seastar_gym import Attachment, Body, Seastar
 from seastar_gym.envs import paths
 from seastar_gym.envs.paths import FEW, PATHS, cross_track_error, make_path, path_length, register_path, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -139,11 +139,6 @@ def test_a_registered_path_can_be_asked_for_by_its_name_and_is_checked(monkeypat
         path_of("nowhere")
 
 
-def test_a_fidelity_of_a_scene_that_nobody_measured_promises_nothing():
-    with pytest.warns(UserWarning, match='fidelity="fast" promises nothing for it, and errors in info are NaN'):
-        SeastarSwimEnv(scene=Scene(Seastar(limb_length=0.12)), fidelity="fast")
-
-
 # Stations lie on the limbs' curve, and are nodes where a node lies there.
 
 
@@ -166,13 +161,6 @@ def test_a_station_where_a_node_lies_is_the_node_and_kernels_are_given_every_wei
         used = slice(int(first), int(last))
         row[used] = own[used]
     np.testing.assert_array_equal(rows, weights(n, 10))
-
-
-@pytest.mark.parametrize("n", [4, 5, 7, 12, 100])
-def test_stations_lie_on_the_spline_through_the_nodes(n):
-    nodes, curve = np.arange(n) / (n - 1), np.random.default_rng(n).normal(size=n)
-    expected = CubicSpline(nodes, curve)(PLACES) - curve[0]
-    np.testing.assert_allclose(weights(n, 10) @ (curve[1:] - curve[0]), expected, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("n", range(2, 11))

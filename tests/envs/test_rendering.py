@@ -2,7 +2,6 @@
 
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -123,30 +122,6 @@ def test_a_picture_is_rgb_of_the_size_asked_for_and_the_same_for_the_same_frame_
         np.testing.assert_array_equal(again.draw(frame), first)
 
 
-DRAWN = Path(__file__).parent / "everything.png"
-"""Picture of everything that a picture may show. Where it is to look otherwise: delete it, run its test, look at it."""
-
-
-@pytest.mark.skipif(pygame.version.ver != "2.5.8", reason="another version draws letters otherwise")
-def test_everything_looks_as_it_did_when_somebody_looked_at_it():
-    angles = np.linspace(0.0, 6.0, 30)
-    course = 0.1 * np.column_stack([np.cos(angles), np.sin(2.0 * angles)]) + [-0.25, 0.0]
-    scenery = SCENERY._replace(lines=(course,))
-    renderer = renderer_of(CROSSING, (640, 480), [0.0, 1.0, 2.0, -1.0, 3.0])
-    roots = 0.02 * np.exp(0.4j * np.pi * np.arange(5)) + 0.1
-    frame = frame_of((0.1, 0.0), (1, -1, 0.5, 0, -0.2), [(0.0, 0.0), (0.06, 0.03), (0.1, 0.0)], 1, 3.25)
-    frame = replace(
-        frame, scenery=scenery, wire_state=np.linspace(0.0, 1.0, 10).reshape(5, 2),
-        roots=np.column_stack([roots.real, roots.imag]), outline=np.column_stack([roots.real, roots.imag]),
-    )  # fmt: skip
-    picture = renderer.draw(frame).astype(float)
-    if not DRAWN.exists():
-        pygame.image.save(pygame.surfarray.make_surface(picture.swapaxes(0, 1)), DRAWN)
-        pytest.fail(f"{DRAWN} is drawn: look at it.")
-    expected = pygame.surfarray.array3d(pygame.image.load(DRAWN)).swapaxes(0, 1).astype(float)
-    assert picture.shape == expected.shape and np.abs(picture - expected).max() <= 2.0
-
-
 def test_what_is_kept_of_a_picture_shows_in_no_other():
     """A renderer that has drawn others draws every picture as a new one does."""
     renderer, far = renderer_of(), frame_of(hub=(0.5, 0.3))
@@ -234,30 +209,6 @@ def test_a_window_closed_by_the_user_stays_closed(dummy_window):
     for _ in range(2):
         assert not renderer.show(frame_of())
         assert not pygame.display.get_init()
-
-
-def test_pictures_survive_a_stranger_who_quits_pygame_and_others_who_take_the_window(dummy_window):
-    renderer, large = renderer_of(), renderer_of(size=(640, 480))
-    before = renderer.draw(frame_of())
-    renderer.show(frame_of())
-    pygame.quit()
-    np.testing.assert_array_equal(renderer.draw(frame_of()), before)
-    assert renderer.show(frame_of()) and large.show(frame_of()) and renderer.show(frame_of())
-    renderer.close()
-    assert large.show(frame_of())
-    large.close()
-
-
-def test_a_window_where_nobody_looks_is_refused(monkeypatch):
-    """SDL has a driver without a display, and takes it without being asked."""
-    pygame.display.quit()
-    for name in ("SDL_VIDEODRIVER", "DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(pygame.display, "get_driver", lambda: "offscreen")
-    monkeypatch.setattr(pygame.display, "init", lambda: None)
-    with pytest.warns(UserWarning, match=r"there is no display.*seastar swim --film"):
-        assert renderer_of().show(frame_of())
-    pygame.display.quit()
 
 
 def test_no_display_for_a_window_is_one_warning(monkeypatch):

@@ -1,9 +1,7 @@
 """One robot behind Gymnasium: spaces, reward, episodes and refusals are what the docstring says."""
 
-import copy
 import pickle
 from dataclasses import replace
-from weakref import WeakSet
 
 import gymnasium as gym
 import numpy as np
@@ -13,7 +11,6 @@ from episodes import break_robot
 from seastar_gym import (
     Body,
     DomainRandomization,
-    Numerics,
     RewardWeights,
     Scene,
     Seastar,
@@ -23,10 +20,7 @@ from seastar_gym import (
     ThermalSma,
     Uniform,
 )
-from seastar_gym.accuracy import chapters_certificate, timed_certificate
-from seastar_gym.accuracy.certificate import MARGIN
 from seastar_gym.envs import rendering, seastar_swim
-from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.paths import cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -53,23 +47,6 @@ def random_episode(env, n_strokes: int, seed: int = 0, **options):
 
 
 # Contracts
-
-
-@pytest.mark.parametrize("fidelity, period", [("fast", 1.0), ("chapter", 1.0), ("reference", 0.5), ("fast", 0.1)])
-def test_info_tells_what_was_measured_of_the_fidelity(fidelity, period):
-    """Of decisions in time, by wires; speeds were measured of strokes."""
-    in_time, scene = period < 1.0, make_scene(None, fidelity, period)
-    certificate = timed_certificate(period) if in_time else chapters_certificate()
-    known, repeated = certificate.of(scene), certificate.repeated(certificate.actions)
-    others = [name for name in certificate.actions if name not in repeated]
-    _, info = SeastarSwimEnv(fidelity=fidelity, decision_period=period).reset(seed=0)
-    assert (info["path_error"], info["gait_error"]) == (known.promise(others), known.promise(repeated))
-    typical = known.typical_error(others), known.typical_error(repeated)
-    assert (info["typical_error"], info["typical_gait_error"]) == typical
-    assert (info["space_error"], info["time_error"]) == (known.space_error, known.time_error)
-    assert info.get("batch_real_time_factor") == (None if in_time else known.speed)
-    assert 0.0 < info["typical_error"] < info["path_error"] and info["typical_gait_error"] < info["gait_error"]
-    assert info["path_error"] <= MARGIN * (info["space_error"] + info["time_error"]) * (1.0 + 1e-2)
 
 
 SOFT, HOT = Seastar(youngs_modulus=2e6), ThermalSma(largest_temperature=60.0)
@@ -118,13 +95,6 @@ def test_a_scene_that_names_no_numerics_is_swum_at_the_fidelity_however_it_is_as
         assert found == replace(preset, robot=replace(preset.robot, density=1100.0))
 
 
-def test_numerics_that_a_scene_names_are_kept():
-    for numerics in (Numerics("sdirk3", 0.05), Numerics(), replace(Scene().numerics, step=2e-3)):
-        assert SeastarSwimEnv(scene=Scene(numerics=numerics)).scene.numerics == numerics
-    chapters = Scene.preset("chapter")
-    assert SeastarSwimEnv(scene=chapters, fidelity="chapter").scene == chapters
-
-
 @pytest.mark.parametrize(
     "scene, angle", [(None, 2 * np.pi / 5), (Scene(Seastar(4, body=Body.rectangle(0.06, 0.03))), np.pi)]
 )
@@ -163,18 +133,6 @@ def test_the_same_episode_under_another_heading_looks_the_same():
     np.testing.assert_allclose(seen_there, seen_here, rtol=0.0, atol=1e-5)
     np.testing.assert_allclose(rewards_there, rewards_here, rtol=0.0, atol=1e-8)
     assert np.abs(there.simulator.positions - here.simulator.positions).max() > 0.01
-
-
-def test_what_a_caller_does_to_infos_and_waypoints_changes_no_robot():
-    env = fast()
-    _, info = env.reset(seed=0)
-    kept = copy.deepcopy(info)
-    second = env.step(STRAIGHT)[0]
-    np.testing.assert_array_equal(info["hub_position"], kept["hub_position"])
-    state, table = env.simulator.get_state(), env.waypoints
-    second[:], info["hub_position"][:], table[:] = 7.0, 7.0, 7.0
-    np.testing.assert_array_equal(env.simulator.positions, state.positions)
-    assert np.abs(env.waypoints).max() < 1.0
 
 
 # Reward and waypoints
@@ -238,21 +196,6 @@ def test_an_episode_is_over_with_success_at_the_last_waypoint():
         env.step(STRAIGHT)
     env.reset()
     assert env.step(STRAIGHT)[2] is False
-
-
-# Episodes
-
-
-def test_a_path_is_copied_when_it_is_asked_for_at_making_or_for_one_episode():
-    path = np.array([[0.1, 0.2], [0.3, 0.4]])
-    env = fast(path=path)
-    expected, path[:] = path.copy(), 9.0
-    env.reset(seed=0)
-    np.testing.assert_array_equal(env.waypoints, expected)
-    env.reset(options={"path": "line"})
-    np.testing.assert_array_equal(env.waypoints, [[0.3, 0.0]])
-    env.reset()
-    np.testing.assert_array_equal(env.waypoints, expected)
 
 
 # Failure
@@ -322,15 +265,3 @@ def test_rendering_without_a_mode_warns_and_draws_nothing():
         env.reset(seed=0)
         with pytest.warns(UserWarning, match="draws nothing"):
             assert env.render() is None
-
-
-def test_whoever_opens_four_environments_is_told_of_batches_once(monkeypatch):
-    monkeypatch.setattr(seastar_swim, "_open", WeakSet())
-    seastar_swim._tell_of_batches.cache_clear()
-    for _ in range(5):
-        SeastarSwimEnv().close()
-    few = [SeastarSwimEnv() for _ in range(3)]
-    with pytest.warns(UserWarning, match="one compiled call"):
-        few.append(SeastarSwimEnv())
-    few.append(SeastarSwimEnv())
-    assert len(seastar_swim._open) == 5

@@ -39,7 +39,7 @@ from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table, to_commands
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry import Symmetry, SymmetryReduction, VectorSymmetryReduction, symmetry_in
+from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from symmetries import elements_of, matrix, reduced_swim, symmetry_for, turns_and_axis
 
@@ -168,15 +168,6 @@ def test_on_a_boundary_the_next_waypoint_decides_and_rounding_does_not(n_limbs, 
     assert symmetry_for(n_limbs).sectors(observation) == (boundary if left else boundary - 1) % (2 * n_limbs)
 
 
-@pytest.mark.parametrize("n_limbs", N_LIMBS)
-@pytest.mark.parametrize("behind", [0.0, np.pi])
-def test_where_nothing_decides_the_sector_is_that_anticlockwise_of_the_boundary(n_limbs, behind):
-    for boundary in range(2 * n_limbs):
-        angle = boundary * np.pi / n_limbs
-        assert symmetry_for(n_limbs).sectors(aimed(n_limbs, angle, angle + behind)) == boundary
-    assert symmetry_for(n_limbs).sectors(aimed(n_limbs, 0.0, 0.0, distance=0.0)) == 0  # a waypoint at the hub
-
-
 # Commands and actions
 
 
@@ -301,23 +292,6 @@ def test_a_scene_that_is_not_symmetric_is_refused_with_its_reason(name):
         VectorSymmetryReduction(SeastarSwimVectorEnv(2, **arguments))
 
 
-@pytest.mark.parametrize("mode", MODES)
-def test_the_symmetry_of_a_scene_is_that_of_its_environment(mode):
-    for scene in (Scene(STAR), Scene(STAR, actuator=SmaWires(0.4))):
-        found = Symmetry.of(scene, mode)
-        assert found == symmetry_in(SeastarSwimEnv(actions=mode, scene=replace(scene, numerics=FAST)))
-
-
-@pytest.mark.parametrize("name", ASYMMETRIC)
-def test_a_refusal_has_its_reason_in_the_swim(name, monkeypatch):
-    """Were the scene accepted, the same reduced actions would not earn the same in a world that is turned."""
-    scene, randomization, _ = ASYMMETRIC[name]
-    actions = pairs_for(scene, 5)
-    monkeypatch.setattr(symmetry.wrappers, "require_symmetry", lambda *_: None)
-    swims = [reduced_swim(scene, randomization, matrix(element, 4), actions)[0] for element in range(8)]
-    assert np.ptp(swims, axis=0).max() > 1e-3
-
-
 def test_actuators_that_remember_say_what_a_mirror_does_and_every_robot_of_a_batch_has_to_be_symmetric():
     with assert_refused("symmetry of the regular polygon", "remember"):
         SymmetryReduction(SeastarSwimEnv(scene=Scene(actuator=Remembering())))
@@ -327,25 +301,3 @@ def test_actuators_that_remember_say_what_a_mirror_does_and_every_robot_of_a_bat
         VectorSymmetryReduction(SeastarSwimVectorEnv(3, scene=one_bent))
     alike = Seastar(4, 4, limb_length=np.array([0.1, 0.11, 0.12]))
     VectorSymmetryReduction(SeastarSwimVectorEnv(3, scene=Scene(alike)))
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_the_wrapper_has_the_masks_of_the_reduced_robot(mode):
-    """A reduced action that the mask forbids is one that would not be followed."""
-    scene = Scene(STAR, actuator=SmaWires(0.4, refractory=True), numerics=FAST)
-    arguments = {"actions": mode, "scene": scene, "decision_period": 0.2, "path": [[-0.05, -0.02], [0.1, 0.1]]}
-    env = SymmetryReduction(SeastarSwimEnv(**arguments))
-    env.reset(seed=0)
-    for action in random_actions(mode, 4, 6):
-        masks = env.action_masks()
-        *_, info = env.step(action)
-        assert (info["masked_limbs"] == 0) == followed_as_a_whole(action, masks, mode)
-        np.testing.assert_array_equal(info["action_mask"], env.action_masks())
-
-
-def followed_as_a_whole(action, mask, mode):
-    if mode == "limbs":
-        return all(mask.reshape(-1, 3)[limb, choice] for limb, choice in enumerate(action))
-    if mode == "continuous":
-        return all(mask.reshape(-1, 2)[limb, int(share < 0)] for limb, share in enumerate(action) if share)
-    return bool(mask[action])

@@ -1,6 +1,5 @@
 """Decisions within a stroke: the timed environments, their actions, masks, heat and pictures."""
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -85,20 +84,6 @@ def test_energy_per_metre_is_that_since_the_reset():
     assert terms == pytest.approx([-1.0, -1.0, 0.0])  # decisions that end within a pulse pay for it all the same
 
 
-# Observations
-
-
-def test_the_memory_of_wires_is_observed_or_not_and_forgotten_at_a_reset():
-    seen = SeastarSwimEnv(actions="pairs", fidelity="fast", decision_period=0.5)
-    blind = SeastarSwimEnv(actions="pairs", fidelity="fast", decision_period=0.5, observe_actuators=False)
-    for observation, other in ((seen.reset(seed=0)[0], blind.reset(seed=0)[0]), (seen.step(7)[0], blind.step(7)[0])):
-        assert observation.shape == seen.observation_space.shape == (196,)
-        assert other.shape == blind.observation_space.shape == (186,)
-        np.testing.assert_array_equal(np.delete(observation, np.s_[182:192]), other)
-    assert sorted(observation[182:192])[-2:] == pytest.approx([5 / 9, 5 / 9])
-    assert not seen.reset()[0][182:192].any()
-
-
 # Masks
 
 
@@ -139,21 +124,3 @@ def test_a_masked_policy_never_loses_a_command_and_wires_that_always_follow_have
         env = SeastarSwimEnv(**arguments)
         assert not {"action_mask", "masked_limbs"} & set(env.reset(seed=0)[1])
         assert env.action_masks().shape == (15,) and env.action_masks().all()
-
-
-# Pictures
-
-
-def test_a_second_has_ten_pictures_of_commands_and_warm_wires():
-    for period, frames, fps in ((1.0, 10, 10), (0.5, 5, 10), (0.1, 1, 10), (0.02, 1, 50)):
-        env = SeastarSwimEnv(decision_period=period, fidelity="fast")
-        assert env.frames_per_stroke == frames and env.metadata["render_fps"] == fps
-    for mode, frames, fps in (("rgb_array", 5, 10 / 3), ("rgb_array_list", 6, 20)):
-        kind = {"decision_period": 0.3, "fidelity": "fast", "render_mode": mode, "frames_per_stroke": frames}
-        makers = (gym.make, gym.make_vec) if mode == "rgb_array" else (gym.make,)
-        assert all(make("SeastarSwim-v0", **kind).metadata["render_fps"] == fps for make in makers)
-    warm, cold = (SeastarSwimEnv(actions="pairs", fidelity="fast", decision_period=period) for period in (0.5, 1.0))
-    for env in (warm, cold):
-        env.reset(seed=0)
-        env.step(7)
-    assert warm.frame().wire_state.max() == pytest.approx(5 / 9) and cold.frame().wire_state is None

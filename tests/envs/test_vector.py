@@ -1,17 +1,15 @@
 """What a native batch offers besides the bits of single environments, which test_conformance.py is about."""
 
 import copy
-import pickle
 
 import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from episodes import SHORT, assert_same_steps, both
+from episodes import SHORT, assert_same_steps
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar
-from seastar_gym.envs.rendering import picture_size
 from seastar_gym.envs.vector import Buffers, SeastarSwimVectorEnv
 
 ID = "SeastarSwim-v0"
@@ -20,17 +18,6 @@ ID = "SeastarSwim-v0"
 def native(num_envs=3, **arguments) -> SeastarSwimVectorEnv:
     arguments = {"fidelity": "fast"} | arguments
     return gym.make_vec(ID, num_envs, "vector_entry_point", **arguments)
-
-
-def test_make_vec_gives_the_native_batch_with_the_registered_time_limit_and_the_mode_asked_for():
-    batch = gym.make_vec(ID, num_envs=2)
-    assert isinstance(batch, SeastarSwimVectorEnv)
-    assert batch.max_episode_steps == 400 and batch.num_envs == 2
-    assert batch.simulator.scene == Scene.preset("balanced")
-    for kind in (batch, SeastarSwimVectorEnv):
-        assert kind.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
-    for mode in AutoresetMode:
-        assert native(autoreset_mode=mode).metadata["autoreset_mode"] is mode
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
@@ -56,25 +43,6 @@ def test_nothing_that_was_returned_changes_later_and_what_a_caller_does_to_it_ch
 # What a vector environment of Gymnasium offers
 
 
-def test_attributes_are_set_as_in_single_environments_and_what_is_common_is_refused():
-    batch, singles = both(ID, 3, fidelity="fast")
-    for env in (batch, singles):
-        for given, kept in ((["a", "b", "c"], ("a", "b", "c")), (7, (7, 7, 7))):
-            env.set_attr("mark", given)
-            assert env.get_attr("mark") == kept
-        with pytest.raises(ValueError, match="2"):
-            env.set_attr("mark", [1, 2])
-    batch.set_attr("max_episode_steps", [3, 3, 3])
-    assert batch.max_episode_steps == 3 and batch.call("get_attr", "actions") == (("limbs",) * 3,) * 3
-    with assert_refused("max_episode_steps", "the same for all"):
-        batch.set_attr("max_episode_steps", [3, 4, 3])
-    for name in ("reset", "step"):
-        with assert_refused(f"use {name}()"):
-            batch.call(name)
-    with pytest.raises(AttributeError, match="no_such_thing"):
-        batch.get_attr("no_such_thing")
-
-
 def test_every_robot_has_its_own_scene_generator_and_promise():
     scene = Scene(Seastar(youngs_modulus=np.array([1e6, 2e6, 3e6])), numerics=Numerics.preset("fast"))
     batch = SeastarSwimVectorEnv(3, scene=scene, path="random", random_heading=True)
@@ -91,21 +59,6 @@ def test_every_robot_has_its_own_scene_generator_and_promise():
     alike.reset(seed=0)
     alike.simulator.set_limb_strengths([[1.0] * 5, [0.5] * 5, [1.0] * 5])
     assert np.isnan(alike.step(np.ones((3, 5), int))[4]["path_error"]).tolist() == [False, True, False]
-
-
-# Pictures
-
-
-def test_pictures_of_many_robots_are_small_and_some_can_be_drawn_alone():
-    pytest.importorskip("pygame")
-    batch = native(40, render_mode="rgb_array", path="random")
-    batch.reset(seed=0)
-    all_of_them = batch.render()
-    assert len(all_of_them) == 40 and {picture.shape for picture in all_of_them} == {(240, 320, 3)}
-    for one in (batch, pickle.loads(pickle.dumps(batch))):
-        np.testing.assert_array_equal(one.render_robots([7])[0], all_of_them[7])
-    for n, width in ((1, 960), (4, 960), (5, 640), (9, 640), (10, 480), (26, 320), (10_000, 320)):
-        assert picture_size(n) == (width, width * 3 // 4) and all(size % 4 == 0 for size in picture_size(7 * n))
 
 
 # A batch writes its results where it is told.

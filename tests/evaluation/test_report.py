@@ -16,7 +16,7 @@ from seastar_gym.envs.frame import Frame
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation import pictures
 from seastar_gym.evaluation.comparison import evaluate
-from seastar_gym.evaluation.films import CLOSING_SECONDS, film, film_format, frequent_colours, shrunk, write_gif
+from seastar_gym.evaluation.films import CLOSING_SECONDS, film, shrunk
 from seastar_gym.evaluation.playback import UNIT, Playback, RecordingEnv
 from seastar_gym.evaluation.report import charts, page
 from seastar_gym.evaluation.report.charts import Curve
@@ -293,49 +293,6 @@ def test_the_robot_moves_as_slider_strokes_and_play_say_and_its_actuated_limbs_a
     assert int(time.input_value()) < 3 * straight.strokes and opened.complaints == []
 
 
-SCALES = """['xaxis', 'yaxis'].map((axis) => {
-    const { range, _length } = document.getElementById(NAME)._fullLayout[axis];
-    return _length / (range[1] - range[0]);
-})"""
-TITLES = "[...document.querySelectorAll('.xtitle, .ytitle')].map((title) => title.textContent)"
-
-
-@pytest.mark.parametrize("size", [(1366, 768), (390, 844)], ids=["laptop", "phone"])
-def test_it_fits_the_screen_with_equal_scales_and_all_columns(open_offline, evaluated, size):
-    watched = Watched(open_offline(evaluated[0] / "report.html", *size))
-    for name in ("#paths", "#speeds"):
-        watched.page.wait_for_selector(f"{name} .main-svg")
-    assert watched.page.evaluate("document.documentElement.scrollWidth") <= size[0]
-    for name in ("playback", "paths"):
-        scales = watched.page.evaluate(SCALES.replace("NAME", repr(name)))
-        assert scales[0] == pytest.approx(scales[1], rel=1e-3)
-        box = watched.page.locator(f"#{name}").bounding_box()
-        assert box["height"] <= size[1] and box["width"] >= 0.6 * min(size[0], 1120)
-    titles = watched.page.evaluate(TITLES)
-    assert len(titles) == 2 * len(["playback", "paths", "curves"])
-    assert {"x [mm]", "y [mm]", "strokes trained"} <= set(titles)
-    cells = watched.page.locator("tbody tr").first.locator("td")
-    assert cells.count() == len(COLUMNS)
-    for cell in cells.all():
-        box = cell.bounding_box()
-        assert box["x"] >= 0 and box["x"] + box["width"] <= size[0] and cell.get_attribute("data-title")
-    watched.page.context.close()
-    assert watched.complaints == []
-
-
-def test_the_dark_mode_has_no_light_picture(open_offline, evaluated):
-    watched = Watched(open_offline(evaluated[0] / "report.html", color_scheme="dark"))
-    colour = "document.getElementById('playback').layout.font.color"
-    watched.page.wait_for_function(f"{colour} === '#e4e8ee'")
-    papers = watched.page.evaluate("[...document.querySelectorAll('.bg, .main-svg')].map((e) => e.style.fill)")
-    assert not [paper for paper in papers if "255" in paper]
-    assert watched.page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(19, 20, 22)"
-    watched.page.emulate_media(color_scheme="light")
-    watched.page.wait_for_function(f"{colour} === '#3a404a'")
-    assert watched.complaints == []
-    watched.page.context.close()
-
-
 # Films have their pictures, in their order and for their time.
 
 
@@ -367,23 +324,3 @@ def test_a_gif_shows_every_picture_and_rests_on_the_last(tmp_path, fps):
     with film(tmp_path / "empty.gif", fps):
         pass
     assert not (tmp_path / "empty.gif").exists()
-
-
-def test_a_gif_is_smaller_and_a_small_flat_area_keeps_its_colour(tmp_path):
-    """As a waypoint does, whose pale fill is near the paper's colour, beside lines that are blended."""
-    blocks, many = np.zeros((3, 4, 3), np.uint8), np.full((120, 160, 3), 250, np.uint8)
-    blocks[0, 0] = 100
-    assert shrunk(blocks).tolist() == [[[25] * 3, [0] * 3]]
-    many[20:100, 20:140] = np.random.default_rng(0).integers(0, 255, (80, 120, 3))
-    many[4:12, 4:12] = PALE
-    assert frequent_colours(many, 2).tolist() == [[250] * 3, PALE.tolist()]
-    write_gif([many], tmp_path / "film.gif", 10.0)
-    with Image.open(tmp_path / "film.gif") as shown:
-        np.testing.assert_array_equal(np.asarray(shown.convert("RGB"))[8, 8], PALE)
-
-
-def test_missing_writers_of_films_are_named(tmp_path, monkeypatch):
-    assert film_format(tmp_path / "film.GIF") == ".gif"
-    monkeypatch.setattr("seastar_gym.files.find_spec", lambda name: None if name == "imageio_ffmpeg" else name)
-    with pytest.raises(ModuleNotFoundError, match=r"Films need imageio_ffmpeg: pip install .*\[render\]"):
-        film_format(tmp_path / "film.mp4")

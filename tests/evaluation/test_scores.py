@@ -7,9 +7,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from refusals import assert_refused
 from seastar_gym.cli.main import main
-from seastar_gym.controllers import GreedyPolicy, load_agent, scripted
+from seastar_gym.controllers import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -18,7 +17,6 @@ from seastar_gym.evaluation.rollout import (
     SECONDS,
     make_batch,
     measure_of,
-    require_seen,
     swim_episodes,
     task_ids,
 )
@@ -78,17 +76,6 @@ def test_a_task_of_another_measure_without_a_batch_is_swum_on_its_held_out_split
     swum = swim_episodes(OTHER, scripted("rest"), [0, 1])
     side = np.hypot(*env.reset(seed=0)[0][182:184]) * 100.0
     np.testing.assert_allclose(MEASURES[Station].of(swum), side, rtol=1e-3)
-
-
-def test_agents_are_made_for_the_environment_they_swim_in_and_refused_where_they_cannot_see():
-    env = SeastarSwimEnv(decision_period=0.5, fidelity="fast")
-    assert load_agent("learned", env).decision_period == 0.5
-    assert load_agent("learned", SeastarSwimEnv()).decision_period == 1.0
-    assert load_agent("greedy", env).scene == env.scene
-    greedy = GreedyPolicy.__new__(GreedyPolicy)
-    greedy.actions, greedy.decision_period = "joint", 0.5
-    with assert_refused("It reads observations of 196 numbers, the task shows 186."):
-        require_seen(greedy, SeastarSwimEnv(decision_period=0.5, observe_actuators=False))
 
 
 # The table

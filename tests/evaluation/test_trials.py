@@ -12,7 +12,6 @@ from seastar_gym.envs.options import SwimOptions, make_scene
 from seastar_gym.envs.robots import Robots
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.waypoints import AlongPath
-from seastar_gym.evaluation import results
 from seastar_gym.evaluation import results as statistics
 from seastar_gym.evaluation.swim import DISTURBANCES, Disturbance, DisturbedRobots, swim, swim_many
 from seastar_gym.evaluation.trials import SETS, read_trials
@@ -112,14 +111,6 @@ def test_swims_of_a_batch_are_those_of_one_robot(agent, path, period, strokes):
     for done in swim_many("many", agent, path, 3, scene, max_strokes=strokes, threads=1, decision_period=period):
         for name in ("hub", "waypoint_index", "time", "limbs_heated", "heating_time", "energy"):
             np.testing.assert_array_equal(getattr(done, name), getattr(one, name))
-
-
-def test_a_swim_ends_at_its_last_waypoint():
-    swims = swim_many("script", scripted("straight"), "line", 2, FAST, max_strokes=100, threads=1)
-    numbers = results.statistics(swims)
-    assert numbers["success_rate"][0] == 1.0
-    assert all(done.strokes < 90 and done.waypoint_index[-2] == 0 for done in swims)
-    assert numbers["strokes_to_finish"][0] == pytest.approx(np.mean([done.strokes for done in swims]))
 
 
 # On the command line; more of it in cli/test_cli.py.

@@ -1,7 +1,6 @@
 """Gradients of swims: against dual lanes, and against differences of swims."""
 
 import runpy
-import sys
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -152,20 +151,6 @@ def test_a_record_keeps_its_own_memory_and_a_tape_grows_where_a_step_needs_more(
     expected = recorded.gradient(slopes, ["robot.density"])
     monkeypatch.setattr(adjoint, "ENTRIES", 1000)
     assert record(SMALL, COMMANDS).gradient(slopes, ["robot.density"]) == expected
-
-
-def test_what_commands_move_costs_by_strokes_and_not_by_their_square():
-    """Ten times as many strokes, ten times the calls: counted, since a clock has other work on it."""
-    calls = []
-    for n in (50, 500):
-        swim, seen = record(SMALL, np.resize(COMMANDS, (n, COMMANDS.shape[1]))), list[str]()
-        sys.setprofile(lambda _frame, event, _of, seen=seen: seen.append(event))
-        try:
-            found = swim.rises_by_commands()
-        finally:
-            sys.setprofile(None)
-        calls.append((len(seen) / n, max(map(len, found))))
-    assert calls[1] == pytest.approx(calls[0], rel=0.1)
 
 
 def test_a_swim_that_failed_has_no_gradient():

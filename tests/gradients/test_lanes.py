@@ -5,7 +5,6 @@ from functools import cache
 import numba
 import numpy as np
 import pytest
-from numba.core.errors import TypingError
 
 from seastar_gym.gradients.tape import DUAL, TAPED
 from seastar_gym.lanes import dual as dual_lanes
@@ -126,16 +125,3 @@ def test_every_robot_has_the_derivatives_of_its_choice():
     _, derivatives, *_ = on_tape(choices, x=(Y + 1.0, Y - 1.0), seed=2.0)
     for slopes, (line, of_x) in zip(derivatives, choices.items(), strict=True):
         np.testing.assert_allclose(slopes[0], np.resize(of_x, len(slopes[0])), rtol=1e-14, err_msg=line)
-
-
-@pytest.mark.parametrize("form", [DUAL, TAPED], ids=str)
-def test_lanes_of_different_forms_do_not_meet(form):
-    """Rows of another width would be written to, in memory that is not theirs."""
-    other = lanes.borrow.at(form)
-
-    @numba.njit(**STRICT)
-    def function(rows):
-        lanes.store(other(rows), 0, lanes.load(lanes.borrow(rows), 0))
-
-    with pytest.raises(TypingError):
-        function(np.zeros((1, 3 * N_LANES)))

@@ -34,10 +34,8 @@ from seastar_gym import (
 from seastar_gym.identify import Measurement, get_parameter, identify, synthetic, trajectory, with_parameters
 from seastar_gym.identify import command as its_command
 from seastar_gym.identify.command import main
-from seastar_gym.identify.fit import estimate_of
 from seastar_gym.identify.measurement import uncertainty_of
-from seastar_gym.identify.search import Found, Residuals
-from seastar_gym.identify.trajectories import batch_of_trajectories, trajectories
+from seastar_gym.identify.trajectories import trajectories
 from seastar_gym.scene.number import numbers_of
 from seastar_gym.scene.scene import load_scene
 
@@ -68,19 +66,6 @@ def test_the_picture_of_a_fit_has_residuals_in_millimetres(golden, monkeypatch):
     made = SimpleNamespace(residuals=positions[::-1] / 3.0, root_mean_square=1.234e-3)
     seen = Measurement(np.arange(3.0), positions, (0, 11), np.zeros((3, 5)))
     golden("fit_picture.txt", drawn(monkeypatch, its_command, partial(its_command.draw, made, seen)))
-
-
-def test_intervals_are_as_wide_as_estimates_scatter():
-    """Over 25 noises; the scatter itself is known to 14 %, and intervals too narrow by 40 % would be 0.6 of it."""
-    scene = Scene(Seastar(nodes_per_limb=4), numerics=Numerics("implicit-midpoint", 0.02, newton_tolerance=1e-6))
-    name, rng = "actuator.peak_angle", np.random.default_rng(0)
-    clean = synthetic(scene, {name: 0.5}, n_strokes=1, noise=0.0)
-    noises = rng.normal(0.0, 1e-3, (25, *clean.positions.shape))
-    fits = [identify(scene, [name], replace(clean, positions=clean.positions + noise)) for noise in noises]
-    scatter = np.std([fit.values[0] for fit in fits], ddof=1)
-    half = np.mean([0.5 * (fit.upper[0] - fit.lower[0]) for fit in fits])
-    assert half / (1.96 * scatter) == pytest.approx(1.0, abs=0.3)
-    assert np.mean([fit.lower[0] < 0.5 < fit.upper[0] for fit in fits]) >= 0.84
 
 
 BODY = Body.rectangle(0.06, 0.03, mass=0.03, drag_turning=1.0, attachments=tuple(
@@ -183,56 +168,6 @@ def test_scenes_side_by_side_move_as_each_would_alone(measurement):
     for scene, found in zip(scenes, trajectories(scenes, measurement), strict=True):
         alone = trajectory(measurement.time, measurement.nodes, measurement.commands, scene)
         np.testing.assert_array_equal(found, alone)
-
-
-def test_intervals_are_students_and_what_is_not_told_is_named(golden):
-    """Two parameters by six numbers: four degrees of freedom. Combinations err by 0.4, which is told, and by 0.6."""
-    turn = np.array([[math.cos(0.32), math.sin(0.32)], [-math.sin(0.32), math.cos(0.32)]])  # 0.95 and 0.31
-    residuals = np.array([0.0, 0.0, 0.0, 0.0, 2.0, 0.0])  # a standard error of one
-    off = -residuals.reshape(3, 1, 2)
-    jacobian = np.zeros((6, 2))
-    jacobian[:2] = np.diag([1.0 / 0.4, 1.0 / 0.6]) @ turn
-    shape = (3, 1, 2)
-    data = Measurement(np.arange(3.0), np.zeros(shape), (0,), np.zeros((1, 5)))
-    simulated = Residuals(SCENE, ("fluid.drag_coefficient", "actuator.peak_angle"), data)
-    vars(simulated).update(names=("a", "b"), guess=np.array([2.0, 3.0]), scenes=lambda x: [SCENE, None])
-    fit = SimpleNamespace(jac=jacobian, fun=residuals, x=np.array([0.1, -0.2]))
-    found = estimate_of(Found(fit, simulated, 1e-3, 1e-5), 0.9)
-    covariance = uncertainty_of(jacobian, residuals, np.repeat(data.time, 2)).covariance
-    half = stats.t.ppf(0.95, 4) * np.sqrt(np.diag(covariance))
-    np.testing.assert_allclose(found.values, [2.0 * math.exp(0.1), 3.0 * math.exp(-0.2)])
-    np.testing.assert_allclose([found.lower, found.upper], found.values * np.exp([-half, half]))
-    assert found.untold == (("a", "b"),) and found.scene is SCENE and (found.residuals == off).all()
-    golden("estimate.txt", f"{found.report()}\n\n{found._replace(untold=(('b',),)).report()}")
-
-
-def test_the_command_takes_a_scene_with_its_own_steps_or_those_it_is_given(tmp_path, monkeypatch):
-    steps = []
-
-    def fitted(scene, names, measurement, largest_delay):
-        steps.append(scene.numerics.step)
-        raise ValueError("enough")
-
-    monkeypatch.setattr(its_command, "identify", fitted)
-    monkeypatch.setattr(its_command.Measurement, "from_csv", lambda *files: None)
-    (tmp_path / "mine.json").write_text(json.dumps(SCENE.to_dict()))
-    own = ["a.csv", "b.csv", "--scene", str(tmp_path / "mine.json")]
-    for line in (own[:2], own, [*own, "--step", "0.02"]):
-        assert main(line) == 2
-    assert steps == [0.005, 0.01, 0.02]
-    for line in ([], ["path.csv"]):
-        with pytest.raises(SystemExit):
-            main(line)
-
-
-def test_a_robot_whose_solver_gives_up_has_no_trajectory(monkeypatch):
-    scene = Scene(Seastar(nodes_per_limb=4), numerics=Numerics("implicit-midpoint", 0.02))
-    time, commands = np.array([0.0, 0.5]), np.zeros((1, 5))
-    for failed, lost in (([True, True], [True, True]), ([False, True], [False, True])):
-        monkeypatch.setattr(Simulator, "failed", property(lambda simulator, failed=failed: np.array(failed)))
-        found = batch_of_trajectories(time, (0, 3), commands, [scene, scene])
-        assert found.shape == (2, 2, 2, 2) and np.isnan(found).all(axis=(1, 2, 3)).tolist() == lost
-        assert np.isnan(found).any(axis=(1, 2, 3)).tolist() == lost
 
 
 # Intervals of a fit hold what they promise where residuals depend on each other, and where they do not.

@@ -82,12 +82,6 @@ def test_a_scene_that_lacks_something_is_told_and_its_intervals_are_not_trained_
     assert Scene.from_dict(json.loads((tmp_path / "fitted.json").read_text())).numerics == RINGING.numerics
 
 
-def test_a_number_at_the_end_of_the_search_is_named(monkeypatch):
-    monkeypatch.setattr("seastar_gym.identify.fit.LARGEST_FACTOR", 1.1)
-    found = identify(with_parameters(RINGING, NAMES[1:], TRUE[1:]), NAMES[:1], track(n_strokes=2))
-    assert found.at_end == NAMES[:1] and "at the end of the search" in found.report()
-
-
 def turned(angle):
     return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
 
@@ -123,8 +117,3 @@ def test_a_track_that_begins_in_a_stroke_is_refused():
                   commands=seen.commands[3:])  # fmt: skip
     with assert_refused("begins at rest"):
         identify(RINGING, NAMES, replace(cut, time=np.minimum(cut.time, 1.9)))
-
-
-def test_an_exact_track_is_not_doubted():
-    found = identify(RINGING, NAMES, track(noise=0.0))
-    assert not found.is_doubted and found.values == pytest.approx(TRUE, rel=0.01)

@@ -23,18 +23,15 @@ from seastar_gym import Body, DomainRandomization, Scene, Seastar, Sight, Simula
 from seastar_gym.cli import drive as drive_command
 from seastar_gym.cli.drive import report
 from seastar_gym.cli.main import main
-from seastar_gym.controllers import learned
-from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.open_loop import OpenLoopPolicy
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.identify import Measurement, trajectory
 from seastar_gym.identify.measurement import ORIENTATION
 from seastar_gym.plant import lines
 from seastar_gym.plant.guard import FIRST, Guard, Limits
 from seastar_gym.plant.lines import LineError, LinePlant, Server, open_serial, opened, sealed
 from seastar_gym.plant.plant import PlantError, Sighting, SimulatedPlant
-from seastar_gym.plant.swim import PlantSwim, nodes_of
+from seastar_gym.plant.swim import PlantSwim
 
 SCENE = Scene(actuator=SmaWires(heating_time=0.08, period=0.5)).at("fast")
 OPTIONS = {"scene": SCENE, "decision_period": 0.5, "actions": "pairs"}
@@ -129,37 +126,6 @@ def test_pulses_are_as_short_and_wires_rest_as_long_as_they_have_to():
             guard.heat([1, 0, 0, 0, 0], seconds)
         guard.begin()
     assert len(plant.pulses) == 2 and plant.stops >= 4
-
-
-def test_a_clock_that_stands_still_stops_the_wires(monkeypatch):
-    plant, guard = guarded()
-    monkeypatch.setattr(plant, "wait", lambda _: None)
-    for wait in (lambda: guard.wait_until(plant.time + 0.1), guard.begin):
-        monkeypatch.setattr(plant, "sight", plant.sight if guard.held_back is None else lambda: None)
-        plant.stops = 0
-        with pytest.raises(PlantError, match="clock stands still"):
-            wait()
-        assert plant.stops
-
-
-@pytest.mark.parametrize("error", [OSError(5, "gone"), KeyboardInterrupt(), MemoryError(), OverflowError("inf")])
-@pytest.mark.parametrize("name", ["now", "sight", "wait", "heat"])
-def test_whatever_ends_a_look_or_a_pulse_stops_all_wires_for_good(name, error, monkeypatch):
-    plant, guard = guarded()
-    guard.heat([1, 0, 0, 0, 0], 0.1)
-    plant.stops = 0
-
-    def fail(*_):
-        raise error
-
-    with monkeypatch.context() as patch:
-        patch.setattr(plant, name, fail)
-        with pytest.raises(type(error)):
-            guard.wait_until(plant.time + 0.05), guard.heat([0, 1, 0, 0, 0], 0.1)
-    assert plant.stops >= 1
-    plant.time += 1.0
-    with pytest.raises(PlantError, match=f"by a {type(error).__name__}"):
-        guard.heat([0, 1, 0, 0, 0], 0.1)
 
 
 # Lines
@@ -321,20 +287,6 @@ def test_a_simulated_plant_is_seen_as_the_environment_sees_its_robot(sees):
         np.testing.assert_allclose(ours.step(action)[0], theirs.step(action)[0], atol=0.02)
 
 
-def test_policies_drive_a_plant_unchanged(tmp_path):
-    """A learned one that was saved, and one of Stable-Baselines3."""
-    plant = PlantSwim(simulated(), **OPTIONS)
-    layout, rng = plant.layout, np.random.default_rng(0)
-    about = Description("pairs", True, SCENE, (8,), 0.5, entries=layout.entries, shows_limbs=False)
-    weights = {name: rng.normal(size=shape).astype(np.float32) for name, shape in about.shapes().items()}
-    learned.save(learned.LearnedPolicy(about, weights, {}), tmp_path / "policy.safetensors")
-    model = pytest.importorskip("stable_baselines3").PPO("MlpPolicy", plant, n_steps=4, batch_size=4, n_epochs=1)
-    for policy in (learned.load(tmp_path / "policy.safetensors"), model.learn(4)):
-        found = rollout(plant, policy, seeds=0, until=4, record=("hub_position",))
-        assert found.decisions == [4]
-        assert np.abs(np.diff(found.entries["hub_position"][:5, 0], axis=0)).max() > 1e-4
-
-
 def test_a_plant_that_stops_truncates_the_episode_and_one_that_sees_no_robot_begins_none():
     plant = simulated()
     env = PlantSwim(plant, **OPTIONS)
@@ -417,12 +369,6 @@ def test_logs_tell_when_commands_were_given_and_what_the_robot_did(scene, nodes,
     assert poses[0, 4] == pytest.approx(1.0, abs=1e-6) and (poses[:, 0] < poses[:, 1]).all() and len(poses) > 100
 
 
-def test_markers_between_nodes_are_not_tracked():
-    assert nodes_of(Seastar(nodes_per_limb=10), 9) == {k: k + 1 for k in range(45)}
-    assert list(nodes_of(Seastar(nodes_per_limb=7), 3).values())[:4] == [2, 4, 6, 8]
-    assert nodes_of(Seastar(nodes_per_limb=5), 3) == {2: 4, 5: 8, 8: 12, 11: 16, 14: 20}
-
-
 @pytest.mark.parametrize("name", ["tracking", "commands", "poses"])
 def test_a_full_disk_stops_the_wires_in_a_sentence(name, tmp_path, monkeypatch):
     def full(path, mode, **_):
@@ -500,25 +446,6 @@ def test_a_simulated_drive_is_planned_driven_and_reported(tmp_path, capsys):
     assert {file.name for file in out.iterdir()} == names
     measured = Measurement.from_csv(out / "tracking.csv", out / "commands.csv")
     assert measured.commands.tolist() == [[0, 1, 0, 0, -1], [0] * 5] * 2 and len(measured.nodes) == 6
-
-
-@pytest.mark.parametrize("sees", ["pose", 1])
-def test_a_drive_is_as_the_policy_was_trained(sees, tmp_path, capsys, monkeypatch):
-    scene = Scene(Seastar(n_limbs=3), actuator=SmaWires()).at("fast")
-    sight = Sight(20.0, delay=0.05, sees=sees)
-    layout = SeastarSwimEnv(scene=scene, sight=sight).layout
-    about = Description(
-        "pairs", True, scene, (4,), 0.25, entries=layout.entries, shows_limbs=layout.shows_limbs, past=2,
-        stations=layout.stations, sight=sight, path="line",
-    )  # fmt: skip
-    weights = {name: np.zeros(shape, np.float32) for name, shape in about.shapes().items()}
-    file = tmp_path / "policy.safetensors"
-    learned.save(learned.LearnedPolicy(about, weights), file)
-    made, make = [], drive_command.PlantSwim
-    monkeypatch.setattr(drive_command, "PlantSwim", lambda *a, **k: made.append(make(*a, **k)) or made[-1])
-    assert main(["drive", str(file), "--seconds", "1", "--yes", "--no-window", "--out", str(tmp_path / "out")]) == 0
-    assert "Driven: 0 of 1 waypoints. The guard had nothing to stop." in capsys.readouterr().out
-    assert {(env.scene, env.decision_period, env.path, env.sight.sees) for env in made} == {(scene, 0.25, "line", sees)}
 
 
 def test_strokes_are_driven_on_wires(tmp_path):

@@ -20,7 +20,6 @@ from seastar_gym import Numerics, Scene, Simulator
 from seastar_gym.cli.shipped import keep
 from seastar_gym.lanes import compile as compilation
 from seastar_gym.lanes.compile import PACKAGE, entry_point, kernel_sources, source_digest
-from seastar_gym.lanes.dispatch import code_for
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
@@ -374,12 +373,6 @@ def test_code_that_came_with_the_package_runs_where_no_folder_can_be_written(shi
     assert "set NUMBA_CACHE_DIR" in sentence
 
 
-def test_what_the_user_has_is_looked_for_first(cached, monkeypatch):
-    monkeypatch.setattr(compilation, "SHIPPED", cached.cache)
-    monkeypatch.setattr(compilation, "ShippedFile", lambda *_: pytest.fail("the package was asked"))
-    assert cached.call() == FOUND
-
-
 @pytest.mark.parametrize("suffix", [".nbi", ".1.nbc"])
 @pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE)
 def test_a_damaged_file_of_the_package_is_as_none(shipped, told, suffix, damage):
@@ -409,14 +402,6 @@ def test_code_of_the_package_that_does_not_fit_never_runs(shipped, monkeypatch, 
     assert [shipped.call(), shipped.call()] == [COMPILED, FOUND]
 
 
-def test_code_of_the_package_fits_all_of_numpy_2(monkeypatch):
-    def digest(version):
-        monkeypatch.setattr(np, "__version__", version)
-        return compilation.shipped_digest.__wrapped__()
-
-    assert digest("2.0.0") == digest("2.9.1") != digest("3.0.0")
-
-
 # Whoever waits is told
 
 NUMBERS = """
@@ -435,26 +420,6 @@ def said(tmp_path: Path, cache: str, before: str = "") -> str:
     environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
     command = [sys.executable, "-c", before + NUMBERS, str(tmp_path / cache), str(tmp_path)]
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stderr
-
-
-def test_the_first_compilation_says_so_once_wherever_it_runs(tmp_path):
-    """Unless logging is told otherwise; where no code can be kept it says in every process what to do."""
-    silent = "import logging; logging.getLogger('seastar_gym').setLevel('ERROR')\n"
-    assert said(tmp_path, "silent", silent) == ""
-    first = said(tmp_path, "cache")
-    assert first.count("\n") == 1 and "compiles" in first
-    assert said(tmp_path, "cache") == ""
-    (tmp_path / "file").write_text("")
-    home = f"import os; os.environ.update(dict.fromkeys(('HOME', 'XDG_CACHE_HOME'), {str(tmp_path / 'file')!r}))\n"
-    for _ in range(2):
-        assert "set NUMBA_CACHE_DIR" in said(tmp_path, "file", home)
-
-
-def test_the_sentence_needs_no_standard_error(fresh, monkeypatch):
-    """As under pythonw."""
-    compilation._say_that_it_compiles.cache_clear()
-    monkeypatch.setattr(sys, "stderr", None)
-    assert fresh.call() == COMPILED
 
 
 # The digest
@@ -486,18 +451,6 @@ def test_digest_changes_with_whatever_machine_code_depends_on(tmp_path, monkeypa
         case package:
             monkeypatch.setattr(getattr(compilation, {"numpy": "np"}.get(package, package)), "__version__", "0")
     assert source_digest(tmp_path) != before
-
-
-def test_code_for_arguments_is_that_of_the_entry_point_for_their_types():
-    @entry_point
-    def twice(pair, out):
-        out[0] = 2.0 * pair[0][0]
-
-    out = np.zeros(1)
-    code = code_for(twice, (np.ones(1), 3), out)
-    assert code is code_for(twice, (np.zeros(2), 1), out)
-    code((np.full(1, 4.0), 5), out)
-    assert out == 8.0 and code_for(len, ()) is len
 
 
 def test_a_stroke_releases_the_gil():

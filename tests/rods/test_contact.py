@@ -14,12 +14,11 @@ from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.model import make_rods
 from seastar_gym.rods.bundles import make_work
 from seastar_gym.rods.contact.coupled import add_contact_product, solve_again_coupled, solve_coupled, solver_iterations
-from seastar_gym.rods.contact.forces import SLOT_ROWS, STIFFNESS, add_contact, add_contact_energy, members, n_listed
+from seastar_gym.rods.contact.forces import SLOT_ROWS, STIFFNESS, add_contact, members, n_listed
 from seastar_gym.rods.contact.pairs import freeze_contact, without_new_crossings
-from seastar_gym.rods.guard import add_held_energy
 from seastar_gym.rods.linear import solve_again, substitute_star
 from seastar_gym.rods.potential import factorise
-from seastar_gym.rods.step import SCHEMES, Stage
+from seastar_gym.rods.step import Stage
 from seastar_gym.rods.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.scene.robot import Discretisation
 from slopes import nodes, plain, rotated, rows
@@ -136,18 +135,6 @@ def test_a_node_counts_once_wherever_along_a_limb_it_stands(shift):
     found = listed_stiffness(touching, q)
     whole = touching.rods.contact.stiffness
     np.testing.assert_allclose(found[5:7], np.broadcast_to(whole[5:7, None], (2, N_LANES)), rtol=1e-9)
-
-
-def test_limbs_that_press_each_other_store_the_same_where_a_stage_asks_and_where_a_state_ends():
-    """Without looking ahead; and it counts at the end of steps whose scheme gives it back."""
-    touching = touching_limbs()
-    args = touching.rods, touching.work
-    stored = plain(add_contact_energy(*args, touching.work.q, Lanes(0.0)))
-    np.testing.assert_allclose(stored, energy(touching), rtol=1e-9)
-    assert np.all(stored > 0.0)
-    for name, scheme in SCHEMES.items():
-        found = plain(add_held_energy(*args, scheme, touching.work.q, Lanes(0.0)))
-        np.testing.assert_array_equal(found, stored if name == "implicit-euler" else 0.0)
 
 
 # Limbs that came to cross: told from limbs that touch, that part, or that crossed before.

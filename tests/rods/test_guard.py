@@ -1,5 +1,5 @@
-"""The guard's parts: energies and work are the oracle's, seen from any frame; cuts keep the momenta; hinges that go
-through their poles are seen. What it promises of strokes: simulator/test_conservation.py."""
+"""The guard's parts: cuts keep the momenta; hinges that go through their poles are seen. What it promises of strokes:
+simulator/test_conservation.py."""
 
 from types import SimpleNamespace
 
@@ -9,7 +9,7 @@ import pytest
 import oracle
 from continuum_oracle import Continuum
 from currents import CURRENTS, velocity
-from hubs import HUBS, TEN
+from hubs import TEN
 from oracle import Star
 from seastar_gym import Scene, SmaPulse, Water
 from seastar_gym.lanes.plain import Lanes, Mask
@@ -18,8 +18,6 @@ from seastar_gym.model import make_rods
 from seastar_gym.rods.bundles import make_work
 from seastar_gym.rods.guard import (
     LARGEST_CUT,
-    add_work_of_loads,
-    allowed_energy,
     hold_to_energy,
     restore,
     rigid_motion,
@@ -27,8 +25,7 @@ from seastar_gym.rods.guard import (
     through_poles,
 )
 from seastar_gym.rods.step import SCHEMES
-from seastar_gym.rods.terms.fluid import add_work_of_current, freeze_fluid
-from seastar_gym.rods.terms.hub import Actuation
+from seastar_gym.rods.terms.fluid import freeze_fluid
 from slopes import nodes, plain, rotated, rows
 from stages import EVERYONE, robot_and_star, turn_limbs
 
@@ -38,9 +35,7 @@ RODS = make_rods(Scene(TEN, actuator=SmaPulse(0.5)))
 
 TERMS = {"tangential_drag_coefficient": 0.2, "added_mass_coefficient": 0.7}
 STREAM = Continuum(**TERMS, current=lambda places: velocity("vortex", places))
-PULL = np.random.default_rng(5).standard_normal((STAR.n_nodes, 2))
-LOADS = tuple((node, *force) for node, force in enumerate(PULL.tolist()))
-STREAM_RODS = make_rods(Scene(TEN, Water(current=CURRENTS["vortex"], **TERMS), SmaPulse(0.5), loads=LOADS))
+STREAM_RODS = make_rods(Scene(TEN, Water(current=CURRENTS["vortex"], **TERMS), SmaPulse(0.5)))
 FRAME = np.random.default_rng(6).uniform(-1.0, 1.0, (2, N_LANES))
 """Velocity that every lane is seen from [m/s]."""
 SEEN_FROM = Lanes(FRAME[0]), Lanes(FRAME[1])
@@ -52,53 +47,6 @@ def moving_robots(seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     shape = (N_LANES, STAR.n_nodes, 2)
     q = STAR.rest + 1e-3 * rng.standard_normal(shape) + 0.3
     return q, 0.2 * rng.standard_normal(shape) + [0.5, -0.2] + 2.0 * (q - 0.3) @ [[0.0, 1.0], [-1.0, 0.0]]
-
-
-# Energies
-
-
-def stored_by_moving(star: Star, first: np.ndarray, last: np.ndarray) -> float:
-    """Energy at the hub of a robot natural at the rotations `first` [rad], at those of `last` [J]."""
-    if star.clamps:
-        return oracle.clamp_slopes(star, star.rest, first - last)[0]
-    kappa_bar = [oracle.natural_strains(star, one)[-5:] for one in (first, last)]
-    return 0.5 * star.EI * star.edge_length * np.sum(np.diff(kappa_bar, axis=0) ** 2)
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("hub", HUBS)
-def test_allowed_energy_is_that_of_the_robot_standing_still_while_its_actuators_move(hub, scheme):
-    """At a step from a quarter to three quarters of an interval; from the larger end and with what moving stores."""
-    robot, star = robot_and_star(hub=hub)
-    rods, (q, v) = make_rods(Scene(robot, actuator=SmaPulse(0.5))), moving_robots()
-    begin, end = np.random.default_rng(1).uniform(-0.4, 0.4, (2, N_LANES, 5))
-    tableau, actuation = SCHEMES[scheme], Actuation(begin.T.copy(), end.T.copy())
-    args = rods, make_work(rods, tableau.n_stages), tableau, actuation, Lanes(0.25), Lanes(0.75), rows(q), rows(v)
-    found = plain(allowed_energy(*args, SEEN_FROM))
-    for lane in range(N_LANES):
-        first, last = (begin[lane] + share * (end[lane] - begin[lane]) for share in (0.25, 0.75))
-        at_start, at_end = (oracle.elastic_energy(star, q[lane], one) for one in (first, last))
-        moved = stored_by_moving(star, first, last)
-        expected = at_end if tableau.dissipative else max(at_start, at_end) + moved
-        seen = v[lane] - FRAME[:, lane]
-        assert found[lane] == pytest.approx(expected + oracle.kinetic_energy(star, seen), rel=1e-12)
-
-
-def test_work_of_currents_and_loads_is_force_times_way_as_the_frame_sees_it():
-    """Drag and the current are those where the stage began; the load's way is that of its node."""
-    h, (q, v), (begin, _) = 0.01, moving_robots(), moving_robots(seed=2)
-    work = make_work(STREAM_RODS, 1)
-    work.q[:], work.step[:] = rows(begin), rows(begin)
-    freeze_fluid(STREAM_RODS, work)
-    of_current, of_loads = (
-        plain(add(STREAM_RODS, work, rows(state), Lanes(h), SEEN_FROM, Lanes(0.0)))
-        for add, state in ((add_work_of_current, v), (add_work_of_loads, q))
-    )
-    for lane in range(N_LANES):
-        drag, fluid = oracle.drag_force(STREAM, v[lane], begin[lane]), velocity("vortex", begin[lane]) - FRAME[:, lane]
-        assert of_current[lane] == pytest.approx(h * np.sum(drag * fluid), rel=1e-12)
-        way = q[lane] - begin[lane] - h * FRAME[:, lane]
-        assert of_loads[lane] == pytest.approx(np.sum(PULL * way), rel=1e-12)
 
 
 def inertia(star: Star, lane_q: np.ndarray) -> np.ndarray:

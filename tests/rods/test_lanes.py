@@ -3,28 +3,23 @@
 Whatever kernels may ask of lanes is asked of the plain twin, too.
 """
 
-import os
-import subprocess
 import sys
 from fractions import Fraction
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba
 import numpy as np
 import pytest
-from numba.core.errors import TypingError
 
 from seastar_gym.lanes import plain as numpy_lanes
 from seastar_gym.lanes import registers as lanes
-from seastar_gym.lanes.compile import STRICT, entry_point, kernel
+from seastar_gym.lanes.compile import STRICT
 from seastar_gym.lanes.pipeline import compiler_of
 from seastar_gym.lanes.registers import N_LANES, NARROW, PLAIN, any_lane, borrow, load, load_number, splat, store
 
 ONLY_COMPILED = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="numba alone looks at the types of arrays")
 ROUNDS_TWICE = sys.version_info < (3, 13)  # the plain twin, before math.fma
-ROOT = Path(__file__).resolve().parents[2]
 SPECIAL = [0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 5e-324, -2.2e-308, 1.8e308, 1e-160, 1e200, 1.0 + 2**-52]
 
 
@@ -214,115 +209,3 @@ def test_narrow_lanes_compute_for_the_first_robots_of_a_row_to_the_same_bits_and
         kernel_of("compiled", "{}", LOOP, ARITHMETIC, form)(operands.a, operands.b, operands.c, out)
     assert_same_bits(narrow[:, : NARROW.width], wide[:, : NARROW.width])
     np.testing.assert_array_equal(narrow[:, NARROW.width :], 0.5)
-
-
-# Refusals
-
-
-REFUSED = [
-    "a ** 2", "a // 2.0", "a % 2.0", "a + None", "a + 'one'", "a + True", "a + 1j", "select(a < b, a, 1j)",
-    "a + (a < b)", "(a < b) + 1.0", "(a < b) & True", "a & b", "~a", "-(a < b)", "(a < b) == (a < c)", "a != b",
-    "abs(a)", "max(a, b)", "a if a < b else b", "(a < b) and (a < c)", "select(a, b, c)", "select(True, a, b)",
-    "select(a < b, 1.0, 2.0)", "select(a < b, a < b, a < c)", "sqrt(2.0)", "absolute(a < b)",
-    "add_product(1.0, 2.0, 3.0)", "add_product(a, b, a < b)", "splat('one')", "splat(True)", "load(a_in, 1.5)",
-    "load(a_rows, 0)", "load_number(a_in, 0)", "splat(any_lane(a))", "splat(any_lane(1.0))", "a < b",
-]  # fmt: skip
-
-
-def test_what_lanes_cannot_do_is_a_typing_error_at_compilation_and_a_type_error_in_plain_python(twin, subtests):
-    one, is_plain = np.ones((1, N_LANES)), twin == "plain" or numba.config.DISABLE_JIT
-    for line in REFUSED:
-        if line == "load(a_rows, 0)" and is_plain:
-            continue  # an array is its own rows in plain Python
-        with subtests.test(line), pytest.raises((TypingError, TypeError)):
-            kernel_of(twin, "{}", LOOP, [line])(one, one, one, one.copy())
-
-
-# The width
-
-
-@pytest.mark.parametrize("width", ["3", "eight", ""])
-def test_an_impossible_width_is_refused(width):
-    environment = {**os.environ, "SEASTAR_LANES": width}
-    command = [sys.executable, "-c", "from seastar_gym import Simulator"]
-    answer = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
-    assert answer.returncode == 1
-    last = answer.stderr.strip().splitlines()[-1]
-    assert f"SEASTAR_LANES={width!r}" in last and "2, 4, 8 or 16" in last
-
-
-# A kernel asks a bundle whether a term is there, and what it does with one that is not need not compile.
-
-
-@ONLY_COMPILED
-@pytest.mark.parametrize(
-    "array",
-    [
-        np.ones((1, N_LANES), np.float32), np.ones((1, N_LANES), np.int64), np.ones((N_LANES, 2)).T,
-        np.ones((2, 2 * N_LANES))[:, ::2], np.ones((1, 1, N_LANES)), (np.ones(3), np.ones(4)), "rows",
-    ],
-    ids=["float32", "int64", "transposed", "strided", "three axes", "plain tuple", "string"],
-)  # fmt: skip
-def test_only_contiguous_float64_rows_and_named_tuples_of_them_can_be_borrowed_and_shared_ones_not_written(array):
-    @compiled
-    def function(rows):
-        return any_lane(load(borrow(rows), 0) > 0.0)
-
-    @compiled
-    def write(rows):
-        store(borrow(rows), 0, 1.0)
-
-    with pytest.raises(TypingError):
-        function(array)
-    with pytest.raises(TypingError):
-        write(np.zeros(3))  # shared
-
-
-class Part(NamedTuple):
-    weight: Any
-
-
-class Whole(NamedTuple):
-    drag: Any
-    part: Any
-
-
-@kernel
-def asked(whole):
-    """Every way to ask."""
-    total = splat(1.0) if whole.drag is None else load(whole.drag, 0)
-    part = whole.part
-    if part is None or part.weight is None:
-        return total
-    if whole.drag is not None and whole.part is not None:
-        total = total + load(whole.drag, 1)
-    return total + load(part.weight, 0)
-
-
-@kernel
-def handed_on(whole):
-    return asked(whole)
-
-
-@entry_point
-def ask(whole, out):
-    store(borrow(out), 0, handed_on(borrow(whole)))
-
-
-TWO, ONE = np.full((2, N_LANES), 3.0), np.full((1, N_LANES), 7.0)
-
-
-@pytest.mark.parametrize(
-    "whole, answer",
-    [
-        (Whole(None, None), 1.0),
-        (Whole(TWO, None), 3.0),
-        (Whole(None, Part(None)), 1.0),
-        (Whole(None, Part(ONE)), 8.0),
-        (Whole(TWO, Part(ONE)), 13.0),
-    ],
-)
-def test_kernels_see_what_a_bundle_has_and_what_it_has_not(whole, answer):
-    out = np.zeros((1, N_LANES))
-    ask(whole, out)
-    np.testing.assert_array_equal(out, answer)

@@ -22,10 +22,8 @@ from seastar_gym.rods.body import place_roots
 from seastar_gym.rods.bundles import make_work
 from seastar_gym.rods.linear import solve_again, substitute_star
 from seastar_gym.rods.potential import elastic_energy, energies, factorise, fill_moments
-from seastar_gym.rods.star import rotation, tangent
-from seastar_gym.rods.terms.along import add_moved_energy, hyperbolic_tangent
-from seastar_gym.rods.terms.clamp import orientation
-from seastar_gym.rods.terms.current import GRID, VORTEX, Current, current_velocity
+from seastar_gym.rods.terms.along import add_moved_energy
+from seastar_gym.rods.terms.current import GRID, Current, current_velocity
 from seastar_gym.rods.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.rods.terms.inertia import kinetic_energy
 from slopes import gradient, plain, rows
@@ -221,10 +219,6 @@ def test_a_matrix_that_is_not_a_number_does_not_pass_for_positive_definite():
         assert np.all(found.pivot[others] > 0.0) and np.isfinite(found.direction[others]).all()
 
 
-def test_a_hub_without_any_preference_has_an_orientation():
-    assert [float(plain(one)) for one in orientation(Lanes(0.0), Lanes(0.0))] == [1.0, 0.0]
-
-
 # Actuators
 
 
@@ -283,16 +277,6 @@ def bilinear(x, y):
     return 0.1 + 0.3 * x - 0.5 * y + 2.0 * x * y, 0.2 * x + 0.05 * y
 
 
-def test_a_vortex_has_its_circulation_far_from_its_core_and_turns_rigidly_within():
-    angles = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
-    directions = np.array([np.cos(angles), np.sin(angles)])
-    eddy = Current(VORTEX, np.array([0.1, -0.05, 0.02, 0.06**2]))
-    for r, speed in ((600.0, 0.02 / 600.0), (6e-6, 0.02 * 6e-6 / 0.06**2)):
-        u = current_at(eddy, np.array([[0.1], [-0.05]]) + r * directions)
-        np.testing.assert_allclose((u * directions).sum(axis=0), 0.0, atol=1e-8 * speed)
-        np.testing.assert_allclose(directions[0] * u[1] - directions[1] * u[0], speed, rtol=1e-6)
-
-
 def test_a_grid_is_bilinear_between_its_samples_and_that_of_the_nearest_edge_beyond():
     """It is continuous across its cells, and what is no place is the first point."""
     current, inside = grid(bilinear), PLACES[:, np.abs(PLACES[1]) < 0.375]
@@ -308,40 +292,6 @@ def test_a_grid_is_bilinear_between_its_samples_and_that_of_the_nearest_edge_bey
     beside = np.array([[1e-12], [0.0]])
     for side in (border - beside, border, border + beside):
         np.testing.assert_allclose(current_at(grid(rough), side), rough(*border), atol=1e-9)
-
-
-# Tangents and rotations of edges
-
-
-# The tangent
-
-
-def tangents(x: np.ndarray) -> np.ndarray:
-    return plain(tangent(Lanes(x)))
-
-
-def test_tangent_is_that_of_numpy_to_a_few_units_in_the_last_place():
-    """Up to 1.3 rad: the chapter's hub hinges, opened by two peaks, need pi/5 + pi/5 = 1.26 rad."""
-    x = np.concatenate([np.linspace(-1.3, 1.3, 200_001), [0.0, -0.0, 1e-300, -1e-9]])
-    exact = np.tan(x.astype(np.longdouble))
-    found = tangents(x)
-    assert np.max(np.abs(found - exact) / np.spacing(np.abs(exact.astype(float)))) < 5.0
-    assert not np.signbit(found[-4])
-
-
-def test_tangent_is_that_of_an_angle_a_few_units_in_the_last_place_away_up_to_the_pole():
-    x = 0.5 * np.pi - np.geomspace(1e-6, 0.4, 10_000)
-    exact = np.tan(x.astype(np.longdouble))
-    # d tan x = (1 + tan^2 x) dx: the pole magnifies what rounding does to the angle.
-    error_in_angle = (tangents(x) - exact) / (1.0 + exact**2)
-    assert np.max(np.abs(error_in_angle)) < 4.0 * np.spacing(1.5)
-
-
-@pytest.mark.parametrize("turns", [0.0, 1e-9, 0.3, 3.1, 3.2, -7.0, 100.0, -1e4])
-def test_rotations_are_those_of_any_angle(turns):
-    c, s = plain(rotation(Lanes(np.array([turns]))))
-    assert c[0] == pytest.approx(np.cos(turns), abs=1e-12) and s[0] == pytest.approx(np.sin(turns), abs=1e-12)
-    assert c[0] ** 2 + s[0] ** 2 == pytest.approx(1.0, abs=1e-15)
 
 
 # Actuators that act along limbs: natural curvature, stiffness, and the energy that moving them stores
@@ -370,14 +320,6 @@ def memory(turns: np.ndarray):
     work = make_work(RODS, 1)
     set_natural_hub_angles(RODS, work, actuation(0.0 * turns, turns), Lanes(1.0))
     return work
-
-
-# Logistic stiffening
-
-
-def test_the_hyperbolic_tangent_is_numpys():
-    x = np.concatenate([np.linspace(-25.0, 25.0, 2001), [0.0, 1e-9, -1e-9]])
-    np.testing.assert_allclose(plain(hyperbolic_tangent(Lanes(x))), np.tanh(x), rtol=2e-15, atol=0.0)
 
 
 # Profiles

@@ -9,7 +9,6 @@ import pytest
 from seastar_gym import Attachment, Body, Limb, Scene, Seastar, Water
 from seastar_gym.model import make_rods
 from seastar_gym.scene.body import Outline, is_convex
-from seastar_gym.scene.shape import lines_cross
 
 TRIANGLE = ((0.03, -0.01), (-0.01, 0.02), (-0.02, -0.02))
 HEXAGON = tuple((0.02 * math.cos(a), 0.02 * math.sin(a)) for a in np.arange(6) * math.pi / 3.0)
@@ -35,19 +34,6 @@ def test_heights_are_over_the_nearest_side_or_corner():
     plate, places = Body.rectangle(0.06, 0.02).shape, [[0.02, 0.02], [-0.04, 0.0], [0.033, 0.014], [0.0, 5e-3]]
     np.testing.assert_allclose(plate.height_over(np.array(places)), [0.01, 0.01, 5e-3, -5e-3], rtol=1e-12)
     np.testing.assert_allclose(Body(radius=0.02).shape.height_over(np.array([[0.03, -0.04]])), [0.03], rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    "other, cross",
-    [
-        ([[1.5, -1.0], [1.5, 1.0]], True), ([[0.5, 1.0], [0.5, -1.0], [9.0, -1.0]], True),
-        ([[0.0, 1.0], [2.0, 1.0]], False), ([[1.5, 1.0], [1.5, 0.5]], False),
-        ([[-1.0, -1.0], [-1.0, 1.0]], False), ([[3.0, -1.0], [3.0, 1.0]], False),
-    ],
-)  # fmt: skip
-def test_lines_cross_within_their_edges(other, cross):
-    line = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
-    assert lines_cross(line, np.array(other)) == lines_cross(np.array(other), line) == cross
 
 
 def on_body(body: Body, **water):
@@ -137,13 +123,3 @@ def test_a_joint_is_a_spring_in_a_row_with_the_clamp():
 def test_whether_an_outline_is_convex_does_not_depend_on_its_size(size, recwarn):
     points = tuple((size * x, size * y) for x, y in TRIANGLE)
     assert is_convex(points) and not is_convex(points[::-1]) and not recwarn
-
-
-def test_limbs_attached_at_the_hub_itself_are_those_without_a_body():
-    for directions in ((0.0,), (0.0, 1.0), (0.0, 1.0, 3.0)):
-        limbs = tuple(map(Limb, directions)) if len(directions) > 1 else ()
-        attached = Body(attachments=tuple(Attachment(0.0, 0.0, angle) for angle in directions))
-        with_body, without = Seastar(len(directions), 5, body=attached), Seastar(len(directions), 5, limbs=limbs)
-        assert [limb.gap for limb in with_body.limb_shapes()] == [limb.gap for limb in without.limb_shapes()]
-        assert with_body.limbs_that_may_touch() == without.limbs_that_may_touch()
-    Scene(Seastar(1, 5, body=Body(radius=0.02)))  # one without a size could not be turned

@@ -10,9 +10,7 @@ from scipy.special import ellipe, ellipk, ellipkm1
 import oracle
 from exact.solutions import let_pass, pause
 from seastar_gym import Disc, Limb, Numerics, Scene, Seastar, Section, Simulator, SmaPulse, Strip, Tube, Water
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.model import make_mesh, make_rods
-from seastar_gym.scene.number import numbers_of, unit_of, with_numbers
 from seastar_gym.scene.section import BROADSIDE, broadside
 from unlike import DIFFERENT, robot_and_star
 
@@ -93,14 +91,6 @@ def test_sections_may_be_profiles_and_differ_from_robot_to_robot():
         np.testing.assert_allclose(mesh.at_nodes.area[0], np.linspace(2e-3, 1e-3, 7) * height)
         middles = 2e-3 - 1e-3 * (np.arange(6) + 0.5) / 6
         np.testing.assert_allclose(mesh.at_edges.reach[:6], 0.5 * middles)
-
-
-def test_numbers_of_sections_have_names_and_units():
-    scene = Scene(star(STRIP))
-    assert numbers_of(scene)["robot.limbs.0.section.width"] == WIDTH
-    assert unit_of(scene, "robot.limbs.0.section.width") == "m"
-    wider = with_numbers(scene, {"robot.limbs.0.section.width": 3e-3})
-    assert wider.robot.limbs[0].section == Strip(3e-3, HEIGHT) and wider.robot.limbs[1].section == STRIP
 
 
 # Swims
@@ -208,14 +198,3 @@ def test_a_gap_wider_than_pi_is_never_the_smallest_opening_angle():
     robot, _ = robot_and_star("a gap wider than pi")
     report = Simulator(Scene(robot, actuator=SmaPulse(0.1), numerics=Numerics(step=0.01))).stroke(np.zeros((1, 3)))
     assert report.smallest_opening_angle[0] == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize("n_limbs", [1, 2, 4, 9, 12])
-def test_the_environment_takes_robots_of_any_number_of_limbs(n_limbs):
-    scene = Scene(Seastar(n_limbs, 4), actuator=SmaPulse(0.1 * (n_limbs > 1)), numerics=Numerics.preset("fast"))
-    env = SeastarSwimEnv(scene=scene, actions="limbs", render_mode="rgb_array")
-    observation, _ = env.reset(seed=0)
-    assert env.observation_space.contains(observation) and observation.size == 36 * n_limbs + 6
-    observation, reward, *_ = env.step(np.zeros(n_limbs, int) + 2)
-    assert np.isfinite(observation).all() and np.isfinite(reward) and env.render().std() > 1.0
-    env.close()

@@ -4,7 +4,6 @@ import copy
 import dataclasses
 import inspect
 import json
-import math
 from collections import OrderedDict, UserDict, UserList, deque
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -231,29 +230,6 @@ def test_what_is_no_scene_is_refused(subtests):
     for data, *words in NO_SCENES:
         with subtests.test(words=words), assert_refused(*words):
             Scene.from_dict(data)
-
-
-@pytest.mark.parametrize(
-    "name, change, words",
-    [
-        ("robot", {"n_arms": 5}, ("Scene.robot says 'n_arms', which no Seastar has",)),
-        ("robot", {"density": math.nan}, ("Scene.robot.density must be a finite number", "nan")),
-        ("robot", {"density": {"kind": []}}, ("Scene.robot.density is of the kind []",)),
-        ("robot", {"density": {"kind": "os.system", "items": ["true"]}}, ("'os.system'", "not known")),
-        ("robot", {"density": {"kind": "per robot", "items": [[1.0]]}}, ("density",)),
-        ("robot", {"density": {"kind": "mapping", "items": [3]}}, ("Scene.robot.density is no dict",)),
-        ("robot", {"density": {"kind": "mapping", "items": [[{"kind": "mapping", "items": []}, 1]]}}, ("no dict",)),
-        ("robot", {"density": {1.0, 2.0}}, ("Scene.robot.density", "{1.0, 2.0}")),
-        ("robot", {"limbs": [{"kind": "SmaPulse"}]}, ("limbs must be a tuple of Limb",)),
-        ("fluid", {"current": {**PLAIN["fluid"]["current"], "velocities": [[["1", "2"]] * 2] * 2}}, ("velocities",)),
-        ("actuator", {"actuator": PLAIN["actuator"]}, ("Limited follows an actuator without memory",)),
-    ],
-)  # fmt: skip
-def test_wrong_words_and_numbers_are_refused_in_one_sentence(name, change, words):
-    data = copy.deepcopy(PLAIN)
-    data[name] |= change
-    with assert_refused(*words):
-        Scene.from_dict(data)
 
 
 def places(data, path=()):

@@ -2,20 +2,15 @@
 
 from dataclasses import replace
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
-from seastar_gym import Contact, DomainRandomization, Numerics, Scene, Seastar, Simulator, SmaPulse, Uniform
+from seastar_gym import Scene, Simulator
 from seastar_gym.accuracy.certificate import resolved
 from seastar_gym.accuracy.commands import STROKES, draw_classes
 from seastar_gym.accuracy.measure import SHORT, swim
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.lanes.registers import N_LANES
-from seastar_gym.scene.scene import LARGEST_OVERLAP
 from seastar_gym.simulator import watches as error_bars
-from seastar_gym.simulator.watches import WINDOW
 
 FAST = Scene.preset("fast")
 N_ROBOTS = N_LANES + 3
@@ -101,40 +96,3 @@ def test_a_robot_that_fails_or_whose_twin_fails_has_no_estimate_until_its_reset(
         assert ill.failed.sum() == 1 and (report.status > 0).sum() == simulator.failed.sum() == (whose == "robot")
     simulator.reset(np.isnan(simulator.error_estimate))
     assert np.isfinite(simulator.stroke(COMMANDS[3]).error_estimate).all()
-
-
-# Info has what is measured, alone as in a batch. NaN would differ from itself in Gymnasium's checker of two runs.
-
-DRAWN = DomainRandomization({"robot.youngs_modulus": Uniform(8e5, 1.2e6), "limb_strengths": Uniform(0.5, 1.0)})
-PRESSING = Scene(
-    Seastar(nodes_per_limb=10),
-    actuator=SmaPulse(0.75),
-    numerics=Numerics.preset("balanced"),
-    contact=Contact(layer=10e-3),
-)
-OWN = replace(FAST, numerics=Numerics("implicit-midpoint", 5e-3, 1e-5))
-MEASURED = {
-    "error_estimate": ({"fidelity": "fast", "error_bars": True, "randomization": DRAWN}, 3, 0.0, (1e-9, 0.01)),
-    "largest_overlap": ({"scene": PRESSING}, 1, 0.0, (0.1, LARGEST_OVERLAP)),
-    "energy_growth": ({"scene": OWN}, WINDOW + 1, 1.0, (1e-9, 2.0)),
-}
-"""Options, decisions, what is known at rest, and bounds afterwards."""
-
-
-@pytest.mark.parametrize("name", MEASURED)
-def test_info_has_what_is_measured_alone_as_in_the_batch_and_nothing_else(name):
-    options, n_steps, at_rest, (low, high) = MEASURED[name]
-    batch = SeastarSwimVectorEnv(2, max_episode_steps=n_steps, **options)
-    singles = [gym.make("SeastarSwim-v0", max_episode_steps=n_steps, **options) for _ in range(2)]
-    first = batch.reset(seed=5)[1]
-    own = [env.reset(seed=5 + k)[1][name] for k, env in enumerate(singles)]
-    assert first[name].tolist() == own == [at_rest] * 2
-    for _ in range(n_steps):
-        actions = np.array([[2, 0, 1, 1, 1], [1, 1, 2, 0, 1]])  # neighbours close
-        info = batch.step(actions)[4]
-        own = [env.step(action)[4][name] for env, action in zip(singles, actions, strict=True)]
-        assert info[name].tolist() == own and info[f"_{name}"].all()
-    assert low < min(own) <= max(own) < high and at_rest not in own
-    assert batch.step(actions)[4][name].tolist() == [at_rest] * 2  # the next episodes have begun
-    silent = SeastarSwimEnv(fidelity="fast")
-    assert name not in silent.reset(seed=0)[1] and name not in silent.step(actions[0])[4]

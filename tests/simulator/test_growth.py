@@ -46,44 +46,6 @@ def test_numerics_that_gather_energy_are_told_once():
     assert np.flatnonzero(np.diff(growth, axis=0).any(axis=1)).tolist() == [*range(WINDOW - 1, 79, EVERY)]
 
 
-def drawn(strokes: int, robots: int, gentle: int = 0, first: float = 1.0) -> np.ndarray:
-    """Random commands, the first strokes of which are gentler."""
-    commands = np.random.default_rng(0).integers(-1, 2, (strokes, robots, 5)).astype(float)
-    commands[:gentle] *= first
-    return commands
-
-
-DAMPED = replace(RESONANT, numerics=replace(RESONANT.numerics, damping=0.005))
-SEVEN, FIVE = (Scene(Seastar(nodes_per_limb=nodes), numerics=CALM) for nodes in (7, 5))
-NO_GROWTH = {
-    "numerical damping": (DAMPED, GAITS, 80, 1.5, WINDOW),
-    # Energies go with the square of commands, and the first strokes begin with the first command.
-    "gentle commands first": (SEVEN, drawn(60, 16, 25, 0.1), 60, 5.0, WINDOW),
-    "no commands first": (SEVEN, drawn(60, 16, 25, 0.0), 60, 5.0, WINDOW + 25),
-    # Equal limbs that all turn alike end at rest, with an energy of rounding.
-    "all limbs alike": (FIVE, np.ones((1, 1, 5)), 40, 1.0 + 1e-9, WINDOW),
-}
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("scene, commands, strokes, most, window", NO_GROWTH.values(), ids=NO_GROWTH)
-def test_who_gathers_no_energy_is_told_nothing(scene, commands, strokes, most, window):
-    growth = swim(scene, strokes, commands)[1]
-    assert growth.max() < most
-    assert (growth[:window] == 1.0).all() and (growth[window:] != 1.0).all()
-
-
-@pytest.mark.filterwarnings("error")
-def test_a_robot_that_drifts_with_the_water_has_no_energy_of_that():
-    commands = drawn(30, 4)
-    still = swim(SEVEN, 30, commands)[1]
-    drifting = Simulator(replace(SEVEN, fluid=Water(current=UniformCurrent(0.5, 0.0))), 4)
-    state = drifting.get_state()
-    drifting.set_state(state._replace(velocities=state.velocities + [0.5, 0.0]))
-    carried = np.array([drifting.stroke(each).energy_growth for each in commands])
-    np.testing.assert_allclose(carried[WINDOW:], still[WINDOW:], rtol=1e-3)
-
-
 U_X = np.array([0.5, -0.2, 0.0, 0.1, 0.3, 0.0, 0.0, 0.2, 0.7])
 
 

@@ -125,25 +125,6 @@ def test_an_interrupted_stroke_is_as_if_it_had_not_begun(monkeypatch, threads, h
     assert_not_begun(simulator, swimmers(1, scene, bars))
 
 
-@BARS
-@THREADS
-@pytest.mark.parametrize("where", ["_begin_interval", "_end_interval"])
-def test_an_interrupt_before_or_after_the_kernels_undoes_the_stroke(monkeypatch, threads, where, bars):
-    simulator, whole = swimmers(threads, bars=bars), getattr(Simulator, where)
-
-    def broken_off(self, *arguments):
-        report = whole(self, *arguments)
-        if self is simulator:
-            raise KeyboardInterrupt
-        return report  # of its twin
-
-    monkeypatch.setattr(Simulator, where, broken_off)
-    with pytest.raises(KeyboardInterrupt):
-        simulator.stroke(COMMANDS[1])
-    monkeypatch.undo()
-    assert_not_begun(simulator, swimmers(bars=bars))
-
-
 @pytest.mark.parametrize("how", ["interrupted", "closed", "dropped", "interrupted by whoever looks"])
 @THREADS
 @BARS
@@ -384,42 +365,6 @@ def interrupted_at_first(after: float | None, cache) -> list[float]:
         took = [process.stdout.readline()] if after is None else time.sleep(after) or []
         process.send_signal(signal.SIGINT)
         return [float(line) for line in [*took, *process.communicate(timeout=500.0)[0].split()]]
-
-
-INTERRUPTED_AT_AN_IMPORT = """
-import signal, sys
-import gymnasium as gym, seastar_gym
-library, left, env = sys.argv[1], [int(sys.argv[2])], None
-
-class Finder:
-    def find_spec(self, name, path=None, target=None):
-        left[0] -= name.partition(".")[0] == library
-        if left[0] == 0:
-            left[0] = -1
-            signal.raise_signal(signal.SIGINT)
-
-def swim():
-    global env
-    env = env or gym.make("SeastarSwim-v0", fidelity="fast", render_mode="rgb_array")
-    env.reset(seed=0)
-    env.render()
-    env.step([1, 0, 0, 2, 0])
-
-sys.meta_path.insert(0, Finder())
-try:
-    swim()
-except KeyboardInterrupt:
-    swim()
-    print("swims")
-"""
-
-
-@pytest.mark.parametrize("library, nth", [("numba", 1), ("numba", 120), ("scipy", 1), ("scipy", 3), ("pygame", 10)])
-def test_the_first_environment_can_be_interrupted_in_the_middle_of_an_import(library, nth):
-    if library == "pygame":
-        pytest.importorskip("pygame")
-    command = [sys.executable, "-c", INTERRUPTED_AT_AN_IMPORT, library, str(nth)]
-    assert subprocess.run(command, capture_output=True, text=True, check=False).stdout == "swims\n"
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Ctrl-C is sent otherwise on Windows")

@@ -23,10 +23,7 @@ from seastar_gym import (
     ThermalSma,
     Water,
 )
-from seastar_gym.envs.robots import first_after
-from seastar_gym.simulator.drive import interval_times, step_times
-from seastar_gym.simulator.report import report_of_pieces
-from seastar_gym.simulator.simulator import completed, pausing
+from seastar_gym.simulator.drive import step_times
 from strokes import assert_same, finished, ternary
 
 FAST = Scene.preset("fast")
@@ -62,18 +59,6 @@ def test_an_interval_pauses_at_the_ends_of_the_steps_in_which_times_lie():
     simulator = Simulator(Scene(Seastar(nodes_per_limb=10), actuator=SmaPulse(0.1, 1e-28, 9e-28), numerics=tiny))
     paused, _ = finished(simulator.stroke_in_parts(np.zeros((1, 5)), 10))
     np.testing.assert_allclose(paused, 1e-28 * np.arange(1, 11), rtol=1e-9, atol=0.0)
-
-
-def test_the_report_of_pieces_counts_what_the_whole_does():
-    pieces = Simulator(scene_with(SmaWires()), 2)
-    commands = np.repeat(LEFT_RIGHT, 2, axis=0)
-    reports = [pieces.advance(0.06, commands), pieces.advance(0.3), pieces.advance(0.14)]
-    found, whole = report_of_pieces(reports), Simulator(scene_with(SmaWires()), 2).advance(0.5, commands)
-    for name in ("status", "steps", "heating_time", "energy", "covered"):
-        np.testing.assert_allclose(getattr(found, name), getattr(whole, name), rtol=1e-12, err_msg=name)
-    np.testing.assert_allclose(found.smallest_opening_angle, whole.smallest_opening_angle, rtol=1e-4)
-    failed = reports[1]._replace(status=np.array([0, 2]))
-    assert report_of_pieces([reports[0], failed, reports[2]]).status.tolist() == [0, 2]
 
 
 TO_THE_BODY = Seastar(nodes_per_limb=6, body=Body(radius=0.02, mass=0.01, centre_of_mass=(0.01, 0.005)))
@@ -184,13 +169,9 @@ def test_commands_that_would_make_limbs_jump_are_refused_and_others_taken_at_any
         assert not simulator.advance(1.0 if name in JUMPING else 0.13, commands).status.any()
 
 
-# --- swimming --------------------------------------------------------------------------------------------------------
-
-
 # Time is counted without drift, and no time step straddles a corner of the pulse
 
 
-CHAPTER = (0.0, 0.1, 1.0)
 durations = st.floats(1e-3, 10.0)
 
 
@@ -224,50 +205,3 @@ def test_a_step_that_divides_the_ramps_up_to_rounding_leaves_no_sliver(n_heating
     times = step_times((0.0, heating, heating + cooling), step)
     assert len(times) == n_heating + n_cooling + 1
     np.testing.assert_allclose(np.diff(times), step, rtol=1e-8)
-
-
-def test_steps_of_an_interval_are_those_of_the_whole_and_one_of_its_ends_cuts_a_step_in_two():
-    whole = step_times(CHAPTER, 0.03)
-    np.testing.assert_array_equal(interval_times(CHAPTER, 0.03, 0.0, 1.0), whole)
-    pieces = [interval_times(CHAPTER, 0.03, begin, 0.1) for begin in np.arange(10) / 10]
-    seen = np.unique(np.round(np.concatenate(pieces), 12))
-    assert set(np.round(whole, 12)) <= set(seen) and len(seen) <= len(whole) + 9
-    on_grid = [*interval_times(CHAPTER, 0.01, 0.0, 0.1 + 0.2), *interval_times(CHAPTER, 0.01, 0.1 + 0.2, 0.7)[1:]]
-    np.testing.assert_array_equal(on_grid, step_times(CHAPTER, 0.01))
-    for begin, duration in ((0.0, 0.25), (0.07, 0.4), (0.0, 3.0), (0.99, 0.4)):
-        times = interval_times(CHAPTER, 0.03, begin, duration)
-        assert times[0] == begin and times[-1] == pytest.approx(begin + duration)
-        assert (np.diff(times) > 0.0).all() and np.diff(times).max() <= 0.03 + 1e-12
-        assert all(corner in times for corner in (0.1, 1.0) if begin < corner < begin + duration)
-
-
-# Intervals that pause are seen at every pause, return what they return, and are closed whatever happens.
-
-
-def interval(closed):
-    """Pauses at 1, 2 and 3; notes that it was closed."""
-    try:
-        yield from (1.0, 2.0, 3.0)
-    finally:
-        closed.append(True)
-    return "report"
-
-
-def test_an_interval_is_seen_at_every_pause_and_closed_by_its_end_with_its_pauses_and_by_what_goes_wrong():
-    seen, closed = [], []
-    assert completed(interval(closed), seen.append) == "report" and seen == [1.0, 2.0, 3.0] and closed == [True]
-    assert list(pausing(interval([]), lambda time: 10.0 * time if time != 2.0 else None)) == [10.0, 30.0]
-    pauses = pausing(interval(closed), float)
-    next(pauses)
-    pauses.close()
-    for run in (completed, lambda *given: list(pausing(*given))):
-        with pytest.raises(ZeroDivisionError):
-            run(interval(closed), lambda time: 1 / 0)
-    assert closed == [True] * 4
-
-
-@pytest.mark.parametrize(
-    "ends, expected", [([], []), ([1.5, 3.0], [2.0, 3.0]), ([0.5, 0.6, 1.0], [1.0]), ([2.0 + 1e-10], [2.0])]
-)
-def test_the_first_time_after_each_end_is_yielded(ends, expected):
-    assert list(pausing(interval([]), first_after(ends))) == expected

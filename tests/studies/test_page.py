@@ -107,11 +107,3 @@ def test_a_path_is_drawn_with_the_mouse_and_is_a_file_for_the_policy(opened, tmp
         opened.click("#who a")
     saved.value.save_as(tmp_path / "path.csv")
     np.testing.assert_allclose(load_path(str(tmp_path / "path.csv")), PATH, atol=1e-4)
-
-
-@pytest.mark.parametrize("opened", [(390, 700), (820, 1000), (1400, 720)], indirect=True)
-def test_it_fits_the_screen(opened):
-    size = opened.viewport_size
-    assert opened.evaluate("document.documentElement.scrollWidth") <= size["width"]
-    box = opened.locator("#water").bounding_box()
-    assert box["width"] > 0.9 * size["width"] and box["height"] > 0.4 * size["height"]

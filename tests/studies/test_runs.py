@@ -10,7 +10,6 @@ import pytest
 
 from seastar_gym import Numerics, Scene, Seastar
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.evaluation.rollout import make_batch
 from seastar_gym.scene.actuators.sma_limb import FREQUENCIES, MEASURED
 from studies import benchmark, fit, gallery, gpu, mutants, robustness, swim_page, tasks
 from studies.command import main
@@ -54,18 +53,6 @@ def test_a_study_runs_in_its_shortest_form_and_writes_its_files(command, tmp_pat
     assert main([*words, "--out", str(out)]) == 0
     assert out.is_file() if files == {""} else files <= {each.name for each in out.glob("*")}
     assert capsys.readouterr().out
-
-
-def test_the_history_keeps_what_was_timed_before_in_units_of_a_fixed_loop(monkeypatch, tmp_path):
-    assert len(benchmark.things()) == 10 and benchmark.unit() > 0.0
-    for day, seconds in ("2026-01-01 10:00", 4.0), ("2026-01-02 10:00", 2.0):
-        monkeypatch.setattr(benchmark, "unit", iter([1.0, 1.0, 3.0, 4.0, 4.0, 1.0, 1.0]).__next__)
-        clock = iter([2.0 * seconds, 4.0 * seconds, 9.0]).__next__
-        monkeypatch.setattr(benchmark, "things", lambda clock=clock: {"a stroke": (3, lambda: clock)})
-        monkeypatch.setattr(benchmark.time, "strftime", lambda _, day=day: day)
-        assert main(["benchmark", "--out", str(tmp_path)]) == 0
-    told = benchmark.table(json.loads((tmp_path / "speed_history.json").read_text()))
-    assert re.search(r"2026-01-01 .* 2026-01-02 ", told) and told.endswith("| a stroke | 4 | 2 | 0.50 |")
 
 
 def test_a_robot_is_small_and_a_stroke_leaves_nothing_behind():
@@ -113,23 +100,6 @@ def test_presets_of_limbs_are_as_near_to_the_measurements_as_a_fit(liquid_metal)
     both = MEASURED[liquid_metal], fit.fit(curves, starts=2)
     error, fitted = (np.sqrt(np.mean(fit.errors(numbers, curves) ** 2)) for numbers in both)
     assert error < 1.01 * fitted and error < (0.07 if liquid_metal > 30 else 0.035)
-
-
-def test_greedy_rules_end_near_no_disc_and_swim_to_the_prize_of_most_worth_per_metre():
-    batch = make_batch("SeastarObstTrap-v0", 1, split="test", fidelity="fast")
-    rule, seen = tasks.greedy(batch), np.array(batch.reset(seed=0)[0])
-    disc = 2.5 * rule.hub[0, rule.choose(seen)[0]]
-    seen[:, batch.unwrapped.layout.further] = np.tile([*disc / batch.unwrapped.scene.robot.limb_length, 1e-3], 6)
-    away = np.hypot(*(rule.hub[0, rule.choose(seen)[0]] - disc))
-    assert 0.6 * np.hypot(*disc) < tasks.CLEAR < away
-    batch = make_batch("SeastarPrizes-v0", 1, split="test", fidelity="fast")
-    batch.reset(seed=0)
-    robots, rule = batch.unwrapped._robots, tasks.greedy(batch)
-    for worth, towards in ((4.0, 1.0), (9.0, -1.0)):
-        robots.episode.prizes[0] = 0.0
-        robots.episode.prizes[0, :2] = [[0.1, 0.0, 3.0], [-0.2, 0.0, worth]]
-        end, heading = rule.hub[0, rule.choose(robots.observe())[0]], robots.heading()[0]
-        assert towards * (end @ [np.cos(heading), -np.sin(heading)]) > 1e-3
 
 
 TOY = {

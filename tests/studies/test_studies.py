@@ -17,7 +17,7 @@ from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 from studies import command, pages
 from studies.command import main, module_of, names
-from studies.frame import DOCS, Results, Study, require_known, rounded
+from studies.frame import DOCS, Study, require_known, rounded
 from studies.pages import BLOCK, stale
 
 STUDIES = {name: module_of(name).STUDY for name in names()}
@@ -93,18 +93,6 @@ def test_the_command_lists_the_studies_and_refuses_others(toy, capsys):
     assert main(["contracts"]) == 2 and "nothing to run" in capsys.readouterr().err
     with assert_refused("Unknown seed '99'"):
         Options((99,))
-
-
-def test_several_processes_fill_one_file(tmp_path):
-    """A cell that another process writes meanwhile stays, and is not computed again."""
-    mine, others = (Results({"command": "x"}, tmp_path / "toy.json", {"strokes": 1}) for _ in range(2))
-
-    def slow():
-        others.fill({("runs", "1"): lambda: "theirs", ("runs", "2"): lambda: "theirs"}, str)
-        return "mine"
-
-    mine.fill({("runs", "0"): slow, ("runs", "1"): lambda: pytest.fail("computed twice")}, str)
-    assert json.loads((tmp_path / "toy.json").read_text())["runs"] == {"0": "mine", "1": "theirs", "2": "theirs"}
 
 
 # Pages

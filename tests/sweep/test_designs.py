@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seastar_gym.gaits import STRAIGHT, lagged_gait, thrifty_gait
 from seastar_gym.scene import Limb, Numerics, Scene, Seastar, SmaPulse
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.simulator import Simulator
-from seastar_gym.sweep.designs import Batch, Choices, Range, Sweep, gait_of
-from seastar_gym.sweep.run import REFUSED, UNITS, swim, ways
+from seastar_gym.sweep.designs import Batch, Choices, Range, Sweep
+from seastar_gym.sweep.run import REFUSED, UNITS, swim
 
 FAST = Scene.preset("fast")
 LENGTH = Range("robot.limb_length", 0.05, 0.15)
@@ -88,12 +87,6 @@ def test_parts_fidelities_and_gaits_are_choices_of_frames():
     assert frames[-1].gait.commands == ((0.0, 1.0, 0.0, -1.0),)
 
 
-def test_a_turn_is_the_short_way_round():
-    way, turn = np.zeros(4, complex), np.array([0.4, 3.0, 3.5, -7.0])
-    found = ways(FAST, np.ones(4), way, turn)["turn"]
-    np.testing.assert_allclose(found, [0.4, 3.0, 3.5 - 2.0 * np.pi, 2.0 * np.pi - 7.0])
-
-
 def test_a_cell_is_named_by_all_that_its_results_depend_on(monkeypatch):
     def names(scene=FAST, axes=(LENGTH,), **options):
         return [batch.name for batch in Sweep(scene, axes, **{"samples": 4, **options}).batches()]
@@ -111,30 +104,6 @@ def test_a_cell_is_named_by_all_that_its_results_depend_on(monkeypatch):
     assert len({name for each in (first, *others, names()) for name in each}) == 13
     told = json.loads(frame.text)  # in order, so a name does not depend on that of a scene's fields
     assert list(told) == sorted(told) and list(told["scene"]["robot"]) == sorted(told["scene"]["robot"])
-
-
-@pytest.mark.parametrize("name, gait", [("lagged", lagged_gait), ("thrifty", thrifty_gait)])
-def test_gaits_in_time_are_those_of_a_tenth_of_a_second(name, gait):
-    wires = Scene(Seastar(6), actuator=SmaWires())
-    found = gait_of(name, wires)
-    np.testing.assert_array_equal(found.commands, gait(0.1, 6))
-    assert found.interval == 0.1 and gait_of("straight", wires).interval is None
-    assert gait_of("1+,3-", FAST).commands == ((1.0, 0.0, -1.0, 0.0, 0.0),)
-
-
-def test_a_range_has_both_ends_and_its_shares_in_between():
-    whole, log = Range("x", 1.0, 100.0), Range("x", 1.0, 100.0, is_log=True)
-    np.testing.assert_allclose(whole.at(np.array([0.0, 0.5, 1.0])), [1.0, 50.5, 100.0])
-    np.testing.assert_allclose(log.at(np.array([0.0, 0.5, 1.0])), [1.0, 10.0, 100.0])
-    assert whole.spaced(1).values == (1.0,) and log.spaced(3).values == pytest.approx((1.0, 10.0, 100.0))
-
-
-@pytest.mark.parametrize("ahead_of_limb", [0, 1])
-def test_a_straight_swim_goes_where_its_gait_is_turned_and_turns_nothing(ahead_of_limb):
-    (batch,) = Sweep(FAST, (), np.roll([STRAIGHT], ahead_of_limb, axis=1), settling=1, measured=2).batches()
-    found = swim(batch)
-    way = np.arctan2(found["aside"][0], found["ahead"][0])
-    assert way == pytest.approx(ahead_of_limb * 0.4 * np.pi, abs=1e-6) and abs(found["turn"][0]) < 1e-9
 
 
 def test_a_swim_is_measured_after_it_has_settled():

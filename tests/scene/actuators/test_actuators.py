@@ -1,8 +1,5 @@
 """Actuators other than the pulse, and weak limbs: what they do to a limb."""
 
-import pickle
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -13,7 +10,6 @@ from seastar_gym.scene.actuators.base import Actuator, complete
 
 NUMERICS = Numerics("implicit-midpoint", 0.01)
 SAMPLED_PULSE = MeasuredCurve((0.0, 0.1, 1.0), (0.0, np.pi / 5, 0.0))
-SLOW = Limited(SmaPulse(), largest_rate=0.5)  # cannot come back within the stroke
 COMMANDS = np.random.default_rng(0).integers(-1, 2, (4, 3, 5)).astype(float)
 
 
@@ -132,34 +128,6 @@ def test_a_limited_limb_turns_as_far_and_as_fast_as_it_may_to_either_side_from_w
     assert half.max() == pytest.approx(2.0 * meeting, rel=0.01)
 
 
-def test_a_limb_that_only_has_a_stop_follows_its_curve_up_to_it():
-    t = np.linspace(0.0, 1.0, 101)
-    for actuator, stop in ((Limited(SmaPulse(), largest_angle=0.4), 0.4), (Limited(SmaPulse()), np.pi / 5)):
-        assert actuator.peak_angle == stop and actuator.period == 1.0 and actuator.corners == SmaPulse().corners
-        for side in (1.0, -1.0):
-            turned, _ = actuator.respond(t, np.full((), side), np.zeros(1))
-            np.testing.assert_array_equal(turned, side * np.minimum(SmaPulse().delta_psi(t), stop))
-        np.testing.assert_array_equal(actuator.delta_psi(t), np.minimum(SmaPulse().delta_psi(t), stop))
-
-
-# --- weak limbs ------------------------------------------------------------------------------------------------------
-
-
-def test_every_robot_may_have_weak_limbs_of_its_own():
-    strengths = np.random.default_rng(0).uniform(0.0, 1.0, (3, 5))
-    for scene in (Scene(numerics=NUMERICS), Scene(actuator=SLOW, numerics=NUMERICS)):
-        batch = Simulator(scene, 3)
-        batch.set_limb_strengths(strengths)
-        copy = pickle.loads(pickle.dumps(batch))
-        for robot, of_robot in enumerate(strengths):
-            alone = Simulator(replace(scene, limb_strengths=tuple(of_robot)))
-            alone.stroke(COMMANDS[0][robot : robot + 1])
-            if robot == 0:
-                batch.stroke(COMMANDS[0])
-                copy.stroke(COMMANDS[0])
-            assert batch.positions[robot].tobytes() == alone.positions[0].tobytes() == copy.positions[robot].tobytes()
-
-
 # --- any actuator ----------------------------------------------------------------------------------------------------
 
 
@@ -168,17 +136,6 @@ def test_a_scene_takes_any_actuator_that_says_what_it_does():
     found = swim(Scene(actuator=Triangle(), numerics=NUMERICS))
     expected = swim(Scene(actuator=MeasuredCurve(Triangle.corners, (0.0, 0.3, 0.0)), numerics=NUMERICS))
     assert found.positions.tobytes() == expected.positions.tobytes()
-
-
-def test_what_an_actuator_of_ones_own_does_not_say_is_not_known():
-    plain, remembering = complete(Triangle()), complete(Remembering())
-    assert not plain.has_memory and plain.mirror == () and plain.rest.shape == (0,)
-    assert remembering.has_memory and remembering.mirror is None and remembering.rest.shape == (1,)
-    for actuator in (plain, remembering):
-        assert actuator.peak_angle == 0.3 and actuator.corners == Triangle.corners and not actuator.can_be_refractory
-        assert np.isnan(actuator.heating_power) and actuator.recall(np.ones(1)) is None
-        assert np.isnan(actuator.seconds_heated(np.ones(2), np.ones(5), np.ones((5, 1)))).all()
-        assert actuator.refractory_wires(np.ones((5, 1))) is None
 
 
 def test_what_an_actuator_of_ones_own_says_is_heeded():

@@ -5,14 +5,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import oracle
 from seastar_gym import AlongLimb, Scene, Seastar, SmaLimb, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.scene.actuators.base import check_actuator
-from seastar_gym.scene.actuators.curves import pulse
 from seastar_gym.scene.actuators.sma_limb import MEASURED
 from studies.fit import curvature
 
@@ -69,22 +66,6 @@ def test_a_deaf_limb_ignores_commands_until_both_wires_are_cold():
     np.testing.assert_allclose(refractory.seconds_heated(np.array([0.0, 1.0]), commands, states), [0.0, 1e-3, 0.1])
     turned, _ = refractory.respond(np.array([0.0, 0.009]), commands, states)
     np.testing.assert_allclose(turned[1] / PEAK, [0.2 - 0.01, -0.01 + 0.008 / 0.9, -0.09], atol=SMALL)
-
-
-def test_all_wires_have_the_same_power_that_of_the_wire_in_the_docstring():
-    heat_capacity = 6450.0 * 460.0 * np.pi / 4.0 * 0.25e-3**2 * 0.1
-    thermal = ThermalSma()
-    power = heat_capacity * thermal.steady_rise / thermal.time_constant
-    assert power == pytest.approx(thermal.heating_power, rel=0.01)
-    assert SmaPulse().heating_power == WIRES.heating_power == thermal.heating_power
-
-
-@pytest.mark.parametrize("period", [0.05, 0.5, 1.0, 2.0])
-def test_corners_are_those_of_the_wire_whatever_the_period(period):
-    wires = SmaWires(period=period)
-    assert set(wires.corners) == {0.0, 0.1, 1.0, period} and wires.period == period
-    check_actuator(wires)
-    assert SmaWires(heating_time=0.1, cooling_time=0.2, period=0.3).corners == (0.0, 0.1, 0.3)
 
 
 # The thermal actuator: its heat, its hysteresis, and what a batch of robots remembers of it.
@@ -244,7 +225,6 @@ def test_presets_bend_by_what_was_measured_and_nearly_reach_their_peak_in_every_
 
 
 CHAPTER = (0.0, 0.1, 1.0)
-durations = st.floats(1e-3, 10.0)
 
 
 def test_pulse_is_exact_at_its_corners_and_that_of_the_oracle_between_them():
@@ -253,10 +233,3 @@ def test_pulse_is_exact_at_its_corners_and_that_of_the_oracle_between_them():
     assert actuator.delta_psi(CHAPTER).tolist() == [0.0, np.pi / 5, 0.0]
     times = np.linspace(0.0, 0.999, 1000)
     np.testing.assert_allclose(actuator.delta_psi(times), [oracle.pulse(t) for t in times], rtol=0.0, atol=1e-15)
-
-
-@given(durations, durations, st.lists(st.floats(-20.0, 40.0), min_size=1, max_size=20))
-def test_pulse_stays_between_zero_and_one_whatever_the_time(heating_time, cooling_time, times):
-    share = pulse(times, heating_time, cooling_time)
-    assert share.shape == (len(times),) and pulse(np.reshape(times, (1, -1)), heating_time, cooling_time).ndim == 2
-    assert np.all((share >= 0.0) & (share <= 1.0))
