@@ -6,7 +6,8 @@ nothing. Settings are the presets, and those of the front that `studies.front` f
 infinitely many nodes per limb and infinitely short steps; seastar_gym/accuracy/measure.py defines them. `--store`
 writes the tables of `seastar_gym.accuracy.chapters`, and `--store --speeds` only their speeds.
 
-`--fresh` swims sequences and decision periods that no table used, and keeps how many err more than is promised.
+`--fresh` swims sequences and decision periods that no table used, and keeps how many err more than is promised;
+`--robots` does so for certificates of other robots.
 """
 
 import itertools
@@ -28,6 +29,7 @@ from seastar_gym.accuracy.certificate import CLASSES_VERSION, REPEATED, at, phys
 from seastar_gym.accuracy.command import progress_bar
 from seastar_gym.accuracy.commands import SECONDS, SLOWEST, SMALL_COMMANDS, STROKES, Batch, decisions, draw_batch
 from seastar_gym.accuracy.measure import (
+    certify,
     errors,
     machine,
     measure_settings,
@@ -40,7 +42,7 @@ from seastar_gym.controllers.contract import actions_of
 from seastar_gym.controllers.registry import load_agent
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.gaits import PAIRS, STRAIGHT, pentagon_gait
-from seastar_gym.scene import Numerics, Scene, SmaWires
+from seastar_gym.scene import Numerics, Scene, Seastar, SmaWires, Water
 from seastar_gym.scene.numerics import PRESETS, Fidelity, Resolution
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.version import __version__
@@ -309,6 +311,40 @@ def fresh_table(results: Mapping[str, Any], name: str) -> str:
     return markdown(["fidelity", *next(iter(results[name].values()))], rows)
 
 
+# Own robots
+
+ROBOTS = {
+    "stiff, E = 10 MPa": Scene(Seastar(youngs_modulus=1e7)), "short, L = 5 cm": Scene(Seastar(limb_length=0.05)),
+    "soft, E = 0.1 MPa": Scene(Seastar(youngs_modulus=1e5)), "thick, r = 3 mm": Scene(Seastar(rod_radius=3e-3)),
+    "slippery, C_d = 0.3": Scene(fluid=Water(drag_coefficient=0.3)),
+}  # fmt: skip
+"""Robots whose certificates are held against fresh sequences."""
+
+
+def certified(scene: Scene, samples: int) -> list[float]:
+    """Of fresh sequences at all settings of a robot's own certificate: how many exceed the promise, of how many, the
+    largest over it, and how many exceed the largest measured error of their own class.
+    """
+    certificate = certify(scene, samples)
+    batch = draw_batch(samples, scene.robot.n_limbs, FRESH_SEED)
+    limit = Resolution("continuum", measuring.MANY_NODES, measuring.SHORT)
+    exact, *swums = swim_all([at(scene, limit), *(certificate.at(each) for each in certificate.settings)], batch.joined)
+    lengths = path_lengths(scene, exact.hub)
+    promised, own = [], []
+    for setting, swum in zip(certificate.settings, swums, strict=True):
+        for name, off in batch.of_classes(errors(swum, exact, lengths).path).items():
+            promised.append(off / setting.promise(beside(name)))
+            own.append(off / setting.errors[name])
+    return [*told_of(np.concatenate(promised)), int((np.concatenate(own) > 1.0).sum())]
+
+
+def robots_table(results: Mapping[str, Any]) -> str:
+    """Fresh swims of own robots beyond their certificates."""
+    rows = [[name, f"{out} of {n:,}", f"{most:g}", str(own)] for name, (out, n, most, own) in results["robots"].items()]
+    head = ["robot", "beyond the promise", "largest error over it", "beyond the largest measured of their class"]
+    return markdown(head, rows)
+
+
 # Tables of pages, from the certificates that come with the package: the largest measured error, and in brackets the
 # median
 
@@ -420,6 +456,8 @@ class Options:
     """What is measured: strokes, decisions of robots of silicone (wires), and of undamped ones."""
     fresh: int = 0
     """Measure nothing, but hold the package's tables against so many fresh sequences of every class."""
+    robots: int = 0
+    """Measure nothing, but certify other robots on so many sequences of every class, and swim as many fresh ones."""
     speeds: bool = False
     """Measure nothing but the speeds of the package's tables again, on a machine that does nothing else."""
 
@@ -436,6 +474,9 @@ def run(options: Options, results: Results) -> None:
     if options.fresh:
         results.read()
         return fresh(results, options.only, options.fresh)
+    if options.robots:
+        cells = {("robots", name): partial(certified, scene, options.robots) for name, scene in ROBOTS.items()}
+        return results.fill(cells, str)
     folder = chapter.FOLDER if options.store else Path("runs/accuracy")
     folder.mkdir(parents=True, exist_ok=True)
     for name in options.only:
@@ -454,6 +495,6 @@ STUDY = Study(
     tables={
         "errors": readme, "choosing": choosing, "presets": presets, "periods": by_period,
         "strokes": partial(by_class, names=("strokes",)), "timed": partial(by_class, names=("wires", "undamped")),
-        **{f"fresh {name}": partial(fresh_table, name=name) for name in TABLES},
+        "robots": robots_table, **{f"fresh {name}": partial(fresh_table, name=name) for name in TABLES},
     },
 )  # fmt: skip
