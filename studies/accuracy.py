@@ -259,7 +259,7 @@ FRESH: tuple[Fidelity, ...] = ("rapid", "fast", "balanced", "accurate")
 
 def exceeding(name: str, samples: int) -> dict[Fidelity, dict[str, Floats]]:
     """Errors of fresh sequences of every class over what `info` promises of presets."""
-    table = TABLES[name]
+    table, known = TABLES[name], certificate_of(name)
     found: dict[Fidelity, dict[str, list[Floats]]] = {fidelity: {} for fidelity in FRESH}
     limit = Resolution("continuum", measuring.MANY_NODES, Numerics("implicit-midpoint", 0.2 * MILLI, TIGHT))
     for batches in table.batches(FRESH_SEED, samples, FRESH_PERIODS):
@@ -271,13 +271,14 @@ def exceeding(name: str, samples: int) -> dict[Fidelity, dict[str, Floats]]:
             lengths = path_lengths(table.scene, hub, shortest)
             for fidelity, swum in zip(FRESH, swums, strict=True):
                 for each, path in batch.of_classes(errors(swum, exact, lengths).path).items():
-                    found[fidelity].setdefault(each, []).append(path / in_table(fidelity, name).promise(beside(each)))
+                    found[fidelity].setdefault(each, []).append(
+                        path / in_table(fidelity, name).promise(beside(each, known))
+                    )
     return {fidelity: {each: np.concatenate(some) for each, some in by.items()} for fidelity, by in found.items()}
 
 
-def beside(name: str) -> tuple[str, ...]:
-    """Classes of strokes or decisions that stand behind the same entry of `info` as one class."""
-    of = next(known for known in map(certificate_of, TABLES) if name in known.settings[0].errors)
+def beside(name: str, of: Certificate) -> tuple[str, ...]:
+    """Classes of a certificate that stand behind the same entry of `info` as one class."""
     if name == SMALL_COMMANDS:
         return (name,)
     repeated = name.startswith(REPEATED)
@@ -333,7 +334,7 @@ def certified(scene: Scene, samples: int) -> list[float]:
     promised, own = [], []
     for setting, swum in zip(certificate.settings, swums, strict=True):
         for name, off in batch.of_classes(errors(swum, exact, lengths).path).items():
-            promised.append(off / setting.promise(beside(name)))
+            promised.append(off / setting.promise(beside(name, certificate)))
             own.append(off / setting.errors[name])
     return [*told_of(np.concatenate(promised)), int((np.concatenate(own) > 1.0).sum())]
 

@@ -31,6 +31,7 @@ import gymnasium as gym
 import numpy as np
 import seastar_gym
 from seastar_gym import Body, Contact, Limb, Scene, Seastar, Simulator, UniformCurrent, Water
+from seastar_gym.gradients import differentiate, record
 
 def stroke(n=1, **parts):
     simulator = Simulator(Scene(**parts), n)
@@ -40,6 +41,12 @@ def stroke(n=1, **parts):
 def swim(env):
     env.reset(seed=0)
     env.step(env.action_space.sample())
+
+def forward_and_back():
+    scene, commands = Scene.preset('fast'), np.ones((1, 5))
+    differentiate(scene, commands, ['commands'])
+    swum = record(scene, commands)
+    swum.gradient({'positions': np.ones(swum.swim.positions.shape)}, ['commands'])
 """
 KINDS = {
     "an environment": "swim(gym.make('SeastarSwim-v0'))",
@@ -48,6 +55,7 @@ KINDS = {
     "current": "stroke(fluid=Water(current=UniformCurrent(0.01, 0.0)))",
     "contact": "stroke(contact=Contact())",
     "body": "stroke(robot=Seastar(body=Body(radius=0.02, mass=0.01)))",
+    "gradients": "forward_and_back()",
     "sections": "stroke(3, robot=Seastar(limbs=(Limb(radius=1e-3 * np.array([1.0, 1.1, 1.2])),) * 5))",
 }
 """Scenes whose code is compiled before the tests begin, side by side."""
