@@ -57,8 +57,7 @@ try:
     from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
     from seastar_gym.command import ended_by_disk
     from seastar_gym.controllers.learned import load as load_policy
-    from seastar_gym.evaluation.report.charts import Curve, read_progress
-    from seastar_gym.evaluation.report.page import Remarks
+    from seastar_gym.evaluation.report import Curve, Remarks, read_progress
 except ModuleNotFoundError as missing:
     sys.exit(f'train.py needs {missing.name}: pip install "seastar-gym[train]".')
 

@@ -25,9 +25,8 @@ from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.learned import LearnedPolicy, load, save
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.sight import Camera, read_camera, told
-from seastar_gym.envs.symmetry import Symmetry, VectorFrameStack
-from seastar_gym.envs.symmetry.symmetry import inverse
-from seastar_gym.evaluation.report.page import Remarks
+from seastar_gym.envs.symmetry import Symmetry, VectorFrameStack, inverse
+from seastar_gym.evaluation.report import Remarks
 from seastar_gym.scene.checks import require_count, require_kind
 
 PAST = 8

@@ -39,8 +39,7 @@ from seastar_gym.controllers.learned import save as save_policy
 from seastar_gym.envs.options import scene_at
 from seastar_gym.envs.randomization import DomainRandomization, Uniform
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.evaluation.report.charts import read_progress
-from seastar_gym.evaluation.report.page import ResultsTable
+from seastar_gym.evaluation.report import ResultsTable, read_progress
 from seastar_gym.evaluation.swim import Swim, swim
 from seastar_gym.files import PART, is_left_behind, is_part_of, read_json, write_atomically, write_json, write_lines
 from seastar_gym.identify.fit import DOUBT

@@ -66,12 +66,12 @@ from .envs.randomization import Uniform as Uniform
 from .envs.sight import Sight as Sight
 from .envs.symmetry import SymmetryReduction as SymmetryReduction
 from .envs.symmetry import VectorSymmetryReduction as VectorSymmetryReduction
-from .envs.tasks.fail_blind import FailBlind as FailBlind
-from .envs.tasks.miswired import Miswired as Miswired
+from .envs.tasks.hidden import FailBlind as FailBlind
+from .envs.tasks.hidden import Miswired as Miswired
+from .envs.tasks.hidden import SimToReal as SimToReal
 from .envs.tasks.obst_trap import ObstTrap as ObstTrap
 from .envs.tasks.prey import Prey as Prey
 from .envs.tasks.prizes import Prizes as Prizes
-from .envs.tasks.sim_to_real import SimToReal as SimToReal
 from .envs.tasks.station import Station as Station
 from .scene import AlongLimb as AlongLimb
 from .scene import Attachment as Attachment

@@ -17,7 +17,6 @@ from packaging.version import Version
 
 import seastar_gym
 from seastar_gym import controllers
-from seastar_gym.envs import symmetry
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -111,7 +110,7 @@ def test_every_import_has_its_requirement(folders, extras):
 def test_names_of_the_package_are_those_of_its_modules():
     """What type checkers see, what is there when asked for, what `dir` says and what the site tells are the same."""
     reference = runpy.run_path(str(ROOT / "docs" / "_extensions" / "reference.py"))
-    for package in (seastar_gym, controllers, symmetry):
+    for package in (seastar_gym, controllers):
         for line in ast.parse(Path(package.__file__).with_suffix(".pyi").read_text()).body:
             home = importlib.import_module(f".{line.module or ''}", package.__name__)
             for alias in line.names:

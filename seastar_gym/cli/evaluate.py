@@ -40,7 +40,7 @@ from seastar_gym.scene.checks import require_count, require_number, require_peri
 from seastar_gym.scene.numerics import Fidelity
 
 if TYPE_CHECKING:
-    from seastar_gym.evaluation.report.page import Remarks
+    from seastar_gym.evaluation.report import Remarks
 
 OF_TRIALS, OF_TASKS = ("learned", "greedy", "pentagon"), ("learned", "greedy", "random")
 """Agents of trials and of tasks unless others are named."""
@@ -133,8 +133,7 @@ def compared(options: argparse.Namespace, command: str) -> int:
 def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: str) -> "Remarks":
     """Remarks of the report: how the agents were trained, and how the report was made."""
     require_extra("Reports", "report", "plotly")
-    from seastar_gym.evaluation.report.charts import Curve, read_progress
-    from seastar_gym.evaluation.report.page import Remarks, trials_table
+    from seastar_gym.evaluation.report import Curve, Remarks, read_progress, trials_table
 
     trainings = {name: one.training for name, one in agents.items() if isinstance(one, LearnedPolicy)}
     progress = {name: how["progress"] for name, how in trainings.items() if "progress" in how}

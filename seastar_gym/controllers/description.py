@@ -13,8 +13,7 @@ from seastar_gym.envs.commands import Actions, Discrete, checked_decision_period
 from seastar_gym.envs.layout import N_STATIONS, OBSERVATION_LAYOUT, Entry, Layout, memory_size
 from seastar_gym.envs.randomization import Distribution
 from seastar_gym.envs.sight import Drawn, Sight, require_action_delay
-from seastar_gym.envs.symmetry import FrameStack, Symmetry, memory_mirror, symmetry_of
-from seastar_gym.envs.symmetry.symmetry import MOST_PAST
+from seastar_gym.envs.symmetry import MOST_PAST, FrameStack, Symmetry, memory_mirror, symmetry_of
 from seastar_gym.files import parse_json
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.base import Mirror

@@ -221,7 +221,7 @@ def require_task(name: str, task: Task | None) -> None:
     A policy of `SimToReal` swims along waypoints, also those of a plant.
     """
     from seastar_gym.envs.tasks import NAMED, name_of  # whoever has a task has imported them
-    from seastar_gym.envs.tasks.sim_to_real import SimToReal
+    from seastar_gym.envs.tasks.hidden import SimToReal
     from seastar_gym.envs.waypoints import AlongPath
 
     is_swim = task is None or isinstance(task, AlongPath)

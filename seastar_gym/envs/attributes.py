@@ -8,6 +8,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from enum import Enum
+from operator import attrgetter
 from os import PathLike, fspath
 from typing import Any
 
@@ -29,6 +30,11 @@ from seastar_gym.scene.serial import KINDS, to_dict
 from seastar_gym.simulator import Simulator
 
 
+def _of_robots(place: str, says: str) -> Any:
+    """Property that reads what the robots of an environment have at a place."""
+    return property(attrgetter(f"_robots.{place}"), doc=says)
+
+
 class RobotsEnv:
     """Base of the environments: their robots, and the spaces of one of them.
 
@@ -44,6 +50,31 @@ class RobotsEnv:
     from the next episode on, or is refused, see `Robots.ask`."""
     _is_made = False
     _spec: EnvSpec | None = None
+
+    task: Task = _of_robots(
+        "task", "What the robots swim for; a `AlongPath` of waypoints unless another task was given."
+    )
+    split: Split = _of_robots("split", "Which episodes of a task are drawn.")
+    decision_period: float = _of_robots("decision_period", "Time between decisions [s], which a step takes.")
+    timed: float | None = _of_robots(
+        "timed", "Time between decisions [s], None where they are strokes of the actuator."
+    )
+    observe_actuators: bool = _of_robots(
+        "options.observe_actuators", "Whether observations have the memory of the actuators."
+    )
+    added_mirror: Mirror = _of_robots(
+        "added_mirror", "What a mirror does to the numbers that the task adds to a limb's in the observation."
+    )
+    layout: Layout = _of_robots("layout", "What one robot's observation consists of, and the places of all that.")
+    sight: Sight | None = _of_robots("options.sight", "Camera through which robots are seen, None for full sight.")
+    action_delay: Drawn = _of_robots(
+        "options.action_delay", "Time from a decision to the heat of wires [s], or its distribution."
+    )
+    scene: Scene = _of_robots("scene", "Scene as it was given, before `randomization` draws any of its numbers.")
+    randomization: DomainRandomization | None = _of_robots(
+        "options.randomization", "Distributions of the numbers that are drawn for every episode."
+    )
+    simulator: Simulator = _of_robots("simulator", "Simulator of all robots of the environment.")
 
     def _take(self, robots: Robots) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
         """Take the robots; returns the spaces of one robot's actions and observations."""
@@ -84,64 +115,9 @@ class RobotsEnv:
         self._spec = None if spec is None else _as_plain(spec)
 
     @property
-    def task(self) -> Task:
-        """What the robots swim for; a `AlongPath` of waypoints unless another task was given."""
-        return self._robots.task
-
-    @property
-    def split(self) -> Split:
-        """Which episodes of a task are drawn."""
-        return self._robots.split
-
-    @property
-    def decision_period(self) -> float:
-        """Time between decisions [s], which a step takes."""
-        return self._robots.decision_period
-
-    @property
-    def timed(self) -> float | None:
-        """Time between decisions [s], None where they are strokes of the actuator."""
-        return self._robots.timed
-
-    @property
-    def observe_actuators(self) -> bool:
-        """Whether observations have the memory of the actuators."""
-        return self._robots.options.observe_actuators
-
-    @property
-    def added_mirror(self) -> Mirror:
-        """What a mirror does to the numbers that the task adds to a limb's in the observation."""
-        return self._robots.added_mirror
-
-    @property
-    def layout(self) -> Layout:
-        """What one robot's observation consists of, and the places of all that."""
-        return self._robots.layout
-
-    @property
     def headings(self) -> HeadingTargets | None:
         """Headings that are asked for at the waypoints, None if none are."""
         return getattr(self.task, "headings", None)
-
-    @property
-    def sight(self) -> Sight | None:
-        """Camera through which robots are seen, None for full sight."""
-        return self._robots.options.sight
-
-    @property
-    def action_delay(self) -> Drawn:
-        """Time from a decision to the heat of wires [s], or its distribution."""
-        return self._robots.options.action_delay
-
-    @property
-    def scene(self) -> Scene:
-        """Scene as it was given, before `randomization` draws any of its numbers."""
-        return self._robots.scene
-
-    @property
-    def randomization(self) -> DomainRandomization | None:
-        """Distributions of the numbers that are drawn for every episode."""
-        return self._robots.options.randomization
 
     def privileged_observations(self) -> NDArray[np.float32]:
         """What would be observed now without a `Sight`: the true state, for rewards and critics of a training.
@@ -149,11 +125,6 @@ class RobotsEnv:
         Shape (n_robots, size), in the layout of `SeastarSwim-v0` in this scene, `Layout.of(scene)`.
         """
         return self._robots.privileged_observations()
-
-    @property
-    def simulator(self) -> Simulator:
-        """Simulator of all robots of the environment."""
-        return self._robots.simulator
 
 
 def arguments_of(init: Callable[..., None]) -> frozenset[str]:

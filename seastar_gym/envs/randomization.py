@@ -54,21 +54,13 @@ class Uniform:
 
 @register_part
 @dataclass(frozen=True)
-class LogUniform:
+class LogUniform(Uniform):
     """Between `low` and `high`, both above zero, with a uniform logarithm."""
-
-    low: float
-    high: float
 
     def __post_init__(self) -> None:
         make_floats(self)
         require_number("low", self.low, "of its number")
-        Uniform(self.low, self.high)
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Smallest and largest number that can be drawn."""
-        return self.low, self.high
+        super().__post_init__()
 
     def draw(self, rng: np.random.Generator) -> float:
         """One number."""

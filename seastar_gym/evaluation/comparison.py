@@ -26,7 +26,7 @@ from seastar_gym.scene.checks import require_count, require_kind
 from seastar_gym.scene.serial import read
 
 if TYPE_CHECKING:
-    from seastar_gym.evaluation.report.page import Remarks
+    from seastar_gym.evaluation.report import Remarks
 
 
 def evaluate(
@@ -101,7 +101,7 @@ def evaluate(
             write_csv(time_series(swims), folder / "trajectories.csv")
             files.append("trajectories.csv")
         if report is not None:
-            from seastar_gym.evaluation.report.page import write_report
+            from seastar_gym.evaluation.report import write_report
 
             films = {name: file.name for name, file in videos.items()}
             write_report(

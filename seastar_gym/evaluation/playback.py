@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.frame import Frame
+from seastar_gym.envs.rendering import Frame
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
 UNIT = 1e-4

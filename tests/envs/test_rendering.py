@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from seastar_gym import Body, Scene, Seastar, Simulator
-from seastar_gym.envs.frame import Frame, body_of
 from seastar_gym.envs.paths import PATHS, make_path
-from seastar_gym.envs.rendering import SMALLEST, Renderer
+from seastar_gym.envs.rendering import SMALLEST, Frame, Renderer, body_of
 from seastar_gym.envs.scenery import Ring, Scenery
 from seastar_gym.scene.water import ShearCurrent, UniformCurrent, Vortex
 

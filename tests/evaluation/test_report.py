@@ -12,15 +12,13 @@ from evaluation.made_up import MARKUP, swims
 from refusals import assert_refused
 from seastar_gym import Scene, UniformCurrent, Vortex
 from seastar_gym.controllers.open_loop import scripted
-from seastar_gym.envs.frame import Frame
+from seastar_gym.envs.rendering import Frame
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.evaluation import pictures
+from seastar_gym.evaluation import pictures, report
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.films import CLOSING_SECONDS, film, shrunk
 from seastar_gym.evaluation.playback import UNIT, Playback, RecordingEnv
-from seastar_gym.evaluation.report import charts, page
-from seastar_gym.evaluation.report.charts import Curve
-from seastar_gym.evaluation.report.page import Remarks, ResultsTable
+from seastar_gym.evaluation.report import Curve, Remarks, ResultsTable
 from seastar_gym.evaluation.results import COLUMNS, as_text, results, statistics, time_series, write_csv
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.evaluation.trials import MEASURED
@@ -73,9 +71,9 @@ def test_tables_and_files_of_swims_are_as_kept(kept, tmp_path):
 def test_trials_are_as_kept(kept, tmp_path):
     file = tmp_path / "trials.csv"
     file.write_text(csv_of(TRIALS, TRIAL))
-    rows = page.read_trials(file)
+    rows = report.read_trials(file)
     kept("trials.txt", "\n\n".join([trials_as_text(rows), trials_as_text(rows, 0.2)]))
-    kept("trials.html", page.table_html(page.trials_table(file)))
+    kept("trials.html", report.table_html(report.trials_table(file)))
 
 
 def drawn(figure):
@@ -125,8 +123,8 @@ def playback_of(done):
 
 def test_a_report_is_as_kept(kept, monkeypatch, tmp_path):
     """With all that it can show; names and sentences are text, not markup."""
-    (tmp_path / "page.html").write_text("{{title}}\n{{plotly}}\n{{sections}}\n{{swims}}\n")
-    monkeypatch.setattr(page, "PAGE", tmp_path / "page.html")
+    (tmp_path / "report_template.html").write_text("{{title}}\n{{plotly}}\n{{sections}}\n{{swims}}\n")
+    monkeypatch.setattr(report, "PAGE", tmp_path / "report_template.html")
     monkeypatch.setattr("plotly.offline.get_plotlyjs", lambda: "(plotly)")
     monkeypatch.setattr("plotly.io.to_html", of_figure)
     done = swims()[:2]
@@ -142,18 +140,18 @@ def test_a_report_is_as_kept(kept, monkeypatch, tmp_path):
         ("plain", "pentagon", Remarks(curves=two), {}),
     ):
         recorded = list(map(playback_of, done))
-        page.write_report(tmp_path / "report.html", path, done, recorded, 2e-3, more, **shown)
+        report.write_report(tmp_path / "report.html", path, done, recorded, 2e-3, more, **shown)
         text = (tmp_path / "report.html").read_text(encoding="utf-8")
         *_, swum = text.splitlines()
         assert MARKUP not in text and "<" not in swum and json.loads(swum)["swims"][1]["agent"] == MARKUP
         kept(f"report_{name}.txt", text.replace(',"', ',\n"'))
     titles = (re.sub(r"^(mean|largest) | \[.*", "", " ".join(title.split())) for title in COLUMNS.values())
-    assert [title for title in titles if title not in f"{page._terms()} agent waypoints reached"] == []
+    assert [title for title in titles if title not in f"{report._terms()} agent waypoints reached"] == []
 
 
 READ = {
-    "trials.csv": page.trials_table,
-    "progress.csv": lambda file: charts.read_progress(file.parent),
+    "trials.csv": report.trials_table,
+    "progress.csv": lambda file: report.read_progress(file.parent),
     "curve": lambda file: Curve.of("a", []),
 }
 """Readers of files that a report shows."""

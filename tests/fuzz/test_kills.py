@@ -25,7 +25,7 @@ from fuzz.killed_training import SECONDS
 from later import Later
 from seastar_gym.controllers import learned as policies
 from seastar_gym.controllers.learned import load
-from seastar_gym.evaluation.report.charts import read_progress
+from seastar_gym.evaluation.report import read_progress
 
 train = Later("train")
 

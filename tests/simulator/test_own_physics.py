@@ -9,7 +9,7 @@ import pytest
 
 from own_terms import Trap
 from seastar_gym import Body, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, register_scheme, register_term
-from seastar_gym.envs.symmetry.wrappers import require_symmetry
+from seastar_gym.envs.symmetry import require_symmetry
 from seastar_gym.gradients import differentiate
 from seastar_gym.lanes.functions import code_digest
 from seastar_gym.scene import numerics

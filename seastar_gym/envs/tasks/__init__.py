@@ -3,13 +3,12 @@
 A task is an object that says what is drawn, where the targets are and how a decision is scored, see
 `seastar_gym.envs.robots`; the environments of `SeastarSwim-v0` take it. Here they have names, and get ids.
 
-miswired.py    limbs whose wires may be swapped
-prey.py        prey that is faster than the robot
-station.py     a place to keep in a current that shows in the velocities
-fail_blind.py  dead limbs of a robot that sees its way alone
-obst_trap.py   a goal behind discs, most of which may form a horseshoe, and the ways around them
-prizes.py      more prizes than can be reached, and the best choice of them
-sim_to_real.py a robot that a late camera sees, and whose stiffness and drag are not known
+hidden.py     limbs whose wires may be swapped; dead limbs of a robot that sees its way alone; a robot that a late
+              camera sees, and whose stiffness and drag are not known
+prey.py       prey that is faster than the robot
+station.py    a place to keep in a current that shows in the velocities
+obst_trap.py  a goal behind discs, most of which may form a horseshoe, and the ways around them
+prizes.py     more prizes than can be reached, and the best choice of them
 """
 
 from collections.abc import Mapping
@@ -21,12 +20,10 @@ import gymnasium as gym
 from seastar_gym.envs import ENVIRONMENTS
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.robots import Task
-from seastar_gym.envs.tasks.fail_blind import FailBlind
-from seastar_gym.envs.tasks.miswired import Miswired
+from seastar_gym.envs.tasks.hidden import FailBlind, Miswired, SimToReal
 from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.envs.tasks.prizes import Prizes
-from seastar_gym.envs.tasks.sim_to_real import SimToReal
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.scene.checks import require_choice, require_number, require_period, shown

@@ -1,1 +1,0 @@
-"""The page that compares agents: tables, charts and a playback of every swim."""
