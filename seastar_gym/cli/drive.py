@@ -19,7 +19,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from seastar_gym.cli.swim import sight
+from seastar_gym.cli.swim import camera_of
 from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.description import Description
@@ -85,8 +85,9 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
         require_camera(options.policy, about)
         path = "pentagon" if about.path in (None, "random") else about.path
         own = {"decision_period": policy.decision_period, "sight": about.sight, "path": path}
+    camera = camera_of(options.sight)
     asked = {
-        "decision_period": options.decision_period, "sight": sight(options.sight),
+        "decision_period": options.decision_period, "sight": None if camera is None else camera.sight,
         "path": None if options.path is None else load_path(options.path),
     }  # fmt: skip
     arguments = own | {name: value for name, value in asked.items() if value is not None}

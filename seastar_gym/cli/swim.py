@@ -60,12 +60,6 @@ def parser() -> argparse.ArgumentParser:
     return found
 
 
-def sight(text: str | None) -> Sight | None:
-    """Sight of which a word says what it sees, or that a file of a camera has; None for none."""
-    camera = camera_of(text)
-    return None if camera is None else camera.sight
-
-
 def camera_of(text: str | None) -> Camera | None:
     """Camera of which a word says what it sees, or that a JSON file has, see `read_camera`; None for none."""
     if text is None:
