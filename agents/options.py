@@ -27,8 +27,8 @@ PATH_HELP = (
 )
 
 
-ENOUGH, ENOUGH_IN_TIME = 98_304, 300_000
-"""Length of a training [strokes], after which more gain nothing (docs/training.md), and of one in time [decisions]."""
+ENOUGH, ENOUGH_IN_TIME = 65_536, 300_000
+"""Length of a training [strokes], after which more gain 0.3 % (docs/training.md), and of one in time [decisions]."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Options:
 
     strokes: int | None = None
     """Length of the training [strokes, or decisions], all robots together, with which the learning rate ends; by
-    default 98,304 strokes, after which more gain nothing, or 300,000 decisions that are not strokes."""
+    default 65,536 strokes, after which more gain 0.3 %, or 300,000 decisions that are not strokes."""
     path: Annotated[str, tyro.conf.arg(help=PATH_HELP)] = "random"
     random_heading: bool = True
     """Turn every robot at random at the start of an episode."""
@@ -82,7 +82,7 @@ class Options:
     """JSON file of a camera. With --resume: train no more, but make a policy for that camera, which `seastar drive`
     takes, by imitation of the run's policy, in a folder of the run that is named as the file (docs/plant.md)."""
     quick: bool = False
-    """Train for 32,768 strokes at fidelity "fast": a third of the default training, and of that with --for-camera."""
+    """Train for 32,768 strokes at fidelity "fast", half of the default training, and for a third with --for-camera."""
     ppo: Annotated[Hyperparameters, tyro.conf.arg(name="")] = Hyperparameters()
 
     def __post_init__(self) -> None:
