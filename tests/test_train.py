@@ -418,7 +418,7 @@ def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_pa
 
 def test_a_quick_run_is_short_and_fast_and_published_only_when_asked_twice(tmp_path, capsys):
     options = training.read_options(["--quick"])
-    assert options.length < training.Options().length / 2 and options.fidelity == "fast"
+    assert options.length <= training.Options().length / 2 and options.fidelity == "fast"
     in_time = ["--decision-period", "0.5"]
     assert training.read_options([]).length < training.read_options(in_time).length
     assert training.read_options([*in_time, "--strokes", "7"]).length == 7
