@@ -181,7 +181,7 @@ TABLES = {
 
 
 def quick(table: Table) -> Table:
-    """The same in less than a minute, to see that it works."""
+    """A table with few sequences and settings, measured in less than a minute to see that the study works."""
     few = {"samples": 4, "limit": (37, 1 * MILLI), "fine": 1 * MILLI, "finest": 1 * MILLI, "side": (1, 0), "front": ""}
     return replace(table, periods=(0.2, 0.5) if table.periods else (), **cast(Any, few))
 
@@ -323,8 +323,10 @@ ROBOTS = {
 
 
 def certified(scene: Scene, samples: int) -> list[float]:
-    """Of fresh sequences at all settings of a robot's own certificate: how many exceed the promise, of how many, the
-    largest over it, and how many exceed the largest measured error of their own class.
+    """Fresh sequences against a robot's own certificate, at all of its settings.
+
+    Returns how many exceed the promise, of how many, the largest over it, and how many exceed the largest measured
+    error of their own class.
     """
     certificate = certify(scene, samples)
     batch = draw_batch(samples, scene.robot.n_limbs, FRESH_SEED)

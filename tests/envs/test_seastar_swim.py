@@ -1,5 +1,6 @@
 """One robot behind Gymnasium: spaces, reward, episodes and refusals are what the docstring says."""
 
+import copy
 import pickle
 from dataclasses import replace
 
@@ -20,7 +21,10 @@ from seastar_gym import (
     ThermalSma,
     Uniform,
 )
+from seastar_gym.accuracy import chapters_certificate, timed_certificate
+from seastar_gym.accuracy.certificate import MARGIN
 from seastar_gym.envs import rendering, seastar_swim
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.paths import cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -265,3 +269,44 @@ def test_rendering_without_a_mode_warns_and_draws_nothing():
         env.reset(seed=0)
         with pytest.warns(UserWarning, match="draws nothing"):
             assert env.render() is None
+
+
+@pytest.mark.parametrize("fidelity, period", [("fast", 1.0), ("chapter", 1.0), ("reference", 0.5), ("fast", 0.1)])
+def test_info_tells_what_was_measured_of_the_fidelity(fidelity, period):
+    """Of decisions in time, by wires; speeds were measured of strokes."""
+    in_time, scene = period < 1.0, make_scene(None, fidelity, period)
+    certificate = timed_certificate(period) if in_time else chapters_certificate()
+    known, repeated = certificate.of(scene), certificate.repeated(certificate.actions)
+    others = [name for name in certificate.actions if name not in repeated]
+    _, info = SeastarSwimEnv(fidelity=fidelity, decision_period=period).reset(seed=0)
+    assert (info["path_error"], info["gait_error"]) == (known.promise(others), known.promise(repeated))
+    typical = known.typical_error(others), known.typical_error(repeated)
+    assert (info["typical_error"], info["typical_gait_error"]) == typical
+    assert (info["space_error"], info["time_error"]) == (known.space_error, known.time_error)
+    assert info.get("batch_real_time_factor") == (None if in_time else known.speed)
+    assert 0.0 < info["typical_error"] < info["path_error"] and info["typical_gait_error"] < info["gait_error"]
+    assert info["path_error"] <= MARGIN * (info["space_error"] + info["time_error"]) * (1.0 + 1e-2)
+
+
+def test_what_a_caller_does_to_infos_and_waypoints_changes_no_robot():
+    env = fast()
+    _, info = env.reset(seed=0)
+    kept = copy.deepcopy(info)
+    second = env.step(STRAIGHT)[0]
+    np.testing.assert_array_equal(info["hub_position"], kept["hub_position"])
+    state, table = env.simulator.get_state(), env.waypoints
+    second[:], info["hub_position"][:], table[:] = 7.0, 7.0, 7.0
+    np.testing.assert_array_equal(env.simulator.positions, state.positions)
+    assert np.abs(env.waypoints).max() < 1.0
+
+
+def test_a_path_is_copied_when_it_is_asked_for_at_making_or_for_one_episode():
+    path = np.array([[0.1, 0.2], [0.3, 0.4]])
+    env = fast(path=path)
+    expected, path[:] = path.copy(), 9.0
+    env.reset(seed=0)
+    np.testing.assert_array_equal(env.waypoints, expected)
+    env.reset(options={"path": "line"})
+    np.testing.assert_array_equal(env.waypoints, [[0.3, 0.0]])
+    env.reset()
+    np.testing.assert_array_equal(env.waypoints, expected)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import seastar_gym
+from refusals import assert_refused
 from seastar_gym import FailBlind, Miswired, ObstTrap, Prey, Prizes, Sight, Station
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.randomization import drawn_scene
@@ -15,8 +16,8 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import limb_order, symmetry_in, transform_commands
 from seastar_gym.envs.tasks import NAMED
 from seastar_gym.envs.tasks.obst_trap import draw_discs, rims, ways
-from seastar_gym.envs.tasks.prey import Courses, Pursuit, draw_course
-from seastar_gym.envs.tasks.prizes import best_round, distances, greedy_round
+from seastar_gym.envs.tasks.prey import CHASE, Courses, Pursuit, draw_course
+from seastar_gym.envs.tasks.prizes import best_round, distances, draw_prizes, greedy_round
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.water import UniformCurrent
 
@@ -482,3 +483,40 @@ def _carry(ours, theirs, element):
     theirs.simulator.set_limb_strengths(ours.simulator.limb_strengths[:, limb_order(5)[element]])
     theirs.simulator.reset(np.array([True]), heading)
     theirs.task.begin(theirs, np.array([True]))
+
+
+def test_every_prey_that_is_drawn_can_be_met_and_most_only_ahead_of_it():
+    rng, pursuit, straight = np.random.default_rng(1), Pursuit(0.004, 0.02), 0
+    for _ in range(40):
+        course = draw_course(rng, (0.12, 0.2), (0.006, 0.008), 0.2, pursuit)
+        places = Courses(course).place(CHASE)
+        found = pursuit.meeting_time(np.zeros(2), places, CHASE)
+        assert course[2] == 0.0 < found < 100.0
+        there = Courses(course).place(found)
+        assert abs(np.hypot(*there) - 0.02 - 0.004 * found) < 2e-4  # linear between whole seconds
+        straight += bool(np.hypot(*(there - places[0])) < 0.02)
+    assert straight < 4
+    rests = np.tile([0.1, 0.0], (101, 1))
+    assert Pursuit(0.004, 0.02).meeting_time(np.zeros(2), rests, CHASE) == pytest.approx(0.08 / 0.004)
+    assert Pursuit(0.0005, 0.02).meeting_time(np.zeros(2), rests, CHASE) == np.inf
+    assert Pursuit(0.004, 0.11).meeting_time(np.zeros(2), rests, CHASE) == 0.0
+
+
+def test_greed_takes_worth_per_metre_while_there_is_way_and_costs_in_every_draw():
+    rng, about = np.random.default_rng(2), Prizes(gain=0.3)
+    for _ in range(5):
+        x, y, worth = draw_prizes(rng, about).T
+        asked = np.hypot(x, y), distances(np.column_stack([x, y])), worth, about.robot_speed * about.seconds
+        assert best_round(*asked).worth >= 1.3 * greedy_round(*asked) > 0.0
+        assert len(x) == 10 and 0.2 < np.abs([x, y]).max() <= 0.35 and {*worth} <= {1.0, 2.0, 4.0}
+    with assert_refused("ask for less gain"):
+        draw_prizes(rng, Prizes(side=0.1, gain=5.0))
+    places = np.array([[0.1, 0.0], [0.3, 0.0], [-0.3, 0.0], [0.0, 0.35]])
+    first, between = np.hypot(*places.T), distances(places)
+    assert best_round(first, between, np.array([1.0, 2.0, 3.0, 3.0]), 0.32) == (3.0, [0, 1])
+    assert best_round(first, between, np.array([1.0, 2.0, 3.0, 3.0]), 0.3) in ((3.0, [2]), (3.0, [0, 1]))
+    worth = np.array([1.0, 2.0, 5.0, 9.0])
+    assert greedy_round(first, between, worth, 0.34) == 5.0  # 9 is too far, and 5 is worth most per metre
+    assert greedy_round(first, between, worth, 0.36) == 9.0 and greedy_round(first, between, worth, 0.09) == 0.0
+    assert greedy_round(first, between, np.array([4.0, 2.0, 1.0, 1.0]), 0.3) == 6.0  # all of the way
+    assert distances(places)[0].tolist() == pytest.approx([0.0, 0.2, 0.4, np.hypot(0.1, 0.35)])

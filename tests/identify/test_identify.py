@@ -199,3 +199,22 @@ def test_intervals_hold_where_errors_depend_on_those_before_and_where_they_do_no
     """Errors are remembered for 0.2 s of 20. Intervals of independent errors hold the truth in six of ten fits."""
     assert coverage(0.0).min() > 0.93
     assert coverage(0.8).min() > 0.85
+
+
+def test_the_command_takes_a_scene_with_its_own_steps_or_those_it_is_given(tmp_path, monkeypatch):
+    steps = []
+
+    def fitted(scene, names, measurement, largest_delay):
+        steps.append(scene.numerics.step)
+        raise ValueError("enough")
+
+    monkeypatch.setattr(its_command, "identify", fitted)
+    monkeypatch.setattr(its_command.Measurement, "from_csv", lambda *files: None)
+    (tmp_path / "mine.json").write_text(json.dumps(SCENE.to_dict()))
+    own = ["a.csv", "b.csv", "--scene", str(tmp_path / "mine.json")]
+    for line in (own[:2], own, [*own, "--step", "0.02"]):
+        assert main(line) == 2
+    assert steps == [0.005, 0.01, 0.02]
+    for line in ([], ["path.csv"]):
+        with pytest.raises(SystemExit):
+            main(line)

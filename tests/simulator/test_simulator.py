@@ -199,3 +199,33 @@ def test_a_number_that_is_none_ends_its_robots_stroke_which_lies_where_its_hub_w
     simulator.reset(simulator.failed)
     assert not simulator.stroke(commands[0]).status.any()
     assert all(status.sentence.endswith(".") and "\n" not in status.sentence for status in SolverStatus)
+
+
+def test_what_is_read_is_a_copy():
+    simulator = Simulator(scene_of(), n_robots=2)
+    simulator.stroke(random_commands(2)[0])
+    before = simulator.get_state()
+    for array in (
+        simulator.positions, simulator.velocities, simulator.time, simulator.hub_position(), simulator.hub_velocity(),
+        *(part for part in simulator.get_state() if part is not None), simulator.elastic_energy(),
+    ):  # fmt: skip
+        array[:] = 7.0
+    assert_same_bits(simulator.get_state(), before)
+
+
+@pytest.mark.parametrize("parts", [None, 4])
+@pytest.mark.parametrize("speed", [1e14, 1e30, 1e160, 1e300])
+def test_a_robot_that_fails_within_a_stroke_is_finite_and_its_time_that_of_its_state_which_stands_still(speed, parts):
+    """Velocities so large that rounding ends the stroke, some tenths of a second after its beginning or at once."""
+    simulator, commands = Simulator(scene_of(max_iterations=2), 2), np.repeat(STRAIGHT, 2, axis=0)
+    set_motion(simulator, speed, robots=1)
+    times = []
+    for _ in range(2):
+        report = (
+            simulator.stroke(commands) if parts is None else finished(simulator.stroke_in_parts(commands, parts))[1]
+        )
+        assert report.status.tolist() == [0, 1]
+        assert np.isfinite(simulator.positions).all() and np.isfinite(simulator.velocities).all()
+        times.append((simulator.time[1], report.covered[1]))
+    assert (times[0][1] > 0.0) == (speed == 1e14) and times[1][1] == 0.0
+    assert times[0][0] == pytest.approx(times[0][1]) and times[1][0] == times[0][0]

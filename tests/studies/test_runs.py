@@ -11,7 +11,7 @@ import pytest
 from seastar_gym import Numerics, Scene, Seastar
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.scene.actuators.sma_limb import FREQUENCIES, MEASURED
-from studies import benchmark, fit, gallery, gpu, mutants, robustness, swim_page, tasks
+from studies import benchmark, extremes, fit, gallery, gpu, mutants, robustness, swim_page, tasks
 from studies.command import main
 from studies.frame import DOCS
 from studies.operations import count_operations, flops
@@ -22,6 +22,9 @@ SHORTEST = {
     "benchmark --also throughput --seconds 0": ({"speed_history.json", "speed_history.png"}, {
         "studies.benchmark": {"things": lambda: {"a": (1, lambda: lambda: 2.0)}, "unit": lambda: 0.5,
                               "NODES_PER_LIMB": (5, 10), "BATCH": 8},
+    }),
+    "extremes": ({"extremes.json"}, {
+        "studies.extremes": {"PRESETS": {"rapid": extremes.PRESETS["rapid"]}, "STROKES": 1},
     }),
     "film": ({""}, {"studies.film": {"SeastarSwimEnv": partial(SeastarSwimEnv, path=[[0.02, 0.0]])}}),
     "fit": (set(), {"studies.fit": {"read_curves": lambda: {40: CURVES[40]}}}),

@@ -5,6 +5,7 @@ import itertools
 import json
 import os
 import resource
+import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from losing import Interrupted
 from refusals import assert_refused
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.command import as_text
-from seastar_gym.sweep.designs import Choices, Sweep
+from seastar_gym.sweep.designs import Choices, Range, Sweep
 from seastar_gym.sweep.executors import Outcome, Processes, RayTasks, SlurmJobs, dask_client, outcomes
 from seastar_gym.sweep.run import ATTEMPTS, ResultFiles, read_results, result_file_of, run, swim
 
@@ -275,3 +276,32 @@ def test_a_damaged_part_is_named_left_out_and_simulated_again(name, tmp_path, ba
         each.write_bytes(b"")
     with pytest.warns(UserWarning, match="is damaged"), pytest.raises(ValueError, match="no results"):
         read_results(tmp_path)
+
+
+AXES = tuple(Range(f"robot.{name}", 1.0, 2.0) for name in ("limb_length", "density", "youngs_modulus"))
+
+
+PLANS = {
+    "grid": lambda n: ([axis.spaced(round(n ** (1 / 3)) + 1) for axis in AXES], 0),
+    "latin": lambda n: (AXES, n),
+    "one axis": lambda n: ([AXES[0].spaced(n)], 0),
+}
+
+
+def planned(plan, n_batches, named):
+    """Most memory that a plan of so many batches holds [MB], while the first of them are named."""
+    axes, samples = PLANS[plan](n_batches)
+    tracemalloc.start()
+    try:
+        sweep = Sweep(FAST, tuple(axes), samples=samples, settling=0, measured=1, robots=1)
+        assert all(batch.name for batch in itertools.islice(sweep.batches(), named))
+        return tracemalloc.get_traced_memory()[1] / 1e6
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("plan", PLANS)
+def test_planning_holds_less_than_a_kilobyte_for_ten_cells_and_of_a_grid_the_same_for_any_number(plan):
+    planned(plan, 10, 1)  # imports
+    few = planned(plan, 1_000, 500)
+    assert few < 9.0 and planned(plan, 100_000, 2_000) < (few + 1.0 if plan == "grid" else 20.0)
