@@ -21,7 +21,7 @@ from seastar_gym.lanes.registers import (
     store,
     store_number,
 )
-from seastar_gym.rods.guard import correct_momentum
+from seastar_gym.rods.guard import come_to_rest, correct_momentum
 from seastar_gym.rods.interval import FALLBACK_AFTER, cover_interval
 from seastar_gym.rods.newton import minimise
 from seastar_gym.rods.step import try_step
@@ -119,8 +119,14 @@ def cover_and_count(rods, work, scheme, fallback, actuation, q, v, a, duration, 
     return alive
 
 
+@kernel
+def stay_stuck(rods, work, q, v, robots):
+    """In place of come_to_rest: nobody does, as no derivative leads through it, and the robot has failed."""
+    return robots & ~robots
+
+
 KEPT = Form("kept", registers, instead={
     cover_interval: cover_and_count, try_step: try_and_keep, minimise: minimise_and_keep,
-    correct_momentum: correct_and_keep,
+    correct_momentum: correct_and_keep, come_to_rest: stay_stuck,
 })  # fmt: skip
 """Rows of `Simulator` whose steps leave what they began with and what they found in a field `kept` of `work`."""

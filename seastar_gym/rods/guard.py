@@ -34,6 +34,12 @@ back.
 U is that of the stiffness that limbs have at the time, see along.py. So what actuators put in or take out by stiffening
 a bent limb is in these balances as what they do by moving its natural state.
 
+Where even the shortest step fails, edges collapse so violently that every way on creates energy. The robot then comes
+to rest within itself: it keeps momentum and angular momentum, and loses what other motion it has. Without that,
+implicit Euler minimises |dq|^2_M / (2 h^2) + U(q), the energy that its step ends with, and begins at the energy that
+the robot has: no descent creates any. Where an edge has shrunk to a point, the minimum is the tip of a cone, which
+Newton's method does not find: there a robot fails.
+
 At phi = pi a hinge would store infinite energy, but a Newton step may jump over that pole, and the robot then stays
 folded over itself. Such steps are refused, too, while they are not very short: an edge that collapses turns its hinges
 over at no such cost.
@@ -271,6 +277,22 @@ def cut_velocities(rods, q, v, frame, motion, share, robots):
         store(v, 2 * node + 1, select(robots, add_product(vy, less, about_y), vy))
     cut_spin(rods, v, omega, less, robots)
     move_roots(rods, q, v)
+
+
+KNOWN = 1e300  # energy [J]: the rigid motion of nodes that lie in one point is no number
+
+
+@kernel
+def come_to_rest(rods, work, q, v, robots):
+    """Leave the robots in the mask the rigid motion that has their momenta alone.
+
+    Returns the mask of those that have one.
+    """
+    frame = frame_velocity(rods, q, v)
+    motion = rigid_motion(rods, work, q, v, frame)
+    resting = robots & (motion[5] < KNOWN)
+    cut_velocities(rods, q, v, frame, motion, splat(0.0), resting)
+    return resting
 
 
 ROUNDING = 1e-12  # of the kinetic energy, some 10,000 units in the last place: growth below it is rounding

@@ -18,10 +18,12 @@ from seastar_gym.lanes.registers import (
 )
 from seastar_gym.rods.body import move_roots
 from seastar_gym.rods.contact.pairs import deepest_overlap
+from seastar_gym.rods.guard import come_to_rest
 from seastar_gym.rods.potential import fill_moments
 from seastar_gym.rods.star import edge_geometry, half_angle, larger, tail_node
 from seastar_gym.rods.step import (
     COVERED,
+    ENERGY_CUTS,
     HALVINGS,
     LARGEST_OVERLAP,
     MOMENTS,
@@ -78,8 +80,9 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
 
     A robot whose step does not converge in `limits.max_iterations`, or creates energy, halves it, alone, as often as it
     takes, and still covers the whole interval. After each halving it has as many more iterations and starts them where
-    it stands; after FALLBACK_AFTER halvings it goes on with the scheme `fallback` (implicit Euler); after MOST_HALVINGS
-    it has failed and keeps its last good state. So has one that needs more than `limits.most_iterations` in the stroke.
+    it stands; after FALLBACK_AFTER halvings it goes on with the scheme `fallback` (implicit Euler). After MOST_HALVINGS
+    the robot comes to rest within itself, see guard.py, and tries once more; if that fails it has failed and stays at
+    its last good place. So has one that needs more than `limits.most_iterations` in the stroke.
 
     If steps are adapted, a robot also halves a step whose error is too large, doubles it when the error allows, and
     goes on with it in the next interval. After halvings for other reasons, a doubling takes one back: the first after
@@ -97,7 +100,7 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
     if limits.adaptive:
         last_size = load(a, memory_row(rods, scheme, SIZE))
         size = select(last_size > 0.0, last_size, FIRST_FRACTION)
-    moving = alive
+    moving, rested = alive, one < zero
     while any_lane(moving):
         # Robots do not wait for each other: those on the fallback go on when no other is left.
         on_scheme = moving & (halvings < FALLBACK_AFTER)
@@ -122,6 +125,11 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
         size = select(rejected & (size > SMALLEST_FRACTION), 0.5 * size, size)
         spent = iterations_spent(report) >= limits.most_iterations
         failed = stuck & ((halvings >= MOST_HALVINGS) | spent)
+        rested = rested & ~accepted
+        if any_lane(failed & ~rested & ~spent):
+            resting = come_to_rest(rods, work, q, v, failed & ~rested & ~spent)
+            add_to_report(report, ENERGY_CUTS, select(resting, one, zero))
+            rested, failed = rested | resting, failed & ~resting
         halvings += select(stuck, one, zero)
         if limits.adaptive:
             # The error of a step of twice the length is about eight times as large, per time four times.

@@ -321,7 +321,7 @@ REPORT_ROWS = (
     "steps",  # time steps taken
     "halvings",  # halvings of a time step that did not converge
     "rejections",  # halvings of a time step whose error was too large
-    "energy_cuts",  # steps after which velocities were cut, see guard.py
+    "energy_cuts",  # times that velocities were cut, see guard.py
     "covered",  # time [s]
     "smallest_hub_t",  # smallest tan(phi/2) of a hub hinge
     "largest_overlap",  # of limbs that touch each other or a body, see contact/pairs.py

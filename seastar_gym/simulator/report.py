@@ -58,8 +58,8 @@ class StrokeReport(NamedTuple):
     steps: Time steps accepted.
     halvings: Time steps that did not converge or created energy. They are halved or, at the shortest, tried again.
     rejections: Time steps that were halved because their error was too large (Numerics.path_tolerance).
-    energy_cuts: Steps after which velocities were reduced because the energy had grown a little, see
-        rods/guard.py.
+    energy_cuts: Times that velocities were reduced: because the energy had grown a little, or because no step led on,
+        see rods/guard.py.
     covered: Time covered [s].
     smallest_opening_angle: Smallest angle between neighbouring limbs at the hub [rad]. Below zero, limbs crossed. With
         a body it is pi.

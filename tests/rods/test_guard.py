@@ -18,6 +18,7 @@ from seastar_gym.model import make_rods
 from seastar_gym.rods.bundles import make_work
 from seastar_gym.rods.guard import (
     LARGEST_CUT,
+    come_to_rest,
     hold_to_energy,
     restore,
     rigid_motion,
@@ -109,6 +110,28 @@ def test_a_small_excess_or_any_at_the_last_halving_is_cut_and_the_momenta_stay(s
         carried = np.einsum("and,ndme->ame", rigid_motions(q), inertia(star, q)).reshape(3, -1)
         np.testing.assert_allclose(carried @ cut.ravel(), carried @ v.ravel(), rtol=1e-12)
     assert np.abs(found.after - found.v)[chosen].max() > 1e-4
+
+
+@STARS
+def test_a_robot_that_comes_to_rest_keeps_its_momenta_and_the_energy_of_its_rigid_motion(star):
+    """Robots that are not asked keep their bits, and so does one in a point, which has no rigid motion."""
+    q, v = moving_robots()
+    chosen, in_a_point = np.arange(N_LANES) % 2 == 1, 1
+    q[in_a_point] = 0.25
+    rods, state = RODS if star is STAR else STREAM_RODS, (rows(q), rows(v))
+    work = make_work(rods, 1)
+    work.q[:] = state[0]
+    freeze_fluid(rods, work)
+    np.testing.assert_array_equal(
+        plain(come_to_rest(rods, work, *state, Mask(chosen))), rests := chosen & (np.arange(N_LANES) != in_a_point)
+    )
+    after = nodes(state[1])
+    np.testing.assert_array_equal(after[~rests], v[~rests])
+    for at, before, rest in zip(q[rests], v[rests], after[rests], strict=True):
+        rigid, mass = rigid_motions(at), inertia(star, at).reshape(before.size, before.size)
+        carried = rigid.reshape(3, -1) @ mass
+        np.testing.assert_allclose(carried @ rest.ravel(), carried @ before.ravel(), rtol=1e-12)
+        assert np.linalg.matrix_rank([*rigid.reshape(3, -1), rest.ravel()], tol=1e-9) == 3
 
 
 # Poles
