@@ -44,7 +44,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.body import GIVEN_DRAG, Body, Outline
 from seastar_gym.scene.limb import AlongLimb, LimbShape, Stiffening
 from seastar_gym.scene.number import chosen, frame_of, of_robot, profile_at
-from seastar_gym.scene.numerics import ADAPTATION, MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP
+from seastar_gym.scene.numerics import MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP
 from seastar_gym.scene.robot import Seastar
 from seastar_gym.scene.shape import natural_hub_angle, turn_per_hinge
 from seastar_gym.scene.water import AnyCurrent, GridCurrent, ShearCurrent, UniformCurrent, Vortex, Water
@@ -386,20 +386,13 @@ def with_joints(hinges: bending.Bending, stiffnesses: Sequence[float | None]) ->
 
 
 def make_limits(scene: Scene, index: int = 0) -> Limits:
-    """Tolerances and limits of the solver for robot `index` of a scene.
-
-    The largest error of a step per second follows from the tolerance of the path, as was measured, see ADAPTATION.
-    """
+    """Tolerances and limits of the solver for robot `index` of a scene."""
     numerics, length = scene.numerics, of_robot(scene.robot.limb_length, index)
-    speed, tolerance = length / scene.actuator.period, numerics.path_tolerance
-    error_rate = 0.0 if tolerance is None else speed * (tolerance / ADAPTATION[0]) ** ADAPTATION[1]
     n_steps = math.ceil(scene.actuator.period / numerics.step)
     return Limits(
         tolerance=np.array([numerics.newton_tolerance * length]),
         max_iterations=numerics.max_iterations,
         most_iterations=MOST_ITERATIONS + MOST_ITERATIONS_PER_STEP * n_steps,
-        adaptive=tolerance is not None,
-        error_rate=np.array([error_rate]),
     )
 
 

@@ -35,7 +35,7 @@ TOLERATED = (
     (DAMPING, 1e-4), (DAMPING, 1e-5), (DAMPING, 1e-6), (0.01, 1e-5), (0.03, 1e-4), (0.03, 1e-5), (0.05, 1e-4),
 )  # fmt: skip
 """Numerical dampings and Newton tolerances of the midpoint rule."""
-OTHERS: tuple[tuple[SchemeName, float], ...] = (("sdirk2", 20.0), ("sdirk2", 10.0), ("sdirk2", 5.0), ("sdirk3", 20.0))
+OTHERS: tuple[tuple[SchemeName, float], ...] = (("sdirk2", 20.0), ("sdirk2", 10.0), ("sdirk2", 5.0))
 """Other schemes, and their steps [ms]."""
 PERIODS = (0.125, 0.2, 0.3)
 """Times between decisions [s]."""
@@ -215,8 +215,8 @@ def _as_given(resolution: Resolution) -> Resolution:
 
 
 TITLES = {"strokes": "strokes, limbs of the chapter", "decisions": "decisions every 0.125 to 0.3 s, silicone"}
-SCHEMES = {"implicit-midpoint": ("midpoint rule", FAINT), "sdirk": ("SDIRK2, SDIRK3", CYCLE[1])}
-"""How schemes are named and drawn, by the beginnings of their names."""
+SCHEMES = {"implicit-midpoint": ("midpoint rule", FAINT), "sdirk2": ("SDIRK2", CYCLE[1])}
+"""How schemes are named and drawn."""
 
 
 def picture(results: Mapping[str, Any], file: Path) -> None:
@@ -224,10 +224,8 @@ def picture(results: Mapping[str, Any], file: Path) -> None:
     figure, both = subplots(1, 2, figsize=(8.4, 3.6), sharey=True)
     for axes, (kind, title) in zip(both, TITLES.items(), strict=True):
         some = points(results, kind)
-        for begin, (name, colour) in SCHEMES.items():
-            axes.plot(
-                *drawn(each for each in some if each.scheme.startswith(begin)), ".", ms=3, color=colour, label=name
-            )
+        for scheme, (name, colour) in SCHEMES.items():
+            axes.plot(*drawn(each for each in some if each.scheme == scheme), ".", ms=3, color=colour, label=name)
         axes.plot(*drawn(front(some, of_any)), color=CYCLE[0], lw=1.2, label="front")
         for fidelity in NAMES:
             x, y = drawn(each for each in some if keys_of(each.resolution) == keys_of(PRESETS[fidelity]))

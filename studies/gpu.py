@@ -102,7 +102,6 @@ def scenes() -> dict[str, Scene]:
         "numbers of each robot": of(robot=robot(youngs_modulus=np.full(N_ROBOTS, 1e6))),
         "all of these": of(robot=robot(**of_each), fluid=water),
         EVERYTHING: everything,
-        "adapted steps": of(numerics=Numerics("implicit-midpoint", 0.005, path_tolerance=0.02)),
         "wires": of(actuator=SmaWires()),
         "thermal": of(actuator=ThermalSma()),
         "limited": of(actuator=Limited(SmaPulse(), 0.5, 3.0)),

@@ -335,10 +335,7 @@ NEEDS = {
     "plain Newton": "#c7e0f4", "regularised matrix or line search": "#5aa2d6", "substeps": "#1b4f8f", "failed": MARK,
 }  # fmt: skip
 """Needs of the solver, from least to most, and their colours."""
-NAMES = {
-    "implicit-euler": "Implicit Euler", "implicit-midpoint": "Implicit midpoint rule", "sdirk2": "SDIRK2",
-    "sdirk3": "SDIRK3",
-}  # fmt: skip
+NAMES = {"implicit-euler": "Implicit Euler", "implicit-midpoint": "Implicit midpoint rule", "sdirk2": "SDIRK2"}
 FRAME: dict[str, Any] = {"fill": False, "edgecolor": INK, "linewidth": 1.4}
 DASHES: dict[str, Any] = {"color": MARK, "linewidth": 1.6, "linestyle": (0, (4, 2))}
 REFUSED: dict[str, Any] = {"facecolor": "white", "edgecolor": FAINT, "hatch": "////"}

@@ -707,15 +707,9 @@ def stage(
 
 
 G2 = 1.0 - 1.0 / np.sqrt(2.0)
-G3 = 0.43586652150845899942
 TABLEAUS: dict[str, list[list[float]]] = {
     "implicit-euler": [[1.0]],
     "sdirk2": [[G2], [1.0 - G2, G2]],
-    "sdirk3": [
-        [G3],
-        [(1.0 - G3) / 2.0, G3],
-        [-(6.0 * G3**2 - 16.0 * G3 + 1.0) / 4.0, (6.0 * G3**2 - 20.0 * G3 + 5.0) / 4.0, G3],
-    ],
     "implicit-midpoint": [[0.5]],
 }
 """Rows of the Runge-Kutta matrix of each scheme; a row's sum is the time c of its stage."""

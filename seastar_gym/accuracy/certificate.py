@@ -52,8 +52,7 @@ class Setting:
     nodes per limb with very short steps, and that of time, of the steps with the same nodes. The sum is told also where
     the two cancel. In a current, the path is the way through the water, and robots begin at rest in the water.
 
-    nodes_per_limb, scheme, step [s], newton_tolerance, path_tolerance, damping, discretisation: See `Numerics` and
-        `Seastar`.
+    nodes_per_limb, scheme, step [s], newton_tolerance, damping, discretisation: See `Numerics` and `Seastar`.
     errors: Sum of the errors of space and time, by class of commands, see `Certificate`.
     typical: The same, the median of all sequences of a class. {} where medians were not measured.
     space_error, time_error: Largest errors of all classes that the certificate promises.
@@ -78,7 +77,6 @@ class Setting:
     energy_growth: float = math.nan
     heading_error: float = math.nan
     end_error: float = math.nan
-    path_tolerance: float | None = None
     discretisation: str = "continuum"
     damping: float = 0.0
 
@@ -102,10 +100,7 @@ class Setting:
     @cached_property
     def resolution(self) -> Resolution:
         """Discretisation, nodes per limb and numerics."""
-        numerics = Numerics(
-            cast(SchemeName, self.scheme), self.step, self.newton_tolerance,
-            path_tolerance=self.path_tolerance, damping=self.damping,
-        )  # fmt: skip
+        numerics = Numerics(cast(SchemeName, self.scheme), self.step, self.newton_tolerance, damping=self.damping)
         return Resolution(cast(Discretisation, self.discretisation), self.nodes_per_limb, numerics)
 
     @property
@@ -134,9 +129,8 @@ class Setting:
         return _largest(self.typical, classes)
 
     def __str__(self) -> str:
-        adapted = "" if self.path_tolerance is None else f" adapted to {100 * self.path_tolerance:g} %"
         damped = "" if self.damping == 0.0 else f", damping {self.damping:g},"
-        return f'"{self.scheme}" at {1e3 * self.step:.4g} ms{adapted}{damped} with {self.nodes_per_limb} nodes per limb'
+        return f'"{self.scheme}" at {1e3 * self.step:.4g} ms{damped} with {self.nodes_per_limb} nodes per limb'
 
 
 def is_measured(number: object) -> bool:

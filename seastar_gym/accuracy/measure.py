@@ -180,7 +180,7 @@ class Swims(NamedTuple):
 
     hub: Positions of hubs [m], shape (strokes, n, 2); NaN once the solver failed.
     heading: What robots were turned by [rad].
-    error_estimate [m], newton_iterations, steps, rejections, halvings: See `StrokeReport`.
+    error_estimate [m], newton_iterations, steps, halvings: See `StrokeReport`.
     """
 
     hub: Floats
@@ -188,7 +188,6 @@ class Swims(NamedTuple):
     error_estimate: Floats
     newton_iterations: Floats
     steps: Floats
-    rejections: Floats
     halvings: Floats
 
 
@@ -309,7 +308,7 @@ def measure_settings(
                 speed=factor, energy_growth=rounded_up(growth),
                 heading_error=_largest(by_class(np.degrees(space.heading + time.heading) for space, time in parts)),
                 end_error=_largest(by_class(space.end + in_time.end for space, in_time in parts)),
-                path_tolerance=numerics.path_tolerance, discretisation=each.discretisation, damping=numerics.damping,
+                discretisation=each.discretisation, damping=numerics.damping,
             )
         )  # fmt: skip
         report(SHARE_OF_SWIMS + (1.0 - SHARE_OF_SWIMS) * (k + 1) / len(resolutions))

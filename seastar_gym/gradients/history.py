@@ -75,13 +75,13 @@ def try_and_keep(rods, work, scheme, actuation, q, v, a, step, active, limits, r
     of_fallback = step.iteration_limit > FALLBACK_AFTER * limits.max_iterations
     store(kept.rows, FALLBACK, select(of_fallback, splat(1.0), splat(0.0)))
     store_number(kept.counters, STAGE, 0.0)
-    good, accepted, error_rate = try_step(rods, work, scheme, actuation, q, v, a, step, active, limits, report)
+    accepted = try_step(rods, work, scheme, actuation, q, v, a, step, active, limits, report)
     n = load_number(kept.counters, N_STEPS)
     if any_lane(accepted) and n < load_number(kept.counters, CAPACITY):
         for row in range(kept.n_rows):
             store_number(kept.steps, int(n) * kept.n_rows + row, load_number(kept.numbers, row * N_LANES))
         store_number(kept.counters, N_STEPS, n + 1.0)
-    return good, accepted, error_rate
+    return accepted
 
 
 @kernel

@@ -94,7 +94,7 @@ def with_places(bundle: Any, moved: Sequence[NDArray[np.bool_]]) -> int:
     return n
 
 
-COUNTS = ("halvings", "rejections", "energy_cuts", "solver_iterations")
+COUNTS = ("halvings", "energy_cuts", "solver_iterations")
 """Rows of a report that tell whether a swim is one of several branches."""
 
 
@@ -121,7 +121,7 @@ class Derivatives(NamedTuple):
 
     swim: The swim, to the bits of `Simulator`. by: Derivatives by the names of unknowns, per unit of each.
     status: SolverStatus of every interval, shape (n,). After a failure all is NaN.
-    halvings, rejections, energy_cuts: Counts of every interval, as in StrokeReport, shape (n,).
+    halvings, energy_cuts: Counts of every interval, as in StrokeReport, shape (n,).
     solver_iterations: Iterations of the linear solver where limbs touched, in every interval, shape (n,).
     """
 
@@ -129,7 +129,6 @@ class Derivatives(NamedTuple):
     by: dict[str, Motion]
     status: NDArray[np.int64]
     halvings: NDArray[np.int64]
-    rejections: NDArray[np.int64]
     energy_cuts: NDArray[np.int64]
     solver_iterations: NDArray[np.int64]
 
@@ -147,11 +146,10 @@ def sentence_of(status: NDArray[np.int64], counts: dict[str, NDArray[np.int64]])
     total = {name: int(count.sum()) for name, count in counts.items()}
     if not any(total.values()):
         return "The derivatives are of the swim as it is: no step was halved, no energy cut, and no limb touched."
-    halved, cut = total["halvings"] + total["rejections"], total["energy_cuts"]
     touched = "some" if total["solver_iterations"] else "no"
     return (
-        f"The derivatives are of the branch that was taken: {halved} steps were halved, {cut} lost energy, and "
-        f"{touched} limbs touched."
+        f"The derivatives are of the branch that was taken: {total['halvings']} steps were halved, "
+        f"{total['energy_cuts']} lost energy, and {touched} limbs touched."
     )
 
 
@@ -215,7 +213,7 @@ def require_names(by: Sequence[str]) -> None:
 
 def n_rows_of_a(rods: Any, n_stages: int) -> int:
     """Rows of accelerations at the stages of a step."""
-    return (2 * rods.n_free + 1) * n_stages + 2 + (n_stages if rods.body is not None else 0)
+    return (2 * rods.n_free + 1) * n_stages + (n_stages if rods.body is not None else 0)
 
 
 def advanced(

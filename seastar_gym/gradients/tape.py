@@ -111,7 +111,7 @@ def replay_steps(rods, work, scheme, actuation, q, v, a, limits, report):
     again = Step(
         load(step, START), load(step, SIZE), load(step, OF_STEP), load(step, LIMIT), load(step, RETRYING) > 0.0
     )
-    _, accepted, _ = try_step(rods, work, scheme, actuation, q, v, a, again, everybody, limits, report)
+    accepted = try_step(rods, work, scheme, actuation, q, v, a, again, everybody, limits, report)
     return not any_lane(~accepted)
 
 

@@ -1,4 +1,4 @@
-"""An interval between two corners of a time grid, covered by steps that every robot halves and doubles for itself.
+"""An interval between two corners of a time grid, covered by steps that every robot halves for itself.
 
 A whole sequence of time intervals for many robots, in one compiled call.
 """
@@ -9,7 +9,6 @@ from seastar_gym.lanes.registers import (
     add_product,
     any_lane,
     borrow,
-    floor,
     load,
     load_number,
     select,
@@ -29,8 +28,6 @@ from seastar_gym.rods.step import (
     MOMENTS,
     MOST_HALVINGS,
     PEAK_MOMENT,
-    REJECTIONS,
-    SIZE,
     SMALLEST_FRACTION,
     SMALLEST_HUB_T,
     STEPS,
@@ -39,14 +36,10 @@ from seastar_gym.rods.step import (
     add_to_report,
     forget_accelerations,
     iterations_spent,
-    memory_row,
     try_step,
 )
 
 FALLBACK_AFTER = 4.0  # halvings, a choice: from there on a robot's steps are implicit Euler's
-SOONEST_GROWTH = 4.0  # steps after a halving before a step is doubled, a choice; the next doubling waits twice as long
-FIRST_FRACTION = 2.0**-3  # of an interval, a choice: an adapted stroke begins with this step
-GROWTH_MARGIN = 5.0  # how far below the limit a doubled step's error rate has to be, which is then four times as large
 
 
 @kernel
@@ -84,11 +77,6 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
     the robot comes to rest within itself, see guard.py, and tries once more; if that fails it has failed and stays at
     its last good place. So has one that needs more than `limits.most_iterations` in the stroke.
 
-    If steps are adapted, a robot also halves a step whose error is too large, doubles it when the error allows, and
-    goes on with it in the next interval. After halvings for other reasons, a doubling takes one back: the first after
-    SOONEST_GROWTH accepted steps, the next after twice as many, so that a robot that cannot do with longer steps rarely
-    tries them; none leads back from `fallback` to `scheme`, whose ringing may have been the reason.
-
     No step is below SMALLEST_FRACTION: a robot that is stuck there tries again, and the halving counts. Steps are
     dyadic fractions of the interval, on the grid of their own size, so their sums are exact.
 
@@ -96,10 +84,6 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
     """
     zero, one = splat(0.0), splat(1.0)
     start, size, halvings = zero, one, zero
-    streak, growth = zero, splat(SOONEST_GROWTH)  # accepted steps since the last halving, and needed for a doubling
-    if limits.adaptive:
-        last_size = load(a, memory_row(rods, scheme, SIZE))
-        size = select(last_size > 0.0, last_size, FIRST_FRACTION)
     moving, rested = alive, one < zero
     while any_lane(moving):
         # Robots do not wait for each other: those on the fallback go on when no other is left.
@@ -109,20 +93,18 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
             going, tableau = on_scheme, scheme
         retrying = going & (halvings > 0.0)
         step = Step(start, size, size * duration, (1.0 + halvings) * limits.max_iterations, retrying)
-        good, accepted, error_rate = try_step(rods, work, tableau, actuation, q, v, a, step, going, limits, report)
+        accepted = try_step(rods, work, tableau, actuation, q, v, a, step, going, limits, report)
         note_hub_angles(rods, q, going, report)
         note_overlap(rods, work, q, accepted, report)
-        stuck = going & ~good
-        rejected = going & ~accepted
+        stuck = going & ~accepted
         on_fallback = going & ~on_scheme
         if any_lane(stuck | on_fallback):
             forget_accelerations(rods, scheme, a, stuck | on_fallback)
         add_to_report(report, STEPS, select(accepted, one, zero))
         add_to_report(report, HALVINGS, select(stuck, one, zero))
-        add_to_report(report, REJECTIONS, select(good & rejected, one, zero))
         add_to_report(report, COVERED, select(accepted, step.h, zero))
         start = select(accepted, start + size, start)
-        size = select(rejected & (size > SMALLEST_FRACTION), 0.5 * size, size)
+        size = select(stuck & (size > SMALLEST_FRACTION), 0.5 * size, size)
         spent = iterations_spent(report) >= limits.most_iterations
         failed = stuck & ((halvings >= MOST_HALVINGS) | spent)
         rested = rested & ~accepted
@@ -131,20 +113,8 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
             add_to_report(report, ENERGY_CUTS, select(resting, one, zero))
             rested, failed = rested | resting, failed & ~resting
         halvings += select(stuck, one, zero)
-        if limits.adaptive:
-            # The error of a step of twice the length is about eight times as large, per time four times.
-            small = GROWTH_MARGIN * error_rate <= load(limits.error_rate, 0)
-            pairs = start / (2.0 * size)
-            fits = accepted & small & (pairs == floor(pairs)) & (size < 1.0)
-            streak = select(accepted & retrying, streak + 1.0, zero)
-            relieved = fits & (streak >= growth) & ~(halvings == FALLBACK_AFTER)
-            halvings -= select(relieved, one, zero)
-            streak, growth = select(relieved, zero, streak), select(relieved, 2.0 * growth, growth)
-            size = select((fits & ~retrying) | relieved, 2.0 * size, size)
         alive = alive & ~failed
         moving = moving & ~failed & (start < 1.0)
-    if limits.adaptive:
-        store(a, memory_row(rods, scheme, SIZE), size)
     return alive
 
 
@@ -230,8 +200,8 @@ def advance(
 
     scheme, fallback: Tableaux of the time steps, and of the steps of robots that had to retry often (one stage).
     q, v: Positions and velocities [m, m/s], shape (n_groups, 2 n_nodes, N_LANES).
-    a: Memory from one time step to the next: accelerations of its stages [m/s^2], their shares in the next guess, its
-        length and size, shape (n_groups, n_stages (2 n_nodes + 1) + 2, N_LANES); more with a body, see stages.py.
+    a: Memory from one time step to the next: accelerations of its stages [m/s^2], and their shares in the next guess,
+        shape (n_groups, n_stages (2 n_nodes + 1), N_LANES); more with a body, see `share_of_body` in step.py.
     peaks: Share of `shape` that every limb follows, shape (n_groups, n_limbs, N_LANES).
     times: Ends of the intervals [s], shape (n_intervals + 1,).
     shape: Rotation of the limbs at those times [rad], shape (n_intervals + 1,) if all limbs turn alike, else

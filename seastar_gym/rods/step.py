@@ -1,4 +1,4 @@
-"""One time step: schemes, the stages of a step, its error, the guard's verdict, and what is counted of it.
+"""One time step: schemes, the stages of a step, the guard's verdict, and what is counted of it.
 
 `try_step` makes a step, or says for which robots it failed; `solve_stages` solves its stages one after the other, and
 `end_guarded_step` refuses one that ends with too much energy. Schemes are diagonally implicit Runge-Kutta tableaux
@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.lanes.compile import inlined_kernel, kernel
-from seastar_gym.lanes.registers import add_product, any_lane, load, load_number, select, splat, sqrt, store
+from seastar_gym.lanes.registers import add_product, any_lane, load, load_number, select, splat, store
 from seastar_gym.rods.body import freeze_body, move_roots, place_roots
 from seastar_gym.rods.body_forces import add_work_on_body
 from seastar_gym.rods.contact.coupled import solver_iterations
@@ -77,18 +77,10 @@ def _scheme(a: list[list[float]], b: list[float] | None = None) -> Scheme:
 
 CONSISTENT, GROWING = 1e-12, 1e-9  # rounding of b's sum, and of amplitudes
 _G2 = 1.0 - 0.5 * np.sqrt(2.0)
-_G3 = 0.43586652150845899942  # root of x^3 - 3 x^2 + 3/2 x - 1/6, Alexander (1977)
 
 SCHEMES = {
     "implicit-euler": _scheme([[1.0]]),  # (13.9), order 1, L-stable
     "sdirk2": _scheme([[_G2, 0.0], [1.0 - _G2, _G2]]),  # order 2, L-stable
-    "sdirk3": _scheme(  # order 3, L-stable
-        [
-            [_G3, 0.0, 0.0],
-            [0.5 * (1.0 - _G3), _G3, 0.0],
-            [-1.5 * _G3**2 + 4.0 * _G3 - 0.25, 1.5 * _G3**2 - 5.0 * _G3 + 1.25, _G3],
-        ]
-    ),
     "implicit-midpoint": _scheme([[0.5]], [1.0]),  # order 2, keeps the amplitude of every oscillation
 }
 
@@ -145,15 +137,10 @@ class Stage(NamedTuple):
     ahead: bool
 
 
-# Rows of `a` behind the accelerations and their shares, where steps are adapted: the length of the last step [s], and
-# the next step's share of its interval; then, with a body, the shares of its own accelerations, stage by stage.
-LAST_STEP, SIZE, OF_BODY = 0, 1, 2
-
-
 @kernel
-def memory_row(rods, scheme, which):
-    """Row of `a` where a step leaves LAST_STEP or SIZE for the next."""
-    return (2 * rods.n_free + 1) * scheme.n_stages + which
+def share_of_body(rods, scheme, k):
+    """Row of `a`, behind the accelerations and their shares, for the share of a body's own ones in stage k."""
+    return (2 * rods.n_free + 1) * scheme.n_stages + k
 
 
 @inlined_kernel
@@ -206,7 +193,7 @@ def guessed_motion(rods, scheme, k, stage, a):
     if rods.body is None:
         return splat(0.0), splat(0.0), splat(0.0)
     rows, row = 2 * rods.n_free, 2 * rods.n_nodes
-    change = stage.gamma * load(a, memory_row(rods, scheme, OF_BODY + k))
+    change = stage.gamma * load(a, share_of_body(rods, scheme, k))
     vx = add_product(load(stage.v_hat, 0), change, load(a, k * rows))
     vy = add_product(load(stage.v_hat, 1), change, load(a, k * rows + 1))
     arc = add_product(load(stage.v_hat, row), change, load(a, k * rows + row))
@@ -224,7 +211,7 @@ def keep_share_of_body(rods, work, scheme, k, stage, a, robots):
         _, acceleration = stage_motion(work, stage, row)
         last = load(a, k * rows + row)
         along, squared = add_product(along, last, acceleration), add_product(squared, last, last)
-    store_share(a, memory_row(rods, scheme, OF_BODY + k), along, squared, robots)
+    store_share(a, share_of_body(rods, scheme, k), along, squared, robots)
 
 
 @kernel
@@ -279,24 +266,6 @@ def forget_accelerations(rods, scheme, a, robots):
 
 
 @kernel
-def step_error(rods, work, stage, a, h, last_h):
-    """Position error of a step of the implicit midpoint rule [m], largest over the nodes.
-
-    The rule takes the acceleration in the middle for the whole step, so it errs by h^3/12 times its rate of change, and
-    that is the difference to the last step's over the time between the two middles.
-    """
-    largest = splat(0.0)
-    for node in range(rods.n_free):
-        squared = splat(0.0)
-        for row in range(2 * node, 2 * node + 2):
-            _, acceleration = stage_motion(work, stage, row)
-            change = acceleration - load(a, row)
-            squared = add_product(squared, change, change)
-        largest = select(squared > largest, squared, largest)
-    return h * h * h * sqrt(largest) / (6.0 * (h + last_h))
-
-
-@kernel
 def start_at_rest(rods, work, stage, frame, robots):
     """Start the iterate of the robots in the mask at q_hat, carried on by the frame: Phi is finite there, and no
     velocity about it leads it astray.
@@ -320,14 +289,13 @@ REPORT_ROWS = (
     "backtracks",  # halvings of a Newton step by the line search
     "steps",  # time steps taken
     "halvings",  # halvings of a time step that did not converge
-    "rejections",  # halvings of a time step whose error was too large
     "energy_cuts",  # times that velocities were cut, see guard.py
     "covered",  # time [s]
     "smallest_hub_t",  # smallest tan(phi/2) of a hub hinge
     "largest_overlap",  # of limbs that touch each other or a body, see contact/pairs.py
 )
 (
-    NEWTON_ITERATIONS, SOLVER_ITERATIONS, REGULARISED, BACKTRACKS, STEPS, HALVINGS, REJECTIONS, ENERGY_CUTS, COVERED,
+    NEWTON_ITERATIONS, SOLVER_ITERATIONS, REGULARISED, BACKTRACKS, STEPS, HALVINGS, ENERGY_CUTS, COVERED,
     SMALLEST_HUB_T, LARGEST_OVERLAP,
 ) = range(len(REPORT_ROWS))  # fmt: skip
 
@@ -371,25 +339,17 @@ class Step(NamedTuple):
 def try_step(rods, work, scheme, actuation, q, v, a, step, active, limits, report):
     """One step for the robots in the mask `active`.
 
-    a: Memory from one step to the next, see LAST_STEP and SIZE; read at the beginning and written at the end.
+    a: Memory from one step to the next, see `advance` in interval.py; read at the beginning and written at the end.
 
-    Returns (good, accepted, error rate): the mask of the robots whose stages all converged and created no energy, that
-    of those whose error is small enough besides, whose state has moved, and the error per time [m/s], zero if steps are
-    not adapted.
+    Returns the mask of the robots whose stages all converged and created no energy, whose state has moved.
     """
     good, guarded, stage = solve_stages(rods, work, scheme, actuation, q, v, a, step, active, limits, report)
-    accepted, error_rate, last_h = good, splat(0.0), memory_row(rods, scheme, LAST_STEP)
-    if limits.adaptive and not scheme.dissipative:
-        error_rate = step_error(rods, work, stage, a, step.h, load(a, last_h)) / step.h
-        small = (error_rate <= load(limits.error_rate, 0)) | (step.size <= SMALLEST_FRACTION)
-        accepted = good & small
-        store(a, last_h, select(accepted, step.h, load(a, last_h)))
-    guarded = accepted & guarded
+    guarded = good & guarded
     if not any_lane(guarded):
-        end_step(rods, work, scheme, stage, q, v, a, step.h, accepted)
-        return good, accepted, error_rate
-    refused = end_guarded_step(rods, work, scheme, actuation, q, v, a, step, stage, accepted, guarded, limits, report)
-    return good & ~refused, accepted & ~refused, error_rate
+        end_step(rods, work, scheme, stage, q, v, a, step.h, good)
+        return good
+    refused = end_guarded_step(rods, work, scheme, actuation, q, v, a, step, stage, good, guarded, limits, report)
+    return good & ~refused
 
 
 @inlined_kernel

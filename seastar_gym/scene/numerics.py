@@ -10,7 +10,7 @@ from seastar_gym.scene.number import check_numbers, positive, whole, within
 from seastar_gym.scene.robot import NODES, Discretisation
 from seastar_gym.scene.serial import html_table, register_part, short_repr
 
-SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
+SchemeName = Literal["implicit-euler", "sdirk2", "implicit-midpoint"]
 SCHEME_NAMES: list[str] = [*get_args(SchemeName)]
 """Schemes that a scene may name: those of the package, and what `register_scheme` adds."""
 Fidelity = Literal["rapid", "fast", "balanced", "accurate", "reference", "chapter"]
@@ -24,7 +24,6 @@ MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP = 200_000, 100
 """Limit of a robot's Newton iterations in a stroke: a constant, and an allowance for every time step.
 
 The limit amounts to seconds of computing. It is four times what any stroke in the study of stability needs.
-Strokes with adapted steps in vacuum may need half of it.
 """
 
 
@@ -33,16 +32,14 @@ Strokes with adapted steps in vacuum may need half of it.
 class Numerics:
     """Settings of time stepping.
 
-    scheme: Implicit Runge-Kutta scheme: "implicit-euler" (the chapter's, (13.9)), "sdirk2", "sdirk3",
-        "implicit-midpoint", or the name of one of your own, see `register_scheme`.
+    scheme: Implicit Runge-Kutta scheme: "implicit-euler" (the chapter's, (13.9)), "sdirk2", "implicit-midpoint",
+        or the name of one of your own, see `register_scheme`.
     step: Time step h [s]. The last step before a corner of the actuation is shortened.
     newton_tolerance: Newton stops when the largest displacement of a node in an update is below this fraction of the
         limb length. If quadratic convergence foretells that the next update would be, it is skipped.
     max_iterations: Limit of Newton iterations per stage. Beyond it, the step is halved, down to 1/4096. A stroke has a
         limit of its own, 200,000 iterations and 100 more per time step; a robot beyond it fails with
         SolverStatus.ITERATION_LIMIT. Where limbs touch, those of the linear solver (contact/coupled.py) count, too.
-    path_tolerance: Error of the hub's path as a fraction of its length, from 0.001 to 0.02, by which steps are adapted
-        (up to `step`). Only for the scheme "implicit-midpoint". None means steps of equal length.
     damping: Numerical damping of the scheme "implicit-midpoint", from 0 to 0.5. Without any, oscillations that are too
         fast for the steps never decay, and on fine meshes they may gather energy. Their amplitude falls by a fraction
         of twice the damping in every step, slow oscillations are hardly damped, see rods/step.py.
@@ -54,7 +51,6 @@ class Numerics:
     step: Annotated[float, positive("s")] = 3e-3
     newton_tolerance: Annotated[float, positive("limb lengths")] = 1e-8
     max_iterations: Annotated[int, whole(2, 10_000)] = 60
-    path_tolerance: Annotated[float | None, within(0.001, 0.02)] = None
     damping: Annotated[float, within(0.0, 0.5)] = 0.0
     named: bool = field(default=True, kw_only=True, repr=False, compare=False)
 
@@ -64,8 +60,6 @@ class Numerics:
         check_numbers(self)
         if self.newton_tolerance > 1e-2:
             raise ValueError(f"newton_tolerance must be at most 0.01 limb lengths, not {shown(self.newton_tolerance)}.")
-        if self.path_tolerance is not None and self.scheme != "implicit-midpoint":
-            raise ValueError(f'path_tolerance needs the scheme "implicit-midpoint", not {shown(self.scheme)}.')
         if self.damping > 0.0 and self.scheme != "implicit-midpoint":
             raise ValueError(f'damping needs the scheme "implicit-midpoint", not {shown(self.scheme)}.')
         if not self.named and self != DEFAULT:
@@ -86,10 +80,6 @@ class Numerics:
         """
         require_choice("fidelity", fidelity, get_args(Fidelity))
         return PRESETS[fidelity].numerics
-
-
-ADAPTATION = (0.04, 2.0)
-"""Constants (c, p): steps with an error rate of (tolerance/c)^p limb lengths per stroke keep the path's tolerance."""
 
 
 class Resolution(NamedTuple):

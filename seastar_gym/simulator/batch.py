@@ -141,7 +141,7 @@ class Batch:
         self.v = aligned_rows(n_groups, n_place_rows, N_LANES)
         self.q[:, : self.coefficients.rest.shape[1]] = self.coefficients.rest
         n_shares = 0 if body is None else self._scheme.n_stages
-        self.a = aligned_rows(n_groups, (n_free_rows + 1) * self._scheme.n_stages + 2 + n_shares, N_LANES)
+        self.a = aligned_rows(n_groups, (n_free_rows + 1) * self._scheme.n_stages + n_shares, N_LANES)
         self.peaks = np.zeros((n_groups, n_limbs, N_LANES))
         self.times = self.shape = np.zeros(1)
         self.status = np.zeros((n_groups, 1, N_LANES))

@@ -57,7 +57,6 @@ class StrokeReport(NamedTuple):
     backtracks: Halvings of a Newton update by the line search.
     steps: Time steps accepted.
     halvings: Time steps that did not converge or created energy. They are halved or, at the shortest, tried again.
-    rejections: Time steps that were halved because their error was too large (Numerics.path_tolerance).
     energy_cuts: Times that velocities were reduced: because the energy had grown a little, or because no step led on,
         see rods/guard.py.
     covered: Time covered [s].
@@ -85,7 +84,6 @@ class StrokeReport(NamedTuple):
     backtracks: NDArray[np.int64]
     steps: NDArray[np.int64]
     halvings: NDArray[np.int64]
-    rejections: NDArray[np.int64]
     energy_cuts: NDArray[np.int64]
     covered: Floats
     smallest_opening_angle: Floats

@@ -183,9 +183,7 @@ class EnergyGrowth(Watch):
         )
 
 
-FACTORS: dict[str, float] = {
-    "implicit-midpoint": 4.5, "sdirk2": 5.0, "sdirk3": 7.5, "implicit-euler": 9.0,
-}  # fmt: skip
+FACTORS: dict[str, float] = {"implicit-midpoint": 4.5, "sdirk2": 5.0, "implicit-euler": 9.0}
 """Estimate over distance of the two hubs."""
 FACTOR_OF_CHAPTER = 3.5
 """The same for the chapter's discretisation, where errors of space prevail, of first order, whatever the scheme."""
@@ -203,7 +201,7 @@ class Snapshot(NamedTuple):
 
 
 def twin_scene(scene: Scene) -> Scene:
-    """The scene with edges and time steps half as long; steps that are adapted become equal ones."""
+    """The scene with edges and time steps half as long."""
     if not isinstance(scene, Scene):
         raise ValueError(f"A Scene is needed, not {shown(scene)}.")
     if scene.held_nodes or scene.loads:
@@ -214,7 +212,7 @@ def twin_scene(scene: Scene) -> Scene:
             f"error_bars=False, or one of {', '.join(map(repr, FACTORS))}."
         )
     robot = replace(scene.robot, nodes_per_limb=2 * scene.robot.nodes_per_limb - 1)
-    numerics = replace(scene.numerics, step=0.5 * scene.numerics.step, path_tolerance=None)
+    numerics = replace(scene.numerics, step=0.5 * scene.numerics.step)
     return replace(scene, robot=robot, numerics=numerics)
 
 

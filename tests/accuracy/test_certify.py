@@ -327,8 +327,7 @@ def test_what_cannot_be_certified_is_refused_before_it_is_measured(arguments, wo
 def test_the_table_and_the_picture_of_a_certificate(made, golden, monkeypatch):
     """Fastest first, and a line for every number of nodes."""
     golden("certificate.txt", command.as_text(made))
-    adapted = {"scheme": "implicit-midpoint", "path_tolerance": 0.01}
-    slower = replace(made.settings[1], speed=10.0, errors=MADE["errors"] | {"b": 0.004}, **adapted)
+    slower = replace(made.settings[1], scheme="sdirk2", speed=10.0, errors=MADE["errors"] | {"b": 0.004})
     three = replace(made, settings=(*made.settings, slower))
     picture = drawn(monkeypatch, command, partial(command.draw, three))
     golden("certificate_picture.txt", f"{picture}\n{three.settings[2]}")

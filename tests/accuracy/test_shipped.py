@@ -107,7 +107,7 @@ OTHERS = [
 
 
 UNMEASURED = [
-    replace(FAST, numerics=Numerics("sdirk3", 7.77e-3)),
+    replace(FAST, numerics=Numerics("sdirk2", 7.77e-3)),
     replace(FAST, robot=replace(FAST.robot, nodes_per_limb=15)),
     replace(FAST, robot=replace(FAST.robot, discretisation="chapter")),
 ]

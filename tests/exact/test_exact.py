@@ -196,7 +196,7 @@ def test_the_limbs_ring_with_the_eigenvalues_of_their_stiffness(name, n):
 
 # Quadratic drag: a straight robot does not bend when it translates, so dv/dt = a - k |v| v (13.8).
 
-IN_DRAG = Numerics("sdirk3", 2e-3, newton_tolerance=1e-12)
+IN_DRAG = Numerics("sdirk2", 0.25e-3, newton_tolerance=1e-12)
 K = 1.0 / (np.pi * Seastar().rod_radius)
 """Drag over mass rho_f C_d / (pi r_0 rho_m) [1/m]; fluid and limbs have one density, and C_d is 1."""
 

@@ -57,7 +57,7 @@ MADE: Calls = {
         "GridCurrent": dict(corner=(0.0, 0.0), spacing=0.1, velocities=np.ones((2, 2, 2))), "SmaLimb": dict(delay=0.02),
         "MeasuredCurve": dict(times=(0.0, 0.1, 1.0), angles=(0.0, 0.5, 0.0)), "ThermalSma": {},
         "Limited": dict(actuator=SmaPulse(), largest_angle=0.3, largest_rate=1.0),
-        "Numerics": dict(scheme="implicit-midpoint", path_tolerance=0.01, damping=0.002),
+        "Numerics": dict(scheme="implicit-midpoint", damping=0.002),
         "relaxation_time": dict(loss_factor=0.1, frequency=10.0), "Uniform": dict(low=0.0, high=1.0),
         "Scene": dict(numerics=FAST, held_nodes=(0,), loads=((1, 0.0, 1e-3),), limb_strengths=(1.0,) * 5,
                       contact=Contact()),

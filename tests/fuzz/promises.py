@@ -213,7 +213,7 @@ def check_momentum(case: Case) -> None:
             speed = speed + np.abs(simulator.spin()) * simulator.scene.robot.body.shape.reach
         report = simulator.stroke(commands)
         after, _ = momenta(simulator)
-        h = numerics.step / np.exp2(np.minimum(report.halvings + report.rejections, 12))
+        h = numerics.step / np.exp2(np.minimum(report.halvings, 12))
         rounding = MOMENTUM_ROUNDING * (speed + (lengths + extent + speed * simulator.stroke_time) / h)
         tolerated = MOMENTUM_PER_TOLERANCE * numerics.newton_tolerance * lengths / numerics.step
         drift = np.abs(after - before).max(axis=1) / mass

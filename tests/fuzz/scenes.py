@@ -318,15 +318,13 @@ def draw_wires(draw: Draw, peak: Any, heating: float, cooling: float) -> SmaWire
 def draw_numerics(draw: Draw) -> Numerics:
     if not draw.wild and draw.maybe(0.5):
         return Numerics.preset(draw.rng.choice(get_args(Fidelity)))
-    scheme = draw.rng.choice(["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint", "implicit-midpoint"])
-    adapted = scheme == "implicit-midpoint" and draw.maybe(0.4)
+    scheme = draw.rng.choice(["implicit-euler", "sdirk2", "implicit-midpoint", "implicit-midpoint"])
     tolerance = draw.power(-14.0, -2.0) if draw.wild else draw.power(-9.0, -6.0)
     return Numerics(
         scheme,
         step=draw.power(-5.0, 0.0) if draw.wild else draw.power(-3.0, -2.0),
         newton_tolerance=min(tolerance, 1e-2),
         max_iterations=draw.rng.choice([2, 5, 60, 60, 60]) if draw.wild else 60,
-        path_tolerance=draw.rng.uniform(1e-3, 0.02) if adapted else None,
         damping=draw.rng.choice([0.0, 0.002, 0.5]) if scheme == "implicit-midpoint" else 0.0,
     )
 

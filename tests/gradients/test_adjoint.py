@@ -46,7 +46,7 @@ TIGHT = replace(SMALL, numerics=replace(SMALL.numerics, newton_tolerance=1e-14))
 SCENES = {
     "positions and velocities": (SMALL, [*ALL_KINDS, "positions", "velocities"], COMMANDS),
     **{name: (SWIMS[name][0], ALL_KINDS, COMMANDS) for name in
-       ("implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint", "adapted", "halved")},
+       ("implicit-euler", "sdirk2", "implicit-midpoint", "halved")},
     "halved midpoint": (
         replace(SMALL, fluid=Water(), numerics=replace(HALVED, scheme="implicit-midpoint")), ALL_KINDS, COMMANDS
     ),
@@ -75,7 +75,7 @@ def test_gradient_is_that_of_dual_lanes(name):
         share = 1e-10 if scene.contact is None else 1e-8  # conjugate gradients leave rounding
         np.testing.assert_allclose(found, right, rtol=0.0, atol=share * largest, err_msg=by)
     assert recorded.sentence == expected.sentence
-    assert (BRANCH in recorded.sentence) == (name.startswith(("adapted", "halved"))) or name in TERMS
+    assert (BRANCH in recorded.sentence) == (name.startswith("halved")) or name in TERMS
 
 
 def test_an_objective_has_its_value_and_the_gradient_of_its_slopes():

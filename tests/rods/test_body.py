@@ -21,7 +21,7 @@ from seastar_gym.rods.contact.forces import add_contact, n_listed
 from seastar_gym.rods.contact.pairs import freeze_contact, without_new_crossings
 from seastar_gym.rods.newton import move_along
 from seastar_gym.rods.potential import factorise
-from seastar_gym.rods.step import OF_BODY, REPORT_ROWS, SCHEMES, Stage, Step, memory_row, try_step
+from seastar_gym.rods.step import REPORT_ROWS, SCHEMES, Stage, Step, share_of_body, try_step
 from seastar_gym.rods.terms.hub import Actuation
 from slopes import gradient, hessian, plain, slope
 from stages import EVERYONE, begun_on_body, unknown_rows, unknowns
@@ -208,10 +208,10 @@ def stepped(scene: Scene, rods: Rods, start: SimpleNamespace, h: float) -> np.nd
     tableau, limits = SCHEMES[scene.numerics.scheme], make_limits(scene)
     q, v, still = unknown_rows(rods, start.u), unknown_rows(rods, start.v_hat), np.zeros((N_LIMBS, N_LANES))
     move_roots(rods, q, v)
-    memory = np.zeros((memory_row(rods, tableau, OF_BODY + tableau.n_stages), N_LANES))
+    memory = np.zeros((share_of_body(rods, tableau, tableau.n_stages), N_LANES))
     step = Step(Lanes(0.0), Lanes(1.0), Lanes(h), Lanes(60.0), ~EVERYONE)
     args = rods, make_work(rods, tableau.n_stages), tableau, Actuation(still, still), q, v, memory, step
-    _, accepted, _ = try_step(*args, EVERYONE, limits, np.zeros((len(REPORT_ROWS), N_LANES)))
+    accepted = try_step(*args, EVERYONE, limits, np.zeros((len(REPORT_ROWS), N_LANES)))
     assert plain(accepted).all()
     return unknowns(rods, q)
 

@@ -44,15 +44,11 @@ WATER = Water(950.0, 1.3, 0.1, Vortex(0.02, 0.1, -0.05, 0.06), 0.8)
 def scenes():
     """Name, scene, and velocities of some robots at the start [m/s], by which steps are halved and limbs meet.
 
-    Few nodes and a short stroke: every scheme, adapted steps, a fluid with all terms, limbs that meet.
+    Few nodes and a short stroke: every scheme, a fluid with all terms, limbs that meet.
     """
     pulse, midpoint = SmaPulse(0.6, 0.02, 0.02), Numerics("implicit-midpoint", 0.01)
-    for scheme, nodes, blow in (
-        ("implicit-euler", 4, 20.0), ("sdirk2", 3, 0.3), ("sdirk3", 3, 0.3), ("implicit-midpoint", 3, 0.3)
-    ):  # fmt: skip
+    for scheme, nodes, blow in (("implicit-euler", 4, 20.0), ("sdirk2", 3, 0.3), ("implicit-midpoint", 3, 0.3)):
         yield scheme, Scene(Seastar(nodes_per_limb=nodes), actuator=pulse, numerics=Numerics(scheme, 0.02)), blow
-    adapted = Numerics("implicit-midpoint", 0.02, path_tolerance=0.02)
-    yield "adapted", Scene(Seastar(nodes_per_limb=3), actuator=pulse, numerics=adapted), 0.3
     robot = Seastar(nodes_per_limb=3, relaxation_time=4e-3)
     yield "fluid", Scene(robot, WATER, pulse, midpoint, loads=((4, 1e-3, -2e-3),)), 0.3
     bent = Seastar(nodes_per_limb=4, along=AlongLimb(0.7, (1.0, 2.0, 0.5)), stiffening=Stiffening(2.0))

@@ -32,7 +32,7 @@ def test_every_scheme_is_exact_for_nodes_that_fall(scheme):
     tableau, work = SCHEMES[scheme], make_work(RODS, SCHEMES[scheme].n_stages)
     q_0, v_0, a_0 = RNG.standard_normal((3, SIZE, N_LANES))
     q, v, n = q_0.copy(), v_0.copy(), tableau.n_stages
-    a = np.concatenate([np.tile(a_0, (n, 1)), np.ones((n + 2, N_LANES))])
+    a = np.concatenate([np.tile(a_0, (n, 1)), np.ones((n, N_LANES))])
     for k in range(n):
         stage = begin_stage(RODS, work, tableau, k, q, v, a, Lanes(H))
         if k < n - 1:

@@ -62,7 +62,7 @@ SCENES = {
     "contact": Scene(contact=Contact(np.geomspace(1e4, 1e6, N_ROBOTS)), numerics=Numerics.preset("fast")),
     "bodies": Scene(Seastar(4, 5, body=Body.rectangle(0.06, 0.03, mass=0.03 * SPREAD)), numerics=FAST),
     "along": Scene(ALONG, actuator=SmaPulse(0.6)),
-    "tolerances of their own size": Scene(LENGTHS, numerics=Numerics("implicit-midpoint", 10e-3, path_tolerance=0.02)),
+    "tolerances of their own size": Scene(LENGTHS, numerics=Numerics("implicit-midpoint", 10e-3, 1e-4)),
 }
 
 

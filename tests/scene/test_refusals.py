@@ -156,9 +156,8 @@ ACTUATORS = [
 ]
 SCENES = [
     (lambda: Numerics(newton_tolerance=0.1), "newton_tolerance", "0.01"),
-    (lambda: Numerics("sdirk2", path_tolerance=0.01), "path_tolerance", "implicit-midpoint", "sdirk2"),
     *((partial(Numerics, scheme, damping=0.002), "damping", "implicit-midpoint", scheme)
-      for scheme in ("implicit-euler", "sdirk2", "sdirk3")),
+      for scheme in ("implicit-euler", "sdirk2")),
     (lambda: Simulator(Scene(numerics=Numerics(step=1e-15))), "step"),
     (lambda: Water(1000.0, np.array([1.0, 0.5]), 0.6), "tangential", "exceed"),
     *((partial(Scene, limb_strengths=strengths), "limb_strengths")

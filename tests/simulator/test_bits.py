@@ -51,7 +51,7 @@ from strokes import finished
 
 pytestmark = pytest.mark.filterwarnings("ignore:Limbs of robot:RuntimeWarning")
 
-SCHEMES = "implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"
+SCHEMES = "implicit-euler", "sdirk2", "implicit-midpoint"
 MIDPOINT = Numerics("implicit-midpoint", 0.01)
 FAST = Scene.preset("fast")
 NASTY = "at rest", "shifted", "coinciding", "fast", "crossed", "crumpled", "far out", "no number"
@@ -99,7 +99,6 @@ ACTUATORS = {
     "limited": Limited(SmaPulse(), largest_rate=2.0),
     "measured limb": SmaLimb(heating_time=0.1, delay=0.02),
 }
-ADAPTIVE = Numerics("implicit-midpoint", 0.02, path_tolerance=0.02)
 LONG = brief(Numerics("implicit-euler", 5e-3), Seastar(nodes_per_limb=40), contact=Contact())
 ROWS = {
     "default strokes": Row(Scene(TEN, numerics=MIDPOINT)),
@@ -108,7 +107,6 @@ ROWS = {
     "body": Row(Scene(ON_BODY, numerics=MIDPOINT)),
     "current": Row(Scene(Seastar(nodes_per_limb=10, relaxation_time=1e-4), FLUID, numerics=MIDPOINT)),
     "sections": Row(Scene(Seastar(nodes_per_limb=10, limbs=(Limb(section=Strip(2e-3, 8e-3)),) * 5), numerics=MIDPOINT)),
-    "adaptive": Row(Scene(TEN, numerics=ADAPTIVE)),
     **{f"{name} actuator": Row(replace(FAST, actuator=each)) for name, each in ACTUATORS.items()},
     "error bars": Row(FAST, (), True),
     "error bars, contact": Row(replace(FAST, contact=Contact()), (), True),
@@ -117,8 +115,7 @@ ROWS = {
     "error bars, each its own": Row(replace(FAST, robot=OF_EACH), (), True),
     **{f"nasty, {name}, {scheme}": Row(brief(Numerics(scheme, 5e-3), **terms), NASTY)
        for (name, terms), scheme in product(TERMS.items(), SCHEMES)},
-    "nasty, adaptive": Row(brief(ADAPTIVE), NASTY),
-    "nasty, long steps": Row(brief(Numerics("sdirk3", 0.02)), NASTY),
+    "nasty, long steps": Row(brief(Numerics("sdirk2", 0.02)), NASTY),
     # Chains too long for all pairs of node and edge at once; pairs near a robot are counted robot by robot.
     "long chains that touch": Row(LONG, ("shifted", *["crumpled"] * (N_LANES - 2), "crossed"), n_robots=N_LANES),
     "limbs pressed onto a body": Row(
@@ -280,7 +277,7 @@ def test_a_robot_has_its_bits(name, way):
 # Another width of lanes
 
 
-FEW = {name: ROWS[name] for name in ("default strokes", "body", "adaptive", "nasty, every term, implicit-midpoint")}
+FEW = {name: ROWS[name] for name in ("default strokes", "body", "nasty, every term, implicit-midpoint")}
 FEW["held, along limbs"] = Row(
     Scene(replace(TEN, along=AlongLimb(0.7), stiffening=Stiffening(2.0)), numerics=MIDPOINT, held_nodes=(9,))
 )
@@ -303,7 +300,7 @@ def test_few_robots_on_narrow_lanes_have_their_bits(monkeypatch, name):
 )
 def test_a_simulator_that_travels_to_another_lane_width_swims_on_to_the_same_bits(tmp_path, width):
     """To a processor without AVX-512, say. Six of nine robots fly about."""
-    simulator, rng = Simulator(Scene(TEN, numerics=Numerics("sdirk3", 0.02)), 9), np.random.default_rng(0)
+    simulator, rng = Simulator(Scene(TEN, numerics=Numerics("sdirk2", 0.02)), 9), np.random.default_rng(0)
     state, commands = simulator.get_state(), rng.integers(-1, 2, (2, 9, 5)).astype(float)
     state.velocities[3:] = 0.1 * rng.standard_normal((6, 46, 2))
     simulator.set_state(state)

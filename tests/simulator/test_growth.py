@@ -88,8 +88,7 @@ def test_a_reset_and_a_new_state_begin_anew_and_a_pickle_goes_on():
 # A stroke's work is bounded: no step below 1/4096 of an interval, and no robot beyond its iterations.
 
 
-STEPPED = {scheme: Numerics(scheme, 0.05) for scheme in ("implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint")}
-STEPPED["adaptive"] = Numerics("implicit-midpoint", 0.05, path_tolerance=0.01)
+STEPPED = {scheme: Numerics(scheme, 0.05) for scheme in ("implicit-euler", "sdirk2", "implicit-midpoint")}
 
 
 def swimmers(scene: Scene, speed: float) -> tuple[Simulator, np.ndarray]:

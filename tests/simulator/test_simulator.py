@@ -14,14 +14,11 @@ from seastar_gym.scene.number import side_by_side
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
 from strokes import assert_same_bits, finished
 
-SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
+SCHEMES = ["implicit-euler", "sdirk2", "implicit-midpoint"]
 STRAIGHT = np.array([[0.0, 1.0, 0.0, 0.0, -1.0]])
 
 
 def scene_of(scheme="implicit-midpoint", step=0.01, **numerics) -> Scene:
-    """The chapter's robot; "adaptive" is the implicit midpoint rule with steps adapted to their error."""
-    if scheme == "adaptive":
-        return Scene(TEN, numerics=Numerics("implicit-midpoint", step, path_tolerance=0.02, **numerics))
     return Scene(TEN, numerics=Numerics(scheme, step, **numerics))
 
 
@@ -43,7 +40,7 @@ def set_motion(simulator: Simulator, size: float, robots: slice | int = slice(No
 # Robots at rest
 
 
-@pytest.mark.parametrize("scheme", [*SCHEMES, "adaptive"])
+@pytest.mark.parametrize("scheme", SCHEMES)
 def test_robots_begin_at_rest_with_the_hub_at_the_origin_and_stay_there_if_they_are_left_alone(scheme):
     simulator = Simulator(scene_of(scheme), n_robots=3)
     np.testing.assert_array_equal(simulator.positions, np.tile(TEN.nodes(), (3, 1, 1)))

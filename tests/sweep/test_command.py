@@ -34,7 +34,7 @@ def test_axes_are_words(tmp_path, monkeypatch):
         "fidelity=fast,chapter": Choices("fidelity", ("fast", "chapter")),
         "actuator=SmaWires,SmaPulse": Choices("actuator", (SmaWires(), Scene().actuator), ("SmaWires", "SmaPulse")),
         "fluid=Water,None": Choices("fluid", (Scene().fluid, None), ("Water", "None")),
-        "numerics.path_tolerance=None,0.01": Choices("numerics.path_tolerance", (None, 0.01), ("None", 0.01)),
+        "robot.relaxation_time=None,0.01": Choices("robot.relaxation_time", (None, 0.01), ("None", 0.01)),
         "robot=@seven.json,Seastar": Choices("robot", (SEVEN, Seastar()), ("seven", "Seastar")),
         "robot.density=1e2:1e4:3:log": Range("robot.density", 1e2, 1e4, is_log=True).spaced(3),
         "x=1:2:1000000": Range("x", 1.0, 2.0).spaced(1_000_000),
