@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
+from copy import copy
 from itertools import pairwise
 from types import ModuleType
 from typing import Any, NamedTuple, TypeVar
@@ -72,11 +73,11 @@ MAX_ROBOTS, MAX_THREADS = 100_000_000, 4096
 
 
 class Snapshot(NamedTuple):
-    """What an interval changes, before it. Arrays of clock and drive are never written into."""
+    """What an interval changes, before it. Only kernels write into arrays, those of `rows`, which are copies."""
 
     rows: dict[str, Any]
-    clock: dict[str, Any]
-    drive: dict[str, Any]
+    clock: Clock
+    drive: Drive
     watches: list[Any]
 
 
@@ -118,7 +119,7 @@ class Simulator:
             else DeviceBatch(scene, self.n_robots, device, effort)
         )  # fmt: skip
         self._drive = Drive(scene.actuator, self.n_robots, scene.robot.n_limbs, scene.numerics.step)
-        self._clock = Clock(self.n_robots)
+        self._clock = Clock.at_zero(self.n_robots)
         self._lock = StrokeLock()
         self._known_duration: float | None = None  # of the last interval [s]
         self._may_warn_of_overlap = scene.contact is not None
@@ -197,18 +198,18 @@ class Simulator:
 
     def __getstate__(self) -> dict[str, Any]:
         self._lock.require_intact()
-        drive = {name: getattr(self._drive, name) for name in ("state", "strengths", "commands", "phase")}
+        drive = self._drive
         arguments = (self.scene, self.n_robots, self.threads, False, self._batch.effort.size > 0, self.device)
-        rows = self._batch.rows()
-        watched = {"watches": self._watches, "may_warn": self._may_warn_of_overlap}
-        return {"arguments": arguments, "rows": rows, "clock": self._clock, "drive": drive, **watched}
+        actuators = drive.state, drive.commands, np.full(self.n_robots, drive.phase)
+        moved = {"rows": self._batch.rows(), "clock": self._clock, "actuators": actuators}
+        kept = {"strengths": drive.strengths, "watches": self._watches, "may_warn": self._may_warn_of_overlap}
+        return {"arguments": arguments, **moved, **kept}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(*state["arguments"])  # type: ignore[misc]
         self._batch.put_rows(state["rows"])
-        vars(self._clock).update(vars(state["clock"]))
-        for name, value in state["drive"].items():
-            setattr(self._drive, name, value)
+        self._drive.put(*state["actuators"])
+        self._drive.strengths, self._clock = state["strengths"], state["clock"]
         self._watches, self._may_warn_of_overlap = state["watches"], state["may_warn"]
 
     def reset(self, mask: ArrayLike | None = None, heading: ArrayLike = 0.0) -> None:
@@ -227,7 +228,7 @@ class Simulator:
             for robot in np.flatnonzero(chosen):
                 self._batch.put_at_rest(robot, angles[robot])
             self._drive.put_at_rest(chosen)
-            self._clock.set(chosen, 0.0)
+            self._clock = self._clock.put(chosen, 0.0)
             for watch in self._watches.values():
                 watch.reset(chosen, angles)
 
@@ -250,7 +251,7 @@ class Simulator:
         checked_commands(commands, self.scene, self._drive.strengths, "State.commands")
         with self._new_state(of_all=True):
             self._batch.put_state(positions, velocities, orientation, spin)
-            self._clock.set(slice(None), time)
+            self._clock = self._clock.put(slice(None), time)
             self._drive.put(actuators, commands, phase)
             for watch in self._watches.values():
                 watch.lose()
@@ -456,8 +457,9 @@ class Simulator:
         checked = None if commands is None else checked_commands(commands, self.scene, self._drive.strengths)
         interval = self._lock.acquire(intact=True)
         watches = [watch.save() for watch in self._watches.values()]
-        before = Snapshot(self._batch.save(), dict(vars(self._clock)), dict(vars(self._drive)), watches)
+        before = Snapshot(self._batch.save(), self._clock, self._drive, watches)
         try:
+            self._drive = copy(self._drive)
             self._begin_interval(float(duration), checked)
             if ends_of is None:
                 self._batch.advance(0, len(self._batch.times) - 1)
@@ -477,7 +479,7 @@ class Simulator:
         times = self._batch.times - self._batch.times[0]
         for begin, end in pairwise([0, *ends_of(times)]):
             self._batch.advance(begin, end)
-            self._clock.advance_to(self._batch.covered())
+            self._clock = self._clock._replace(within=self._batch.covered())
             self._drive.advance(end)
             self._lock.pause()
             yield float(times[end])
@@ -488,22 +490,21 @@ class Simulator:
         with held_back():
             if self._lock.resume(interval):
                 self._batch.restore(before.rows)
-                vars(self._clock).update(before.clock)
-                vars(self._drive).update(before.drive)
+                self._clock, self._drive = before.clock, before.drive
                 for watch, saved in zip(self._watches.values(), before.watches, strict=True):
                     watch.restore(saved)
                 self._lock.release()
 
     def _begin_interval(self, duration: float, commands: Floats | None) -> None:
         self._batch.begin(*self._drive.begin(duration, commands))
-        self._clock.begin(duration)
+        self._clock = self._clock.begun(duration)
         for watch in self._watches.values():
             watch.begin(duration, commands)
 
     def _end_interval(self) -> StrokeReport:
         rows = self._batch.end()
         failed = rows["status"] > 0
-        self._clock.end(failed, rows["covered"])
+        self._clock = self._clock.ended(failed, rows["covered"])
         self._drive.advance(len(self._batch.times) - 1)
         for field, watch in self._watches.items():
             watch.end(self, failed)
