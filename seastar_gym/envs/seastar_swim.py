@@ -14,7 +14,7 @@ from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.envs import IDS
 from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
 from seastar_gym.envs.commands import Actions, sampling_mask
-from seastar_gym.envs.options import HeadingTargets, Plain, RewardWeights, SwimOptions
+from seastar_gym.envs.options import HeadingTargets, Plain, RewardWeights
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.rendering import Frame
@@ -399,12 +399,11 @@ class SeastarSwimEnv(OneRobotEnv):
         frames_per_stroke: int | None = None,
     ):
         robots = swimmers(
-            1, 1, split, task,
-            SwimOptions(
-                actions, fidelity, scene, randomization, certificate, error_bars, decision_period,  # type: ignore[arg-type]
-                observe_actuators, device, sight, action_delay,  # type: ignore[arg-type]  # plain data, too
-            ),
-            path=path, reward=reward, waypoint_radius=waypoint_radius, random_heading=random_heading, headings=headings,
+            1, 1, task, split, path=path, actions=actions, fidelity=fidelity, scene=scene, reward=reward,
+            waypoint_radius=waypoint_radius, random_heading=random_heading, randomization=randomization,
+            certificate=certificate, error_bars=error_bars, decision_period=decision_period,
+            observe_actuators=observe_actuators, headings=headings, device=device, sight=sight,
+            action_delay=action_delay,
         )  # fmt: skip
         super().__init__(robots, render_mode, frames_per_stroke)
 

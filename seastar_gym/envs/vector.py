@@ -13,18 +13,14 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.accuracy.chapters import warn_uncertified, warn_undamped
 from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
-from seastar_gym.envs.commands import Actions, as_array, sampling_mask, to_commands
-from seastar_gym.envs.options import HeadingTargets, Plain, RewardWeights, SwimOptions
-from seastar_gym.envs.paths import WAYPOINT_RADIUS
-from seastar_gym.envs.randomization import DomainRandomization
+from seastar_gym.envs.commands import as_array, sampling_mask, to_commands
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.rendering import BatchPictures, Picture
-from seastar_gym.envs.robots import Robots, Split, Task
-from seastar_gym.envs.sight import Drawn, Sight
+from seastar_gym.envs.robots import Robots, Split
 from seastar_gym.envs.tasks import chosen_task
-from seastar_gym.envs.waypoints import Path
+from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import (
     is_whole_number,
@@ -35,7 +31,6 @@ from seastar_gym.scene.checks import (
     require_seed,
     shown,
 )
-from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator.simulator import MAX_ROBOTS, completed
 
 
@@ -86,6 +81,8 @@ OF_EACH_ROBOT: Mapping[str, Callable[[Any, int], Any]] = {
     "scene": Scene.of_robot,
 }
 """What a robot has of its own of these attributes, and results of methods, of a batch; all others are common."""
+OF_ROBOTS = arguments_of(SwimOptions) | arguments_of(AlongPath) | {"task", "split"}
+"""Arguments of an environment that say what its robots are and what they swim for."""
 NOT_OF_A_ROBOT = ("reset", "step")
 """Methods that robots of one simulator cannot be called alone for."""
 
@@ -382,7 +379,7 @@ class SeastarSwimVectorEnv(ManyRobotsEnv):
     Arrays of actions, observations, rewards and flags have a first axis of length `num_envs`, and so have the entries
     of `info`; `info["_name"]` is the mask of the robots for which `info["name"]` is valid.
 
-    ## Arguments besides those of `SeastarSwimEnv`
+    ## Arguments besides those of `SeastarSwimEnv`, which are taken by name
     num_envs: Number of robots.
     max_episode_steps: Time limit [decisions], applied here; None or -1 for none.
     autoreset_mode: When an episode that is over is followed by the next one. NEXT_STEP (default): the next step ignores
@@ -412,24 +409,6 @@ class SeastarSwimVectorEnv(ManyRobotsEnv):
         self,
         num_envs: int = 1,
         max_episode_steps: int | None = None,
-        path: Path = "pentagon",
-        actions: Actions = "limbs",
-        fidelity: Fidelity | None = None,
-        scene: Scene | Plain | None = None,
-        reward: RewardWeights | Plain = RewardWeights(),
-        waypoint_radius: float = WAYPOINT_RADIUS,
-        random_heading: bool = False,
-        randomization: DomainRandomization | Plain | None = None,
-        certificate: Certificate | str | None = None,
-        error_bars: bool = False,
-        decision_period: float | None = None,
-        observe_actuators: bool = True,
-        headings: HeadingTargets | Plain | None = None,
-        device: str = "cpu",
-        sight: Sight | Plain | None = None,
-        action_delay: Drawn | Plain = 0.0,
-        task: Task | Plain | str | None = None,
-        split: Split = "train",
         *,
         render_mode: Literal["rgb_array"] | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
@@ -437,6 +416,7 @@ class SeastarSwimVectorEnv(ManyRobotsEnv):
         on_device: bool = False,
         frames_per_stroke: int | None = None,
         disable_env_checker: bool | None = None,
+        **arguments: Any,
     ):
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
@@ -448,27 +428,21 @@ class SeastarSwimVectorEnv(ManyRobotsEnv):
             require_flag("disable_env_checker", disable_env_checker)
         require_flag("on_device", on_device)
         self.threads, self.disable_env_checker = threads, disable_env_checker
-        robots = swimmers(
-            num_envs, threads, split, task,
-            SwimOptions(
-                actions, fidelity, scene, randomization, certificate, error_bars, decision_period,  # type: ignore[arg-type]
-                observe_actuators, device, sight, action_delay,  # type: ignore[arg-type]  # plain data, too
-            ),
-            path=path, reward=reward, waypoint_radius=waypoint_radius, random_heading=random_heading, headings=headings,
-        )  # fmt: skip
+        robots = swimmers(num_envs, threads, **arguments)
         super().__init__(robots, max_episode_steps, autoreset_mode, render_mode, frames_per_stroke, bool(on_device))
 
-    _arguments = arguments_of(__init__)
+    _arguments = arguments_of(__init__) | OF_ROBOTS
 
 
-def swimmers(
-    n_robots: int, threads: int | None, split: Split, task: Any, options: SwimOptions, **waypoints: Any
-) -> Robots:
+def swimmers(n_robots: int, threads: int | None, task: Any = None, split: Split = "train", **arguments: Any) -> Robots:
     """Robots of an environment, with a warning if the task tells errors that nobody has measured of the scene.
 
-    waypoints: Arguments of an environment whose task is a path.
+    arguments: Of the environment, those in `OF_ROBOTS`.
     """
-    robots = Robots(chosen_task(task, **waypoints), options, n_robots, threads, split=split)
+    if unknown := sorted({*arguments} - OF_ROBOTS):
+        raise TypeError(f"SeastarSwimEnv has no argument {unknown[0]!r}.")
+    options = SwimOptions(**{name: arguments.pop(name) for name in arguments_of(SwimOptions) & {*arguments}})
+    robots = Robots(chosen_task(task, **arguments), options, n_robots, threads, split=split)
     if robots.task.tells_errors:
         warn_undamped(robots.scene, robots.timed)
         warn_uncertified(robots.scene, robots.options.fidelity_of_scene, robots.certificate, robots.timed)

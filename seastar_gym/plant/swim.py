@@ -368,11 +368,11 @@ class PlantSwim(OneRobotEnv):
             require_file("logs", logs)
         folder = None if logs is None else Path(logs)
         self.plant, self.limits, self.logs = plant, limits, logs
-        own = {name: options.pop(name) for name in arguments_of(AlongPath.__init__) & {*options}}
+        own = {name: options.pop(name) for name in arguments_of(AlongPath) & {*options}}
         self._driven = PlantRobot(plant, limits, AlongPath(**own), SwimOptions(**options), folder)
         super().__init__(self._driven, render_mode, frames_per_stroke)
 
-    _arguments = arguments_of(__init__) | arguments_of(AlongPath.__init__) | arguments_of(SwimOptions.__init__)
+    _arguments = arguments_of(__init__) | arguments_of(AlongPath) | arguments_of(SwimOptions)
 
     @property
     def stopped(self) -> str:
