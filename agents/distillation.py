@@ -23,9 +23,10 @@ from agents.ppo import Hyperparameters, actor, describe, make_training_batch
 from agents.run import held, resume_command, robot_of, versions_and_machine
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.learned import LearnedPolicy, load, save
+from seastar_gym.envs.group import inverse
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.sight import Camera, read_camera, told
-from seastar_gym.envs.symmetry import Symmetry, VectorFrameStack, inverse
+from seastar_gym.envs.symmetry import Symmetry, VectorFrameStack
 from seastar_gym.evaluation.report import Remarks
 from seastar_gym.scene.checks import require_count, require_kind
 
