@@ -225,7 +225,7 @@ DIFFERENT = {
     **dict.fromkeys(("simulator", "unwrapped", "spec"), "robots share one simulator, batch and spec"),
     **dict.fromkeys(("reset", "step"), "robots of one simulator cannot be called alone: call(name) is refused"),
     **dict.fromkeys(("get_wrapper_attr",), "of a batch it is what call gives of that name"),
-    **dict.fromkeys(("draw_frame", "frame"), "a batch draws no pictures within decisions"),
+    **dict.fromkeys(("draw_frame", "frame", "picture", "pictures"), "a batch draws no pictures within decisions"),
     "metadata": "a batch draws no windows and no lists, and has an autoreset mode",
 }
 """Names that mean something else in `SyncVectorEnv` or its environments than in our batch, with the reason."""
