@@ -185,9 +185,9 @@ def imitation(teacher: LearnedPolicy, options: Options, camera: Camera, folder: 
     """Policy that sees through a camera, and has learned from the policy of the run with these options in a folder."""
     robot = robot_of(options, folder)
     batch = make_training_batch(
-        options.ppo, options.path, options.random_heading, robot.fidelity(options), options.num_threads,
-        num_envs=Hyperparameters().num_envs, scene=robot.scene, randomization=robot.draws, sight=camera.sight,
-        action_delay=camera.action_delay,
+        options.ppo, options.path, options.random_heading, fidelity=robot.fidelity(options),
+        threads=options.num_threads, num_envs=Hyperparameters().num_envs, scene=robot.scene, randomization=robot.draws,
+        **camera._asdict(),
     )  # fmt: skip
     decisions = length(options)
     print(f"A policy for {told(camera.sight)} learns from the run's, {decisions} decisions.", flush=True)
