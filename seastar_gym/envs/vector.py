@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from operator import getitem
-from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
+from typing import Any, Literal, NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -18,7 +19,7 @@ from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
 from seastar_gym.envs.commands import as_array, sampling_mask, to_commands
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.rendering import BatchPictures, Picture
-from seastar_gym.envs.robots import Robots, Split
+from seastar_gym.envs.robots import Outcome, Robots, Split
 from seastar_gym.envs.tasks import chosen_task
 from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.scene import Scene
@@ -66,8 +67,6 @@ def require_buffers(out: Buffers, n_robots: int, size: int) -> None:
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 Info = dict[str, Any]
-_P = ParamSpec("_P")
-Result = TypeVar("Result")
 
 LONGEST = 2**63 - 1
 """Largest time limit, which is none [decisions]."""
@@ -192,7 +191,8 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
 
     def begin(self, mask: Flags, asked: Any = None) -> None:
         """Begin episodes of the robots in a mask, with their own generators. asked: What a reset asks for."""
-        self._to_the_end(self._begin_episodes, mask, asked)
+        with self._to_the_end():
+            self._begin_episodes(mask, asked)
 
     def _begin_episodes(self, mask: Flags, asked: Any = None) -> None:
         self._robots.reset(mask, self._generators, asked)
@@ -201,16 +201,16 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
         if self.render_mode is not None:
             self.pictures.begin(mask)
 
-    def _to_the_end(self, change: Callable[_P, Result], *args: _P.args, **kwargs: _P.kwargs) -> Result:
-        """What a step or reset returns: after an interruption, robots and task disagree, and only a reset helps."""
+    @contextmanager
+    def _to_the_end(self) -> Iterator[None]:
+        """Context of a step or reset: after an interruption, robots and task disagree, and only a reset helps."""
         was_running, self.is_running = self.is_running, False
         try:
-            result = change(*args, **kwargs)
+            yield
         except ValueError:  # refused before anything changed
             self.is_running = was_running
             raise
         self.is_running = True
-        return result
 
     def step(
         self, actions: Any, out: Buffers | None = None
@@ -248,36 +248,36 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
         commands = to_commands(self.actions, self.simulator.scene.robot.n_limbs, actions, self.num_envs)
         commands[begun] = 0.0
         self.closed = False
-        return self._to_the_end(self._advance, commands, begun, look, parts)
+        with self._to_the_end():
+            outcome = self._swim(commands, look, parts)
+            self._elapsed += 1
+            reward, terminated, truncated = outcome.reward, outcome.terminated, self._elapsed >= self._limits
+            if begun.any():
+                terminated, truncated = terminated & ~begun, truncated & ~begun
+                reward = np.where(begun, 0.0, reward)
+                self._begin_episodes(begun)
+            self.needs_reset, final = terminated | truncated, Info()
+            observations = self._observe()
+            if self.autoreset_mode is AutoresetMode.SAME_STEP and self.needs_reset.any():
+                begun = self.needs_reset.copy()
+                final = _final(observations, outcome.info, begun)
+                self._begin_episodes(begun)
+                observations = self._observe()
+            return Step(Buffers(observations, reward, terminated, truncated), outcome.info, begun, final)
 
-    def _advance(
-        self, commands: NDArray[np.float64], begun: Flags, look: Callable[[float], None] | None, parts: int
-    ) -> Step:
+    def _swim(self, commands: NDArray[np.float64], look: Callable[[float], None] | None, parts: int) -> Outcome:
+        """Swim for one decision, and let trails follow where pictures are drawn."""
         if look is None:
             outcome = self._robots.step(commands)
             if self.render_mode is not None:
                 self.pictures.follow()
-        else:
+            return outcome
 
-            def follow(time: float) -> None:
-                self.pictures.follow()
-                look(time)
+        def follow(time: float) -> None:
+            self.pictures.follow()
+            look(time)
 
-            outcome = completed(self._robots.step_in_parts(commands, parts), follow)
-        self._elapsed += 1
-        reward, terminated, truncated = outcome.reward, outcome.terminated, self._elapsed >= self._limits
-        if begun.any():
-            terminated, truncated = terminated & ~begun, truncated & ~begun
-            reward = np.where(begun, 0.0, reward)
-            self._begin_episodes(begun)
-        self.needs_reset, final = terminated | truncated, Info()
-        observations = self._observe()
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and self.needs_reset.any():
-            begun = self.needs_reset.copy()
-            final = _final(observations, outcome.info, begun)
-            self._begin_episodes(begun)
-            observations = self._observe()
-        return Step(Buffers(observations, reward, terminated, truncated), outcome.info, begun, final)
+        return completed(self._robots.step_in_parts(commands, parts), follow)
 
     def _observe(self) -> Observations:
         """Observations: numpy's, or the device's if they are asked for."""

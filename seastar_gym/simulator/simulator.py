@@ -420,14 +420,16 @@ class Simulator:
         which is another discretisation: limbs that ring faster than steps resolve then ring otherwise, by 4 % of the
         largest speed at fidelity "fast" and 11 % at "balanced", and the hub is 4e-6 and 4e-5 limb lengths away.
         """
-        return completed(self._advance_pausing(duration, commands))
+        with self._interval(duration, commands):
+            self._batch.advance(0, len(self._batch.times) - 1)
+            return self._end_interval()
 
     def advance_in_parts(
         self, duration: float, commands: ArrayLike | None, parts: int
     ) -> Generator[float, None, StrokeReport]:
         """Advance as `advance` does, to the same bits, and pause as `stroke_in_parts` does."""
         require_count("parts", parts, 1, MAX_STEPS)
-        return (yield from self._advance_pausing(duration, commands, lambda times: ends_of_parts(times, parts)))
+        return (yield from self._advance_in_pieces(duration, commands, lambda times: ends_of_parts(times, parts)))
 
     def advance_pausing(
         self, duration: float, commands: ArrayLike | None, pauses: ArrayLike
@@ -442,15 +444,27 @@ class Simulator:
         def ends_of(times: Floats) -> NDArray[np.intp]:
             return ends_at(times, np.append(wanted, times[-1]))
 
-        return (yield from self._advance_pausing(duration, commands, ends_of))
+        return (yield from self._advance_in_pieces(duration, commands, ends_of))
 
-    def _advance_pausing(
-        self, duration: float, commands: ArrayLike | None, ends_of: Callable[[Floats], NDArray[np.intp]] | None = None
+    def _advance_in_pieces(
+        self, duration: float, commands: ArrayLike | None, ends_of: Callable[[Floats], NDArray[np.intp]]
     ) -> Generator[float, None, StrokeReport]:
-        """Advance, and pause at steps that follow from the ends of all steps [s], or never.
+        """Advance, with a pause after each piece. ends_of: Steps with which pieces end, from the ends of all steps [s]
+        since the interval began."""
+        with self._interval(duration, commands) as interval:
+            times = self._batch.times - self._batch.times[0]
+            for begin, end in pairwise([0, *ends_of(times)]):
+                self._batch.advance(begin, end)
+                self._clock = self._clock._replace(within=self._batch.covered())
+                self._drive.advance(end)
+                self._lock.pause()
+                yield float(times[end])
+                self._lock.resume(interval)
+            return self._end_interval()
 
-        An interval that is not completed is undone.
-        """
+    @contextmanager
+    def _interval(self, duration: float, commands: ArrayLike | None) -> Iterator[object]:
+        """Context of an interval, which is undone if it is not completed. Gives its holder of the lock."""
         if type(duration) is not float or duration != self._known_duration:
             require_duration(duration, self.scene.numerics.step)
             self._known_duration = float(duration)
@@ -460,30 +474,15 @@ class Simulator:
         before = Snapshot(self._batch.save(), self._clock, self._drive, watches)
         try:
             self._drive = copy(self._drive)
-            self._begin_interval(float(duration), checked)
-            if ends_of is None:
-                self._batch.advance(0, len(self._batch.times) - 1)
-            else:
-                yield from self._advance_in_pieces(interval, ends_of)
-            report = self._end_interval()
+            self._batch.begin(*self._drive.begin(float(duration), checked))
+            self._clock = self._clock.begun(float(duration))
+            for watch in self._watches.values():
+                watch.begin(float(duration), checked)
+            yield interval
             self._lock.release()
-            return report
         except BaseException:
             self._restore(interval, before)
             raise
-
-    def _advance_in_pieces(
-        self, interval: object, ends_of: Callable[[Floats], NDArray[np.intp]]
-    ) -> Generator[float, None, None]:
-        """Advance through an interval that has begun, with a pause after each piece."""
-        times = self._batch.times - self._batch.times[0]
-        for begin, end in pairwise([0, *ends_of(times)]):
-            self._batch.advance(begin, end)
-            self._clock = self._clock._replace(within=self._batch.covered())
-            self._drive.advance(end)
-            self._lock.pause()
-            yield float(times[end])
-            self._lock.resume(interval)
 
     def _restore(self, interval: object, before: Snapshot) -> None:
         """Undo an interval, unless robots were put into another state since. Another Ctrl-C waits for its end."""
@@ -494,12 +493,6 @@ class Simulator:
                 for watch, saved in zip(self._watches.values(), before.watches, strict=True):
                     watch.restore(saved)
                 self._lock.release()
-
-    def _begin_interval(self, duration: float, commands: Floats | None) -> None:
-        self._batch.begin(*self._drive.begin(duration, commands))
-        self._clock = self._clock.begun(duration)
-        for watch in self._watches.values():
-            watch.begin(duration, commands)
 
     def _end_interval(self) -> StrokeReport:
         rows = self._batch.end()
