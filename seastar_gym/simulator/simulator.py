@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from copy import copy
 from itertools import pairwise
 from types import ModuleType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,15 +70,6 @@ def completed(steps: Generator[float, None, Result], look: Callable[[float], obj
 Floats = NDArray[np.float64]
 
 MAX_ROBOTS, MAX_THREADS = 100_000_000, 4096
-
-
-class Snapshot(NamedTuple):
-    """What an interval changes, before it. Only kernels write into arrays, those of `rows`, which are copies."""
-
-    rows: dict[str, Any]
-    clock: Clock
-    drive: Drive
-    watches: list[Any]
 
 
 class Simulator:
@@ -470,29 +461,25 @@ class Simulator:
             self._known_duration = float(duration)
         checked = None if commands is None else checked_commands(commands, self.scene, self._drive.strengths)
         interval = self._lock.acquire(intact=True)
-        watches = [watch.save() for watch in self._watches.values()]
-        before = Snapshot(self._batch.save(), self._clock, self._drive, watches)
+        rows, clock, drive = self._batch.save(), self._clock, self._drive  # kernels write into rows, nobody into others
+        watches = [(watch, watch.save()) for watch in self._watches.values()]
         try:
-            self._drive = copy(self._drive)
+            self._drive = copy(drive)
             self._batch.begin(*self._drive.begin(float(duration), checked))
-            self._clock = self._clock.begun(float(duration))
-            for watch in self._watches.values():
+            self._clock = clock.begun(float(duration))
+            for watch, _ in watches:
                 watch.begin(float(duration), checked)
             yield interval
             self._lock.release()
         except BaseException:
-            self._restore(interval, before)
+            with held_back():  # another Ctrl-C waits for the end
+                if self._lock.resume(interval):  # unless robots were put into another state since
+                    self._batch.restore(rows)
+                    self._clock, self._drive = clock, drive
+                    for watch, saved in watches:
+                        watch.restore(saved)
+                    self._lock.release()
             raise
-
-    def _restore(self, interval: object, before: Snapshot) -> None:
-        """Undo an interval, unless robots were put into another state since. Another Ctrl-C waits for its end."""
-        with held_back():
-            if self._lock.resume(interval):
-                self._batch.restore(before.rows)
-                self._clock, self._drive = before.clock, before.drive
-                for watch, saved in zip(self._watches.values(), before.watches, strict=True):
-                    watch.restore(saved)
-                self._lock.release()
 
     def _end_interval(self) -> StrokeReport:
         rows = self._batch.end()

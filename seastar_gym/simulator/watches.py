@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -195,13 +195,6 @@ OF_ONE_MESH = (
 )
 
 
-class Snapshot(NamedTuple):
-    """Copies of what an interval changes, made before it."""
-
-    twin: State
-    largest: Floats
-
-
 def twin_scene(scene: Scene) -> Scene:
     """The scene with edges and time steps half as long; steps that are adapted become equal ones."""
     if not isinstance(scene, Scene):
@@ -266,13 +259,13 @@ class ErrorBars(Watch):
     def set_limb_strengths(self, strengths: Floats) -> None:
         self.twin.set_limb_strengths(strengths)
 
-    def save(self) -> Snapshot:
-        return Snapshot(self.twin.get_state(), self._largest.copy())
+    def save(self) -> tuple[State, Floats]:
+        return self.twin.get_state(), self._largest.copy()
 
     def restore(self, before: Any) -> None:
         """Undo an interval. Robots on which the solver failed before swim again in the twin, but have no estimate."""
-        self.twin.set_state(before.twin)
-        self._largest = before.largest
+        state, self._largest = before
+        self.twin.set_state(state)
 
     def close(self) -> None:
         self.twin.close()
