@@ -375,11 +375,12 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
 class SeastarSwimVectorEnv(ManyRobotsEnv):
     """Environment of `num_envs` robots side by side; `SeastarSwimEnv` documents spaces, rewards, info and arguments.
 
-    Robot i has the seed `seed + i` and is bit-identical to a `SeastarSwimEnv` with that seed and the same actions.
-    Arrays of actions, observations, rewards and flags have a first axis of length `num_envs`, and so have the entries
-    of `info`; `info["_name"]` is the mask of the robots for which `info["name"]` is valid.
+    It takes those arguments by name. Robot i has the seed `seed + i` and is bit-identical to a `SeastarSwimEnv` with that
+    seed and the same actions. Arrays of actions, observations, rewards and flags have a first axis of length
+    `num_envs`, and so have the entries of `info`; `info["_name"]` is the mask of the robots for which `info["name"]`
+    is valid.
 
-    ## Arguments besides those of `SeastarSwimEnv`, which are taken by name
+    ## Arguments besides those of `SeastarSwimEnv`
     num_envs: Number of robots.
     max_episode_steps: Time limit [decisions], applied here; None or -1 for none.
     autoreset_mode: When an episode that is over is followed by the next one. NEXT_STEP (default): the next step ignores
