@@ -375,8 +375,8 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
 class SeastarSwimVectorEnv(ManyRobotsEnv):
     """Environment of `num_envs` robots side by side; `SeastarSwimEnv` documents spaces, rewards, info and arguments.
 
-    It takes those arguments by name. Robot i has the seed `seed + i` and is bit-identical to a `SeastarSwimEnv` with that
-    seed and the same actions. Arrays of actions, observations, rewards and flags have a first axis of length
+    It takes these arguments by name. Robot i has the seed `seed + i` and is bit-identical to a `SeastarSwimEnv` with
+    that seed and the same actions. Arrays of actions, observations, rewards and flags have a first axis of length
     `num_envs`, and so have the entries of `info`; `info["_name"]` is the mask of the robots for which `info["name"]`
     is valid.
 
