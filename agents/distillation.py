@@ -23,9 +23,10 @@ from agents.ppo import Hyperparameters, actor, describe, make_training_batch
 from agents.run import held, resume_command, robot_of, versions_and_machine
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.learned import LearnedPolicy, load, save
+from seastar_gym.envs.group import inverse
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.sight import Camera, read_camera, told
-from seastar_gym.envs.symmetry import Symmetry, VectorFrameStack, inverse
+from seastar_gym.envs.symmetry import Symmetry, VectorFrameStack
 from seastar_gym.evaluation.report import Remarks
 from seastar_gym.scene.checks import require_count, require_kind
 
@@ -184,9 +185,9 @@ def imitation(teacher: LearnedPolicy, options: Options, camera: Camera, folder: 
     """Policy that sees through a camera, and has learned from the policy of the run with these options in a folder."""
     robot = robot_of(options, folder)
     batch = make_training_batch(
-        options.ppo, options.path, options.random_heading, robot.fidelity(options), options.num_threads,
-        num_envs=Hyperparameters().num_envs, scene=robot.scene, randomization=robot.draws, sight=camera.sight,
-        action_delay=camera.action_delay,
+        options.ppo, options.path, options.random_heading, fidelity=robot.fidelity(options),
+        threads=options.num_threads, num_envs=Hyperparameters().num_envs, scene=robot.scene, randomization=robot.draws,
+        **camera._asdict(),
     )  # fmt: skip
     decisions = length(options)
     print(f"A policy for {told(camera.sight)} learns from the run's, {decisions} decisions.", flush=True)

@@ -49,7 +49,6 @@ from seastar_gym.scene.checks import (
     require_number,
     shown,
 )
-from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator
 
 MOST_STROKES, MOST_WEIGHTS = 2**24, 2**26
@@ -263,18 +262,13 @@ class CoastingProgress(gym.vector.VectorWrapper):
 
 
 def make_training_env(
-    hyperparameters: Hyperparameters,
-    path: SwimPath,
-    random_heading: bool,
-    fidelity: Fidelity | None = None,
-    threads: int | None = None,
-    **options: Any,
+    hyperparameters: Hyperparameters, path: SwimPath, random_heading: bool, **options: Any
 ) -> BatchVecEnv:
     """Native batch for Stable-Baselines3, with symmetry reduction if the hyperparameters ask for it.
 
     options: Further options of the batch, see `make_training_batch`.
     """
-    env = make_training_batch(hyperparameters, path, random_heading, fidelity, threads, **options)
+    env = make_training_batch(hyperparameters, path, random_heading, **options)
     if hyperparameters.coasting:
         inner: Any = env.unwrapped
         coasting = fit_coasting(inner.scene, inner.decision_period, np.random.default_rng(0))
@@ -283,16 +277,12 @@ def make_training_env(
 
 
 def make_training_batch(
-    hyperparameters: Hyperparameters,
-    path: SwimPath,
-    random_heading: bool,
-    fidelity: Fidelity | None = None,
-    threads: int | None = None,
-    **options: Any,
+    hyperparameters: Hyperparameters, path: SwimPath, random_heading: bool, **options: Any
 ) -> gym.vector.VectorEnv[Any, Any, Any]:
     """Native batch of a training, in autoreset mode SAME_STEP.
 
-    options: `num_envs` and options of the environment, see `SwimOptions`; those of the hyperparameters unless named.
+    options: Arguments of the batch besides, such as `num_envs`, `threads` and `fidelity`, see `SeastarSwimVectorEnv`;
+    those of the hyperparameters unless named.
     """
     require_kind("hyperparameters", hyperparameters, Hyperparameters, "Hyperparameters")
     arguments = {"num_envs": hyperparameters.num_envs, **hyperparameters.options, **options}
@@ -300,10 +290,8 @@ def make_training_batch(
         "SeastarSwim-v0",
         vectorization_mode="vector_entry_point",
         autoreset_mode=AutoresetMode.SAME_STEP,
-        threads=threads,
         path=path,
         random_heading=random_heading,
-        fidelity=fidelity,
         waypoint_radius=WAYPOINT_RADIUS,
         **arguments,
     )

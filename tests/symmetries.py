@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from seastar_gym import Numerics, SymmetryReduction
+from seastar_gym.envs.group import n_limbs_of
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry import Symmetry, n_limbs_of
+from seastar_gym.envs.symmetry import Symmetry
 
 
 def symmetry_for(group, mirror=(), mode="limbs", entries=()):

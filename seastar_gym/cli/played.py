@@ -30,19 +30,17 @@ class PlayedEnv(SeastarSwimEnv):
 
     def limb_directions(self) -> NDArray[np.float64]:
         """Directions of the limbs in the world, from the hub to the tip [rad], shape (n_limbs,)."""
-        positions = self.simulator.positions[0]
-        x, y = (positions[self._limbs[:, -1]] - positions[0]).T
+        x, y = (self._tips() - self.simulator.hub_position()[0]).T
         return np.arctan2(y, x)
 
-    @property
-    def _limbs(self) -> NDArray[np.int_]:
+    def _tips(self) -> NDArray[np.float64]:
         robot = self.scene.robot
-        return limb_nodes(robot.n_limbs, robot.nodes_per_limb)
+        return self.simulator.positions[0, limb_nodes(robot.n_limbs, robot.nodes_per_limb)[:, -1]]
 
-    def draw_frame(self) -> None:
-        """Draw a picture, and the help."""
-        super().draw_frame()
-        self.last_picture = self._frames[-1] = self._annotated(self._frames[-1])
+    def picture(self) -> NDArray[np.uint8]:
+        """Picture of now, with the numbers and the help."""
+        self.last_picture = self._annotated(super().picture())
+        return self.last_picture
 
     def _annotated(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
         pygame = import_pygame()
@@ -63,9 +61,6 @@ class PlayedEnv(SeastarSwimEnv):
 
     def _numbers(self) -> list[tuple[int, NDArray[np.float64]]]:
         """Limbs that are not heated, whose names the picture lacks, and the places of their numbers [px]."""
-        positions, camera = self.simulator.positions[0], self._batch.pictures.renderer_of(0).camera
-        tips, angles = camera.to_pixels(positions[self._limbs[:, -1]]), self.limb_directions()
+        tips, angles = self.pictures.renderer_of(0).camera.to_pixels(self._tips()), self.limb_directions()
         outward = 18.0 * np.stack([np.cos(angles), -np.sin(angles)], axis=1)
-        return [
-            (limb, tips[limb] + outward[limb]) for limb in np.flatnonzero(self._robots.last_commands[0] == 0.0).tolist()
-        ]
+        return [(limb, tips[limb] + outward[limb]) for limb in np.flatnonzero(self.frame().command == 0.0).tolist()]

@@ -33,9 +33,10 @@ from seastar_gym.controllers.contract import LARGEST_SEEN
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.commands import LIMB_COMMANDS, command_table
+from seastar_gym.envs.group import axis_of, n_turns_of
 from seastar_gym.envs.layout import N_STATIONS, SIZES, VELOCITY_SCALE
 from seastar_gym.envs.stations import at_stations, weights
-from seastar_gym.envs.symmetry import BOUNDARY_WIDTH, axis_of, n_turns_of
+from seastar_gym.envs.symmetry import BOUNDARY_WIDTH
 from seastar_gym.files import require_extra
 from seastar_gym.scene.checks import require_count, require_kind
 from seastar_gym.version import __version__

@@ -207,11 +207,8 @@ def load_agents(
     decision_period: Time between decisions [s]. None means strokes. scene: Scene that agents know, with its numerics.
     None means the chapter's at `fidelity`.
     """
-    known = _known(seed, fidelity, decision_period, scene)
-    make_env = partial(_make_env, scene, fidelity, decision_period)
-    return {
-        label: _load_agent(name, seed, known, decision_period, None, make_env) for label, name in _labels(names).items()
-    }
+    _, makers = _makers(names, seed, fidelity, decision_period, scene)
+    return {label: make() for label, make in makers.items()}
 
 
 def default_agents(scene: Scene) -> tuple[str, ...]:
@@ -230,12 +227,11 @@ def fitting_agents(
 
     names: Names as in `HELP`. None means `default_agents`. ValueError, with their sentences, where none fits.
     """
-    known = _known(seed, fidelity, decision_period, scene)
-    make_env = partial(_make_env, scene, fidelity, decision_period)
+    known, makers = _makers(names, seed, fidelity, decision_period, scene)
     agents, left_out = dict[str, Policy](), list[str]()
-    for label, name in _labels(default_agents(known) if names is None else names).items():
+    for label, make in makers.items():
         try:
-            policy = _load_agent(name, seed, known, decision_period, None, make_env)
+            policy = make()
             sight = learned.camera_of(policy).get("sight")
             n_seen = None if sight is None else policy.description.observation_size  # type: ignore[attr-defined]
             require_fit(policy, known, actions_of(policy, known.robot.n_limbs), decision_period, n_seen, sight=sight)
@@ -248,18 +244,25 @@ def fitting_agents(
     return agents, left_out
 
 
-def _known(seed: int, fidelity: Fidelity, decision_period: float | None, scene: Scene | None) -> Scene:
-    """Scene that agents know."""
+def _makers(
+    names: Sequence[str] | None, seed: int, fidelity: Fidelity, decision_period: float | None, scene: Scene | None
+) -> tuple[Scene, dict[str, Callable[[], Policy]]]:
+    """Scene that agents know, and functions that make them, by what they are called. names: None for the defaults."""
     require_seed(seed)
     require_choice("fidelity", fidelity, get_args(Fidelity))
     require_kind("scene", scene, Scene | None, "a Scene, or None")
     require_period(decision_period)
-    return make_scene(None, fidelity, decision_period) if scene is None else scene
+    known = make_scene(None, fidelity, decision_period) if scene is None else scene
 
+    def make_env() -> SeastarSwimEnv:
+        named = fidelity if scene is None else None
+        return SeastarSwimEnv(scene=scene, fidelity=named, decision_period=decision_period)
 
-def _make_env(scene: Scene | None, fidelity: Fidelity, decision_period: float | None) -> SeastarSwimEnv:
-    named = fidelity if scene is None else None
-    return SeastarSwimEnv(scene=scene, fidelity=named, decision_period=decision_period)
+    labels = _labels(default_agents(known) if names is None else names)
+    return known, {
+        label: partial(_load_agent, name, seed, known, decision_period, None, make_env)
+        for label, name in labels.items()
+    }
 
 
 def _labels(names: Sequence[str]) -> dict[str, str]:

@@ -127,9 +127,9 @@ class RobotsEnv:
         return self._robots.privileged_observations()
 
 
-def arguments_of(init: Callable[..., None]) -> frozenset[str]:
-    """Names of the arguments of a constructor, without those that it takes under any name."""
-    named = inspect.signature(init).parameters.values()
+def arguments_of(make: Callable[..., Any]) -> frozenset[str]:
+    """Names of the arguments of a class or a constructor, without those that it takes under any name."""
+    named = inspect.signature(make).parameters.values()
     return frozenset(one.name for one in named if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)) - {"self"}
 
 

@@ -204,7 +204,8 @@ class Robots:
         self.decision_period = options.period
         self.timed = None if self.decision_period == scene.actuator.period else self.decision_period
         """Time between decisions [s], None where they are strokes of the actuator."""
-        self._can_be_masked = can_be_masked(scene.actuator)
+        self.can_be_masked = can_be_masked(scene.actuator)
+        """Whether robots ever have wires that cannot be heated."""
         self.scene, self._drawn_from = scene, task.simulated(scene)
         self._draws = draws
         self.drawn = {} if draws is None else draws.first_values(self._drawn_from, n_robots)
@@ -232,9 +233,10 @@ class Robots:
         self._lateness = Lateness(options.late, n_robots)
         is_late = options.sight is not None or bounds_of(delay)[1] > 0.0
         self._lag = Lag(delay, self.decision_period, scene.actuator, n_robots, n_limbs) if is_late else None
-        self._tracker: Tracker | None = None
+        self.tracker: Tracker | None = None
+        """What follows robots through the camera; None for full sight."""
         if options.sight is not None:
-            self._tracker = Tracker(options.sight.rate, self._sees, n_limbs, self._lateness.values)
+            self.tracker = Tracker(options.sight.rate, self._sees, n_limbs, self._lateness.values)
 
     def ask(self, name: str, values: Sequence[Any]) -> None:
         """Have a field of the task hold from the next episode of every robot on.
@@ -307,8 +309,8 @@ class Robots:
         self.energy[robots], self.last_commands[robots] = 0.0, 0.0
         if self._lag is not None:
             self._lag.begin(robots, self._lateness.values[ACTION_DELAY])
-        if self._tracker is not None:
-            self._tracker.begin(robots, generators, self.simulator)
+        if self.tracker is not None:
+            self.tracker.begin(robots, generators, self.simulator)
         self.task.begin(self, robots)
 
     def _numbered(
@@ -352,7 +354,7 @@ class Robots:
 
     def observe(self) -> NDArray[np.float32]:
         """Observations, shape (n_robots, size), a fresh array; see observation.py."""
-        at, tracker = self.layout, self._tracker
+        at, tracker = self.layout, self.tracker
         if tracker is None:
             return self._with_more(self._seen_now(), np)
         found = np.empty((self.n_robots, at.size), np.float32)
@@ -373,7 +375,7 @@ class Robots:
 
     def observe_on_device(self) -> Any:
         """`observe` as a fresh array of the simulator's device. What a `Sight` shows is copied there."""
-        if self._tracker is not None:
+        if self.tracker is not None:
             return self.simulator.arrays.asarray(self.observe())
         seen = to_float32(rows_on_device(self.simulator, self.task.targets(self)), self.n_robots)
         return self._with_more(seen, self.simulator.arrays)
@@ -404,7 +406,7 @@ class Robots:
 
     def seen_hub(self) -> Floats:
         """Hubs as robots are seen by who decides [m], shape (n_robots, 2), a copy."""
-        return self.simulator.hub_position() if self._tracker is None else self._tracker.hub
+        return self.simulator.hub_position() if self.tracker is None else self.tracker.hub
 
     def seen_heading(self) -> Floats:
         """Headings as robots are seen by who decides [rad], shape (n_robots,)."""
@@ -412,7 +414,7 @@ class Robots:
         return np.asarray(np.arctan2(s, c))
 
     def _seen_axes(self) -> Floats:
-        return axes_of(self.simulator) if self._tracker is None else self._tracker.axes
+        return axes_of(self.simulator) if self.tracker is None else self.tracker.axes
 
     def _remembered(self) -> Floats:
         """Numbers of the limbs that stand before the targets, shape (n_robots, k), limb after limb."""
@@ -453,17 +455,17 @@ class Robots:
 
     def action_masks(self) -> Flags:
         """Actions that wires can follow now, shape (n_robots, k), see commands.py."""
-        return action_masks(self.options.actions, self._refractory_wires())
+        return action_masks(self.options.actions, self.refractory_wires())
 
-    def _refractory_wires(self) -> Flags:
+    def refractory_wires(self) -> Flags:
         """Wires that cannot be heated now, by their names in commands, shape (n_robots, n_limbs, 2)."""
         return self._by_command(self.simulator.refractory_wires())
 
     def followed(self, commands: Floats) -> Floats:
         """Commands with zeros for limbs whose wire cannot follow its command now, shape (n_robots, n_limbs)."""
-        if not self._can_be_masked:
+        if not self.can_be_masked:
             return commands
-        return np.where(masked_limbs(commands, self._refractory_wires()), 0.0, commands)
+        return np.where(masked_limbs(commands, self.refractory_wires()), 0.0, commands)
 
     def _wired(self, commands: Floats) -> Floats:
         """Commands as they reach the limbs, shape (n_robots, n_limbs)."""
@@ -475,7 +477,7 @@ class Robots:
         if self._lag is None:
             report = self.simulator.advance(self.decision_period, self._wired(followed))
         else:
-            report = completed(self._swim(self._lag, followed, []))
+            report = completed(self.swim_late(self._lag, followed, []))
         return self._judge(commands, followed, report)
 
     def step_in_parts(self, commands: Floats, parts: int) -> Generator[float, None, Outcome]:
@@ -485,10 +487,10 @@ class Robots:
             report = yield from self.simulator.advance_in_parts(self.decision_period, self._wired(followed), parts)
         else:
             ends = (self.decision_period * np.arange(1, parts + 1) / parts).tolist()
-            report = yield from pausing(self._swim(self._lag, followed, ends), first_after(ends))
+            report = yield from pausing(self.swim_late(self._lag, followed, ends), first_after(ends))
         return self._judge(commands, followed, report)
 
-    def _swim(self, lag: Lag, commands: Floats, ends: list[float]) -> Generator[float, None, StrokeReport]:
+    def swim_late(self, lag: Lag, commands: Floats, ends: list[float]) -> Generator[float, None, StrokeReport]:
         """One decision whose commands are late; yields times since it began [s], those at `ends` among them."""
         reports = []
         for piece in lag.pieces(commands):
@@ -499,12 +501,12 @@ class Robots:
     def _swim_piece(self, piece: Piece, ends: Floats) -> Generator[float, None, StrokeReport]:
         """Piece of a decision, in which pictures are taken. ends: Times at which it pauses, too [s]."""
         pauses = ends[(ends > 0.0) & (ends < piece.duration)]
-        if self._tracker is not None:
-            pauses = np.append(pauses, self._tracker.due_times(self.simulator.time, piece.duration))
+        if self.tracker is not None:
+            pauses = np.append(pauses, self.tracker.due_times(self.simulator.time, piece.duration))
 
         def look(since: float) -> float:
-            if self._tracker is not None:
-                self._tracker.take(self.simulator)
+            if self.tracker is not None:
+                self.tracker.take(self.simulator)
             return piece.begin + since
 
         steps = self.simulator.advance_pausing(piece.duration, self._wired(piece.commands), pauses)
@@ -522,8 +524,8 @@ class Robots:
         """Outcome of a decision. commands: Those that were given. followed: Those that were followed."""
         hub = self.simulator.hub_position()
         self.energy += report.energy
-        if self._tracker is not None:
-            self._tracker.look(self.simulator.time)
+        if self.tracker is not None:
+            self.tracker.look(self.simulator.time)
         score = self.task.score(self, hub, pulses_of(report.heating_time, followed))
         if score.success is False or score.over is False:
             success, over = (np.zeros(self.n_robots, bool) if flags is False else flags for flags in score[1:])
@@ -543,7 +545,7 @@ class Robots:
             "heating_time": report.heating_time,
             "energy": report.energy,
             **({"work": report.work, "peak_moment": report.peak_moment} if self._effort else {}),
-            **({"masked_limbs": (followed != commands).sum(axis=1)} if self._can_be_masked else {}),
+            **({"masked_limbs": (followed != commands).sum(axis=1)} if self.can_be_masked else {}),
             "newton_iterations": report.newton_iterations,
             "solver_status": report.status,
             "smallest_opening_angle": report.smallest_opening_angle,
@@ -570,11 +572,11 @@ class Robots:
             "time": self.simulator.time,
             "hub_position": hub,
             **self.task.info(self, hub),
-            **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
+            **({"action_mask": self.action_masks().astype(np.int8)} if self.can_be_masked else {}),
             **(self._errors() if self.task.tells_errors else {}),
             **({"error_estimate": self.simulator.error_estimate} if self.options.error_bars else {}),
             **({"energy_growth": self.simulator.energy_growth} if self._tells_growth else {}),
-            **({} if self._tracker is None else {"sight_age": self._tracker.age(self.simulator.time)}),
+            **({} if self.tracker is None else {"sight_age": self.tracker.age(self.simulator.time)}),
             **self.hidden,
             **({"instance": self.instance.copy()} if self.task.option == "instance" else {}),
         }

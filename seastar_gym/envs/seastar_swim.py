@@ -14,10 +14,10 @@ from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.envs import IDS
 from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
 from seastar_gym.envs.commands import Actions, sampling_mask
-from seastar_gym.envs.options import HeadingTargets, Plain, RewardWeights, SwimOptions
+from seastar_gym.envs.options import HeadingTargets, Plain, RewardWeights
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.rendering import Frame
+from seastar_gym.envs.rendering import BatchPictures, Frame
 from seastar_gym.envs.robots import Robots, Split, Task
 from seastar_gym.envs.sight import Drawn, Sight
 from seastar_gym.envs.vector import FRAMES_PER_SECOND, ManyRobotsEnv, swimmers
@@ -98,19 +98,27 @@ class OneRobotEnv(RobotsEnv, gym.Env[Observation, Any]):
         if self.render_mode in ("human", "rgb_array_list"):
             self.draw_frame()
 
+    @property
+    def pictures(self) -> BatchPictures:
+        """What draws the robot, robot 0 of a batch."""
+        return self._batch.pictures
+
     def frame(self) -> Frame:
         """What a picture shows now."""
-        return self._batch.pictures.frames([0])[0]
+        return self.pictures.frames([0])[0]
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Picture of now, shape (720, 960, 3)."""
+        return self.pictures.draw([0])[0]
 
     def draw_frame(self) -> None:
         """Draw a picture of now, into the window or for `render`: at a reset, and at the ends of parts of decisions."""
-        pictures = self._batch.pictures
         if self.render_mode == "human":
-            pictures.show(self.metadata["render_fps"])
+            self.pictures.show(self.metadata["render_fps"])
             return
         if len(self._frames) == self._frames.maxlen:
             gym.logger.warn(f"Nobody calls render(): of its pictures, the last {len(self._frames)} are kept.")
-        self._frames.append(pictures.draw([0])[0])
+        self._frames.append(self.picture())
 
     def render(self) -> NDArray[np.uint8] | list[NDArray[np.uint8]] | None:  # type: ignore[override]
         """Picture, shape (720, 960, 3); "rgb_array_list": the last MOST_FRAMES since the last call; "human": None."""
@@ -118,7 +126,7 @@ class OneRobotEnv(RobotsEnv, gym.Env[Observation, Any]):
             gym.logger.warn('render() without a render_mode draws nothing: make the environment with "rgb_array".')
             return None
         if self.render_mode == "rgb_array":
-            return self._batch.pictures.draw([0])[0]
+            return self.picture()
         frames = list(self._frames)
         self._frames.clear()
         return frames if self.render_mode == "rgb_array_list" else None
@@ -135,7 +143,7 @@ class OneRobotEnv(RobotsEnv, gym.Env[Observation, Any]):
         """Close the window, if there is one, and end the simulator's threads."""
         _open.discard(self)
         self.simulator.close()
-        self._batch.pictures.close()
+        self.pictures.close()
 
 
 class SeastarSwimEnv(OneRobotEnv):
@@ -399,12 +407,11 @@ class SeastarSwimEnv(OneRobotEnv):
         frames_per_stroke: int | None = None,
     ):
         robots = swimmers(
-            1, 1, split, task,
-            SwimOptions(
-                actions, fidelity, scene, randomization, certificate, error_bars, decision_period,  # type: ignore[arg-type]
-                observe_actuators, device, sight, action_delay,  # type: ignore[arg-type]  # plain data, too
-            ),
-            path=path, reward=reward, waypoint_radius=waypoint_radius, random_heading=random_heading, headings=headings,
+            1, 1, task, split, path=path, actions=actions, fidelity=fidelity, scene=scene, reward=reward,
+            waypoint_radius=waypoint_radius, random_heading=random_heading, randomization=randomization,
+            certificate=certificate, error_bars=error_bars, decision_period=decision_period,
+            observe_actuators=observe_actuators, headings=headings, device=device, sight=sight,
+            action_delay=action_delay,
         )  # fmt: skip
         super().__init__(robots, render_mode, frames_per_stroke)
 

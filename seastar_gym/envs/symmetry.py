@@ -1,24 +1,15 @@
 """Symmetry of robots: one of n equal limbs swims alike in every sector of the regular n-gon.
 
-Directions in the body frame fall into 2n sectors; sector g spans the angles [g pi/n, (g + 1) pi/n]. *Element* g of the
-symmetry group is the turn (g even) or the turn and mirror (g odd) that brings sector g onto sector 0:
+An element of the group (group.py) carries a robot with its waypoints onto another robot, and does to the memory of
+actuators what they say (`memory_mirror`). A turn leaves the turns that asked headings ask for as they are, a mirror
+reverses them. Further entries of an observation are carried by what they are (`layout.py`). A controller that sees only
+waypoints in sector 0 and whose actions are carried back is equivariant: in a turned or mirrored world it swims the
+turned or mirrored way.
 
-    element 2k:      turn by -2 pi k/n
-    element 2k - 1:  turn by -2 pi k/n, then mirror at the x axis (y -> -y), for k = 1..n
+Robots with less symmetry have less to turn and to mirror: four limbs at a rectangle have a mirror and half a turn.
+`symmetry_of` finds from limbs, body and attachments what there is.
 
-An element carries a robot with its waypoints onto another robot, whose limb j was limb `limb_order(n)[g, j]`; a mirror
-swaps the commands + and -, and does to the memory of actuators what they say (`memory_mirror`). A turn leaves the turns
-that asked headings ask for as they are, a mirror reverses them. Further entries of an observation are carried by what
-they are (`layout.py`). A controller that sees only waypoints in sector 0 and whose actions are carried back is
-equivariant: in a turned or mirrored world it swims the turned or mirrored way.
-
-Robots with less symmetry have less to turn and to mirror: four limbs at a rectangle have a mirror and half a turn. A
-`PointGroup` says what there is, `symmetry_of` finds it from limbs, body and attachments, and all functions take it in
-place of n. Its sectors begin at a mirror's line; with turns alone there are even elements only, whose sectors are twice
-as wide.
-
-A group is the number of limbs, which stands for all turns and mirrors of the regular polygon, or a `PointGroup`. A
-`Symmetry` knows the group, the layout and the actions of a robot; a `FrameStack` is the same with its past. Methods
+A `Symmetry` knows the group, the layout and the actions of a robot; a `FrameStack` is the same with its past. Methods
 take batches: observations of shape (..., size), and elements of shape (...). Wrappers reduce environments to one
 sector, or remember, for any learner.
 """
@@ -36,27 +27,34 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.attributes import RobotsEnv
-from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, as_array, choices, command_table, sampling_mask
+from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, as_array, choices, sampling_mask
+from seastar_gym.envs.group import (
+    Elements,
+    Group,
+    action_table,
+    axis_of,
+    inverse,
+    is_mirror,
+    limb_order,
+    move_limbs,
+    n_limbs_of,
+    n_turns_of,
+    read_only,
+    require_group,
+    transform_commands,
+    turns,
+)
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.scene import Scene, checks
 from seastar_gym.scene.actuators.base import Actuator, Mirror, complete, is_actuator
-from seastar_gym.scene.checks import MOST_LIMBS, is_whole_number, require_choice, require_count, require_kind, shown
+from seastar_gym.scene.checks import is_whole_number, require_choice, require_count, require_kind, shown
 from seastar_gym.scene.shape import SAME, PointGroup
 
 if TYPE_CHECKING:
     _VectorWrapper = gym.vector.VectorWrapper[Any, Any, Any, Any, Any]
 else:
     _VectorWrapper = gym.vector.VectorWrapper  # not generic in gymnasium 1.2
-
-Elements = NDArray[np.intp]
-Group = int | PointGroup
-
-
-def require_group(group: object) -> None:
-    """ValueError for what is neither a number of limbs nor a `PointGroup`."""
-    if not isinstance(group, PointGroup):
-        require_count("group", group, 1, MOST_LIMBS)
 
 
 def require_mirror(mirror: object) -> None:
@@ -70,63 +68,6 @@ def _is_row(index: object, sign: object, n: int) -> bool:
     """Whether a row of the mirror of n numbers is an index and a sign."""
     are_whole = is_whole_number(index) and is_whole_number(sign)
     return are_whole and 0 <= index < n and sign in (-1, 1)  # type: ignore[operator]
-
-
-def n_limbs_of(group: Group) -> int:
-    """Number of limbs of a robot with this group."""
-    return len(group.orders[0]) if isinstance(group, PointGroup) else group
-
-
-def n_turns_of(group: Group) -> int:
-    """Number of turns, with that by nothing."""
-    return group.n_turns if isinstance(group, PointGroup) else group
-
-
-def axis_of(group: Group) -> float | None:
-    """Direction of the mirror's line [rad]; None for a group of turns alone."""
-    return group.axis if isinstance(group, PointGroup) else 0.0
-
-
-def is_mirror(elements: ArrayLike) -> NDArray[np.bool_]:
-    """Whether each element mirrors, shape (...)."""
-    return np.asarray(elements) % 2 == 1
-
-
-def inverse(elements: ArrayLike, group: Group) -> Elements:
-    """Elements, shape (...), that undo these; a mirror undoes itself."""
-    elements = np.asarray(elements)
-    return np.where(is_mirror(elements), elements, -elements % (2 * n_turns_of(group)))
-
-
-def compose(second: ArrayLike, first: ArrayLike, group: Group) -> Elements:
-    """Elements, shape (...), of doing `first` and then `second`."""
-    second, first = np.asarray(second), np.asarray(first)
-    k_first, k_second = (first + 1) // 2, (second + 1) // 2
-    k = k_first + np.where(is_mirror(first), -k_second, k_second)
-    return (2 * k - (first + second) % 2) % (2 * n_turns_of(group))
-
-
-@cache
-def turns(group: Group) -> NDArray[np.complex128]:
-    """Factors by which elements turn a vector x + iy, shape (2 n_turns,); exactly 1 for element 0."""
-    n = n_turns_of(group)
-    k = (np.arange(2 * n) + 1) // 2 % n
-    return read_only(np.exp(-2j * np.pi / n * k))
-
-
-@cache
-def limb_order(group: Group) -> NDArray[np.intp]:
-    """Order of limbs, shape (2 n_turns, n_limbs): limb j of a robot carried by element g was limb order[g, j]."""
-    if isinstance(group, PointGroup):
-        return read_only(np.array(group.orders, dtype=np.intp))
-    elements, limbs = np.arange(2 * group)[:, None], np.arange(group)
-    return read_only(((elements + 1) // 2 + np.where(is_mirror(elements), -limbs, limbs)) % group)
-
-
-def read_only(table: NDArray[Any]) -> NDArray[Any]:
-    """Table that can be cached and shared, because nobody can write to it."""
-    table.setflags(write=False)
-    return table
 
 
 def symmetry_of(scene: Scene) -> Group:
@@ -157,33 +98,6 @@ def memory_mirror(actuator: Actuator) -> Mirror:
         raise ValueError(f"actuator must be an actuator, such as SmaWires, not {shown(actuator)}.")
     known = complete(actuator)
     return (known.mirror or ())[: known.observe(known.rest).shape[-1]]
-
-
-def transform_commands(
-    commands: NDArray[np.floating[Any]], elements: ArrayLike, group: Group | None = None
-) -> NDArray[np.floating[Any]]:
-    """Commands, shape (..., n_limbs), of the robots carried by the elements.
-
-    group: None means that of the regular polygon.
-    """
-    moved = move_limbs(np.asarray(commands), np.asarray(elements, dtype=np.intp), group)
-    return np.where(is_mirror(elements)[..., None], -moved, moved) + 0.0  # no -0.0
-
-
-def move_limbs(values: NDArray[Any], elements: Elements, group: Group | None = None) -> NDArray[Any]:
-    """Values of the limbs, shape (..., n_limbs), in the order of the robots carried by the elements."""
-    order = limb_order(values.shape[-1] if group is None else group)[elements]
-    shape = np.broadcast_shapes(values.shape, order.shape)
-    return np.take_along_axis(np.broadcast_to(values, shape), np.broadcast_to(order, shape), axis=-1)
-
-
-@cache
-def action_table(actions: Actions, group: Group) -> NDArray[np.intp]:
-    """Actions, shape (2 n_turns, n_actions), that each action becomes under each element; for "joint" and "pairs"."""
-    commands = command_table(actions, n_limbs_of(group))
-    number = {command.tobytes(): action for action, command in enumerate(commands + 0.0)}
-    carried = transform_commands(commands, np.arange(2 * n_turns_of(group))[:, None], group)
-    return read_only(np.array([[number[command.tobytes()] for command in row] for row in carried]))
 
 
 Floating = NDArray[np.floating[Any]]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from operator import getitem
-from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
+from typing import Any, Literal, NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -13,18 +14,14 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.accuracy.chapters import warn_uncertified, warn_undamped
 from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
-from seastar_gym.envs.commands import Actions, as_array, sampling_mask, to_commands
-from seastar_gym.envs.options import HeadingTargets, Plain, RewardWeights, SwimOptions
-from seastar_gym.envs.paths import WAYPOINT_RADIUS
-from seastar_gym.envs.randomization import DomainRandomization
+from seastar_gym.envs.commands import as_array, sampling_mask, to_commands
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.rendering import BatchPictures, Picture
-from seastar_gym.envs.robots import Robots, Split, Task
-from seastar_gym.envs.sight import Drawn, Sight
+from seastar_gym.envs.robots import Outcome, Robots, Split
 from seastar_gym.envs.tasks import chosen_task
-from seastar_gym.envs.waypoints import Path
+from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import (
     is_whole_number,
@@ -35,7 +32,6 @@ from seastar_gym.scene.checks import (
     require_seed,
     shown,
 )
-from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator.simulator import MAX_ROBOTS, completed
 
 
@@ -71,8 +67,6 @@ def require_buffers(out: Buffers, n_robots: int, size: int) -> None:
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 Info = dict[str, Any]
-_P = ParamSpec("_P")
-Result = TypeVar("Result")
 
 LONGEST = 2**63 - 1
 """Largest time limit, which is none [decisions]."""
@@ -86,6 +80,8 @@ OF_EACH_ROBOT: Mapping[str, Callable[[Any, int], Any]] = {
     "scene": Scene.of_robot,
 }
 """What a robot has of its own of these attributes, and results of methods, of a batch; all others are common."""
+OF_ROBOTS = arguments_of(SwimOptions) | arguments_of(AlongPath) | {"task", "split"}
+"""Arguments of an environment that say what its robots are and what they swim for."""
 NOT_OF_A_ROBOT = ("reset", "step")
 """Methods that robots of one simulator cannot be called alone for."""
 
@@ -195,7 +191,8 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
 
     def begin(self, mask: Flags, asked: Any = None) -> None:
         """Begin episodes of the robots in a mask, with their own generators. asked: What a reset asks for."""
-        self._to_the_end(self._begin_episodes, mask, asked)
+        with self._to_the_end():
+            self._begin_episodes(mask, asked)
 
     def _begin_episodes(self, mask: Flags, asked: Any = None) -> None:
         self._robots.reset(mask, self._generators, asked)
@@ -204,16 +201,16 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
         if self.render_mode is not None:
             self.pictures.begin(mask)
 
-    def _to_the_end(self, change: Callable[_P, Result], *args: _P.args, **kwargs: _P.kwargs) -> Result:
-        """What a step or reset returns: after an interruption, robots and task disagree, and only a reset helps."""
+    @contextmanager
+    def _to_the_end(self) -> Iterator[None]:
+        """Context of a step or reset: after an interruption, robots and task disagree, and only a reset helps."""
         was_running, self.is_running = self.is_running, False
         try:
-            result = change(*args, **kwargs)
+            yield
         except ValueError:  # refused before anything changed
             self.is_running = was_running
             raise
         self.is_running = True
-        return result
 
     def step(
         self, actions: Any, out: Buffers | None = None
@@ -251,36 +248,36 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
         commands = to_commands(self.actions, self.simulator.scene.robot.n_limbs, actions, self.num_envs)
         commands[begun] = 0.0
         self.closed = False
-        return self._to_the_end(self._advance, commands, begun, look, parts)
+        with self._to_the_end():
+            outcome = self._swim(commands, look, parts)
+            self._elapsed += 1
+            reward, terminated, truncated = outcome.reward, outcome.terminated, self._elapsed >= self._limits
+            if begun.any():
+                terminated, truncated = terminated & ~begun, truncated & ~begun
+                reward = np.where(begun, 0.0, reward)
+                self._begin_episodes(begun)
+            self.needs_reset, final = terminated | truncated, Info()
+            observations = self._observe()
+            if self.autoreset_mode is AutoresetMode.SAME_STEP and self.needs_reset.any():
+                begun = self.needs_reset.copy()
+                final = _final(observations, outcome.info, begun)
+                self._begin_episodes(begun)
+                observations = self._observe()
+            return Step(Buffers(observations, reward, terminated, truncated), outcome.info, begun, final)
 
-    def _advance(
-        self, commands: NDArray[np.float64], begun: Flags, look: Callable[[float], None] | None, parts: int
-    ) -> Step:
+    def _swim(self, commands: NDArray[np.float64], look: Callable[[float], None] | None, parts: int) -> Outcome:
+        """Swim for one decision, and let trails follow where pictures are drawn."""
         if look is None:
             outcome = self._robots.step(commands)
             if self.render_mode is not None:
                 self.pictures.follow()
-        else:
+            return outcome
 
-            def follow(time: float) -> None:
-                self.pictures.follow()
-                look(time)
+        def follow(time: float) -> None:
+            self.pictures.follow()
+            look(time)
 
-            outcome = completed(self._robots.step_in_parts(commands, parts), follow)
-        self._elapsed += 1
-        reward, terminated, truncated = outcome.reward, outcome.terminated, self._elapsed >= self._limits
-        if begun.any():
-            terminated, truncated = terminated & ~begun, truncated & ~begun
-            reward = np.where(begun, 0.0, reward)
-            self._begin_episodes(begun)
-        self.needs_reset, final = terminated | truncated, Info()
-        observations = self._observe()
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and self.needs_reset.any():
-            begun = self.needs_reset.copy()
-            final = _final(observations, outcome.info, begun)
-            self._begin_episodes(begun)
-            observations = self._observe()
-        return Step(Buffers(observations, reward, terminated, truncated), outcome.info, begun, final)
+        return completed(self._robots.step_in_parts(commands, parts), follow)
 
     def _observe(self) -> Observations:
         """Observations: numpy's, or the device's if they are asked for."""
@@ -378,9 +375,10 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
 class SeastarSwimVectorEnv(ManyRobotsEnv):
     """Environment of `num_envs` robots side by side; `SeastarSwimEnv` documents spaces, rewards, info and arguments.
 
-    Robot i has the seed `seed + i` and is bit-identical to a `SeastarSwimEnv` with that seed and the same actions.
-    Arrays of actions, observations, rewards and flags have a first axis of length `num_envs`, and so have the entries
-    of `info`; `info["_name"]` is the mask of the robots for which `info["name"]` is valid.
+    It takes these arguments by name. Robot i has the seed `seed + i` and is bit-identical to a `SeastarSwimEnv` with
+    that seed and the same actions. Arrays of actions, observations, rewards and flags have a first axis of length
+    `num_envs`, and so have the entries of `info`; `info["_name"]` is the mask of the robots for which `info["name"]`
+    is valid.
 
     ## Arguments besides those of `SeastarSwimEnv`
     num_envs: Number of robots.
@@ -412,24 +410,6 @@ class SeastarSwimVectorEnv(ManyRobotsEnv):
         self,
         num_envs: int = 1,
         max_episode_steps: int | None = None,
-        path: Path = "pentagon",
-        actions: Actions = "limbs",
-        fidelity: Fidelity | None = None,
-        scene: Scene | Plain | None = None,
-        reward: RewardWeights | Plain = RewardWeights(),
-        waypoint_radius: float = WAYPOINT_RADIUS,
-        random_heading: bool = False,
-        randomization: DomainRandomization | Plain | None = None,
-        certificate: Certificate | str | None = None,
-        error_bars: bool = False,
-        decision_period: float | None = None,
-        observe_actuators: bool = True,
-        headings: HeadingTargets | Plain | None = None,
-        device: str = "cpu",
-        sight: Sight | Plain | None = None,
-        action_delay: Drawn | Plain = 0.0,
-        task: Task | Plain | str | None = None,
-        split: Split = "train",
         *,
         render_mode: Literal["rgb_array"] | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
@@ -437,6 +417,7 @@ class SeastarSwimVectorEnv(ManyRobotsEnv):
         on_device: bool = False,
         frames_per_stroke: int | None = None,
         disable_env_checker: bool | None = None,
+        **arguments: Any,
     ):
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
@@ -448,27 +429,21 @@ class SeastarSwimVectorEnv(ManyRobotsEnv):
             require_flag("disable_env_checker", disable_env_checker)
         require_flag("on_device", on_device)
         self.threads, self.disable_env_checker = threads, disable_env_checker
-        robots = swimmers(
-            num_envs, threads, split, task,
-            SwimOptions(
-                actions, fidelity, scene, randomization, certificate, error_bars, decision_period,  # type: ignore[arg-type]
-                observe_actuators, device, sight, action_delay,  # type: ignore[arg-type]  # plain data, too
-            ),
-            path=path, reward=reward, waypoint_radius=waypoint_radius, random_heading=random_heading, headings=headings,
-        )  # fmt: skip
+        robots = swimmers(num_envs, threads, **arguments)
         super().__init__(robots, max_episode_steps, autoreset_mode, render_mode, frames_per_stroke, bool(on_device))
 
-    _arguments = arguments_of(__init__)
+    _arguments = arguments_of(__init__) | OF_ROBOTS
 
 
-def swimmers(
-    n_robots: int, threads: int | None, split: Split, task: Any, options: SwimOptions, **waypoints: Any
-) -> Robots:
+def swimmers(n_robots: int, threads: int | None, task: Any = None, split: Split = "train", **arguments: Any) -> Robots:
     """Robots of an environment, with a warning if the task tells errors that nobody has measured of the scene.
 
-    waypoints: Arguments of an environment whose task is a path.
+    arguments: Of the environment, those in `OF_ROBOTS`.
     """
-    robots = Robots(chosen_task(task, **waypoints), options, n_robots, threads, split=split)
+    if unknown := sorted({*arguments} - OF_ROBOTS):
+        raise TypeError(f"SeastarSwimEnv has no argument {unknown[0]!r}.")
+    options = SwimOptions(**{name: arguments.pop(name) for name in arguments_of(SwimOptions) & {*arguments}})
+    robots = Robots(chosen_task(task, **arguments), options, n_robots, threads, split=split)
     if robots.task.tells_errors:
         warn_undamped(robots.scene, robots.timed)
         warn_uncertified(robots.scene, robots.options.fidelity_of_scene, robots.certificate, robots.timed)

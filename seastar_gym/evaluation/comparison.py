@@ -24,6 +24,7 @@ from seastar_gym.files import require_extra, write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_kind
 from seastar_gym.scene.serial import read
+from seastar_gym.scene.water import AnyCurrent
 
 if TYPE_CHECKING:
     from seastar_gym.evaluation.report import Remarks
@@ -85,21 +86,13 @@ def evaluate(
         swum, playback = _swim_once(name, policy, environment, episode, film_file, report is not None)
         swims.append(swum)
         playbacks += [] if playback is None else [playback]
-    say(as_text(swims))
     swum_in = scene or make_scene(None, None, decision_period)
-    for done, policy in zip(swims, agents.values(), strict=True):
-        differences = policy.differences(swum_in) if isinstance(policy, LearnedPolicy) else None
-        for remark in filter(None, (done.solver_message, differences)):
-            say(f"{done.agent}: {remark}")
+    _tell(swims, agents, swum_in, say)
     if folder is not None:
-        write_csv(results(swims), folder / "evaluation.csv")
         fluid = swum_in.of_robot(0).fluid
         current = None if fluid is None else fluid.current
-        draw_traces(swims, waypoint_radius, folder / "traces.png", current)
-        files = ["evaluation.csv", "traces.png", *(file.name for file in videos.values())]
-        if trajectory:
-            write_csv(time_series(swims), folder / "trajectories.csv")
-            files.append("trajectories.csv")
+        files = _write(folder, swims, waypoint_radius, current, trajectory)
+        files += [file.name for file in videos.values()]
         if report is not None:
             from seastar_gym.evaluation.report import write_report
 
@@ -110,6 +103,26 @@ def evaluate(
             files.append("report.html")
         say(f"Written to {folder}: {', '.join(files)}")
     return swims
+
+
+def _tell(swims: list[Swim], agents: Mapping[str, Policy], scene: Scene, say: Callable[[str], None]) -> None:
+    """Say how the agents swam, and why a solver gave up or how a policy's robot differs."""
+    say(as_text(swims))
+    for done, policy in zip(swims, agents.values(), strict=True):
+        differences = policy.differences(scene) if isinstance(policy, LearnedPolicy) else None
+        for remark in filter(None, (done.solver_message, differences)):
+            say(f"{done.agent}: {remark}")
+
+
+def _write(
+    folder: Path, swims: list[Swim], waypoint_radius: float, current: AnyCurrent | None, trajectory: bool
+) -> list[str]:
+    """Write tables and traces into a folder; returns the files' names."""
+    write_csv(results(swims), folder / "evaluation.csv")
+    draw_traces(swims, waypoint_radius, folder / "traces.png", current)
+    if trajectory:
+        write_csv(time_series(swims), folder / "trajectories.csv")
+    return ["evaluation.csv", "traces.png", *["trajectories.csv"] * trajectory]
 
 
 def _swim_once(

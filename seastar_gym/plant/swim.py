@@ -158,7 +158,7 @@ class PlantRobot(Robots):
             )
         if plant.n_limbs != self.scene.robot.n_limbs:
             raise ValueError(f"The plant has {plant.n_limbs} limbs, the scene's robot {self.scene.robot.n_limbs}.")
-        self._can_be_masked = True
+        self.can_be_masked = True
         if limits.wire is None and isinstance(self.scene.actuator, ThermalSma):
             limits = replace(limits, wire=self.scene.actuator)
         if (reached := Heat(1, limits).from_cold(self.pulse)) > limits.hottest:
@@ -217,8 +217,8 @@ class PlantRobot(Robots):
 
     @property
     def _known_pictures(self) -> Tracker:
-        assert self._tracker is not None
-        return self._tracker
+        assert self.tracker is not None
+        return self.tracker
 
     def _picture(self, seen: Sighting) -> Pictures:
         """Sighting on the episode's clock, which is known at once."""
@@ -246,10 +246,11 @@ class PlantRobot(Robots):
         if self.logs is not None:
             self.logs.sighting(seen)
 
-    def _refractory_wires(self) -> Flags:
+    def refractory_wires(self) -> Flags:
+        """Wires that have to rest, shape (1, n_limbs, 2)."""
         return self.guard.resting()[None]
 
-    def _swim(self, lag: Lag, commands: Floats, ends: list[float]) -> Generator[float, None, StrokeReport]:
+    def swim_late(self, lag: Lag, commands: Floats, ends: list[float]) -> Generator[float, None, StrokeReport]:
         """One decision, on the plant's clock; yields the time since it began [s] after about every time step."""
         n_steps = math.ceil(self.decision_period / self.scene.numerics.step)
         steps = self.simulator.advance_in_parts(self.decision_period, commands, n_steps)
@@ -368,11 +369,11 @@ class PlantSwim(OneRobotEnv):
             require_file("logs", logs)
         folder = None if logs is None else Path(logs)
         self.plant, self.limits, self.logs = plant, limits, logs
-        own = {name: options.pop(name) for name in arguments_of(AlongPath.__init__) & {*options}}
+        own = {name: options.pop(name) for name in arguments_of(AlongPath) & {*options}}
         self._driven = PlantRobot(plant, limits, AlongPath(**own), SwimOptions(**options), folder)
         super().__init__(self._driven, render_mode, frames_per_stroke)
 
-    _arguments = arguments_of(__init__) | arguments_of(AlongPath.__init__) | arguments_of(SwimOptions.__init__)
+    _arguments = arguments_of(__init__) | arguments_of(AlongPath) | arguments_of(SwimOptions)
 
     @property
     def stopped(self) -> str:

@@ -8,9 +8,10 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
+from copy import copy
 from itertools import pairwise
 from types import ModuleType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -71,15 +72,6 @@ Floats = NDArray[np.float64]
 MAX_ROBOTS, MAX_THREADS = 100_000_000, 4096
 
 
-class Snapshot(NamedTuple):
-    """What an interval changes, before it. Arrays of clock and drive are never written into."""
-
-    rows: dict[str, Any]
-    clock: dict[str, Any]
-    drive: dict[str, Any]
-    watches: list[Any]
-
-
 class Simulator:
     """A batch of robots of one scene. They begin at rest, with the hub at the origin.
 
@@ -118,7 +110,7 @@ class Simulator:
             else DeviceBatch(scene, self.n_robots, device, effort)
         )  # fmt: skip
         self._drive = Drive(scene.actuator, self.n_robots, scene.robot.n_limbs, scene.numerics.step)
-        self._clock = Clock(self.n_robots)
+        self._clock = Clock.at_zero(self.n_robots)
         self._lock = StrokeLock()
         self._known_duration: float | None = None  # of the last interval [s]
         self._may_warn_of_overlap = scene.contact is not None
@@ -197,18 +189,18 @@ class Simulator:
 
     def __getstate__(self) -> dict[str, Any]:
         self._lock.require_intact()
-        drive = {name: getattr(self._drive, name) for name in ("state", "strengths", "commands", "phase")}
+        drive = self._drive
         arguments = (self.scene, self.n_robots, self.threads, False, self._batch.effort.size > 0, self.device)
-        rows = self._batch.rows()
-        watched = {"watches": self._watches, "may_warn": self._may_warn_of_overlap}
-        return {"arguments": arguments, "rows": rows, "clock": self._clock, "drive": drive, **watched}
+        actuators = drive.state, drive.commands, np.full(self.n_robots, drive.phase)
+        moved = {"rows": self._batch.rows(), "clock": self._clock, "actuators": actuators}
+        kept = {"strengths": drive.strengths, "watches": self._watches, "may_warn": self._may_warn_of_overlap}
+        return {"arguments": arguments, **moved, **kept}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(*state["arguments"])  # type: ignore[misc]
         self._batch.put_rows(state["rows"])
-        vars(self._clock).update(vars(state["clock"]))
-        for name, value in state["drive"].items():
-            setattr(self._drive, name, value)
+        self._drive.put(*state["actuators"])
+        self._drive.strengths, self._clock = state["strengths"], state["clock"]
         self._watches, self._may_warn_of_overlap = state["watches"], state["may_warn"]
 
     def reset(self, mask: ArrayLike | None = None, heading: ArrayLike = 0.0) -> None:
@@ -227,7 +219,7 @@ class Simulator:
             for robot in np.flatnonzero(chosen):
                 self._batch.put_at_rest(robot, angles[robot])
             self._drive.put_at_rest(chosen)
-            self._clock.set(chosen, 0.0)
+            self._clock = self._clock.put(chosen, 0.0)
             for watch in self._watches.values():
                 watch.reset(chosen, angles)
 
@@ -250,7 +242,7 @@ class Simulator:
         checked_commands(commands, self.scene, self._drive.strengths, "State.commands")
         with self._new_state(of_all=True):
             self._batch.put_state(positions, velocities, orientation, spin)
-            self._clock.set(slice(None), time)
+            self._clock = self._clock.put(slice(None), time)
             self._drive.put(actuators, commands, phase)
             for watch in self._watches.values():
                 watch.lose()
@@ -419,14 +411,16 @@ class Simulator:
         which is another discretisation: limbs that ring faster than steps resolve then ring otherwise, by 4 % of the
         largest speed at fidelity "fast" and 11 % at "balanced", and the hub is 4e-6 and 4e-5 limb lengths away.
         """
-        return completed(self._advance_pausing(duration, commands))
+        with self._interval(duration, commands):
+            self._batch.advance(0, len(self._batch.times) - 1)
+            return self._end_interval()
 
     def advance_in_parts(
         self, duration: float, commands: ArrayLike | None, parts: int
     ) -> Generator[float, None, StrokeReport]:
         """Advance as `advance` does, to the same bits, and pause as `stroke_in_parts` does."""
         require_count("parts", parts, 1, MAX_STEPS)
-        return (yield from self._advance_pausing(duration, commands, lambda times: ends_of_parts(times, parts)))
+        return (yield from self._advance_in_pieces(duration, commands, lambda times: ends_of_parts(times, parts)))
 
     def advance_pausing(
         self, duration: float, commands: ArrayLike | None, pauses: ArrayLike
@@ -441,69 +435,56 @@ class Simulator:
         def ends_of(times: Floats) -> NDArray[np.intp]:
             return ends_at(times, np.append(wanted, times[-1]))
 
-        return (yield from self._advance_pausing(duration, commands, ends_of))
+        return (yield from self._advance_in_pieces(duration, commands, ends_of))
 
-    def _advance_pausing(
-        self, duration: float, commands: ArrayLike | None, ends_of: Callable[[Floats], NDArray[np.intp]] | None = None
+    def _advance_in_pieces(
+        self, duration: float, commands: ArrayLike | None, ends_of: Callable[[Floats], NDArray[np.intp]]
     ) -> Generator[float, None, StrokeReport]:
-        """Advance, and pause at steps that follow from the ends of all steps [s], or never.
+        """Advance, with a pause after each piece. ends_of: Steps with which pieces end, from the ends of all steps [s]
+        since the interval began."""
+        with self._interval(duration, commands) as interval:
+            times = self._batch.times - self._batch.times[0]
+            for begin, end in pairwise([0, *ends_of(times)]):
+                self._batch.advance(begin, end)
+                self._clock = self._clock._replace(within=self._batch.covered())
+                self._drive.advance(end)
+                self._lock.pause()
+                yield float(times[end])
+                self._lock.resume(interval)
+            return self._end_interval()
 
-        An interval that is not completed is undone.
-        """
+    @contextmanager
+    def _interval(self, duration: float, commands: ArrayLike | None) -> Iterator[object]:
+        """Context of an interval, which is undone if it is not completed. Gives its holder of the lock."""
         if type(duration) is not float or duration != self._known_duration:
             require_duration(duration, self.scene.numerics.step)
             self._known_duration = float(duration)
         checked = None if commands is None else checked_commands(commands, self.scene, self._drive.strengths)
         interval = self._lock.acquire(intact=True)
-        watches = [watch.save() for watch in self._watches.values()]
-        before = Snapshot(self._batch.save(), dict(vars(self._clock)), dict(vars(self._drive)), watches)
+        rows, clock, drive = self._batch.save(), self._clock, self._drive  # kernels write into rows, nobody into others
+        watches = [(watch, watch.save()) for watch in self._watches.values()]
         try:
-            self._begin_interval(float(duration), checked)
-            if ends_of is None:
-                self._batch.advance(0, len(self._batch.times) - 1)
-            else:
-                yield from self._advance_in_pieces(interval, ends_of)
-            report = self._end_interval()
+            self._drive = copy(drive)
+            self._batch.begin(*self._drive.begin(float(duration), checked))
+            self._clock = clock.begun(float(duration))
+            for watch, _ in watches:
+                watch.begin(float(duration), checked)
+            yield interval
             self._lock.release()
-            return report
         except BaseException:
-            self._restore(interval, before)
+            with held_back():  # another Ctrl-C waits for the end
+                if self._lock.resume(interval):  # unless robots were put into another state since
+                    self._batch.restore(rows)
+                    self._clock, self._drive = clock, drive
+                    for watch, saved in watches:
+                        watch.restore(saved)
+                    self._lock.release()
             raise
-
-    def _advance_in_pieces(
-        self, interval: object, ends_of: Callable[[Floats], NDArray[np.intp]]
-    ) -> Generator[float, None, None]:
-        """Advance through an interval that has begun, with a pause after each piece."""
-        times = self._batch.times - self._batch.times[0]
-        for begin, end in pairwise([0, *ends_of(times)]):
-            self._batch.advance(begin, end)
-            self._clock.advance_to(self._batch.covered())
-            self._drive.advance(end)
-            self._lock.pause()
-            yield float(times[end])
-            self._lock.resume(interval)
-
-    def _restore(self, interval: object, before: Snapshot) -> None:
-        """Undo an interval, unless robots were put into another state since. Another Ctrl-C waits for its end."""
-        with held_back():
-            if self._lock.resume(interval):
-                self._batch.restore(before.rows)
-                vars(self._clock).update(before.clock)
-                vars(self._drive).update(before.drive)
-                for watch, saved in zip(self._watches.values(), before.watches, strict=True):
-                    watch.restore(saved)
-                self._lock.release()
-
-    def _begin_interval(self, duration: float, commands: Floats | None) -> None:
-        self._batch.begin(*self._drive.begin(duration, commands))
-        self._clock.begin(duration)
-        for watch in self._watches.values():
-            watch.begin(duration, commands)
 
     def _end_interval(self) -> StrokeReport:
         rows = self._batch.end()
         failed = rows["status"] > 0
-        self._clock.end(failed, rows["covered"])
+        self._clock = self._clock.ended(failed, rows["covered"])
         self._drive.advance(len(self._batch.times) - 1)
         for field, watch in self._watches.items():
             watch.end(self, failed)

@@ -17,67 +17,64 @@ from seastar_gym.scene.checks import as_floats
 
 Floats = NDArray[np.float64]
 
-COUNTED = ("start", "lost", "intervals", "within")
-"""Arrays of a clock. None is written into: `dict(vars(clock))` is what it shows, however long it is kept."""
 
-
-class Clock:
+class Clock(NamedTuple):
     """Simulated time of every robot. Equal intervals are counted, so that rounding does not accumulate.
 
-    duration: Length of the intervals that are counted now [s].
     start: Time at which that count began [s], shape (n_robots,).
     lost: What rounding has left out of `start` [s], shape (n_robots,).
     intervals: Intervals completed since `start`, shape (n_robots,).
     within: Time since the present interval began [s], shape (n_robots,); zero between intervals, except for robots that
         failed within one.
+    duration: Length of the intervals that are counted now [s].
     """
 
-    def __init__(self, n_robots: int):
-        self.duration = 0.0
-        self.start = np.zeros(n_robots)
-        self.lost = np.zeros(n_robots)
-        self.intervals = np.zeros(n_robots, dtype=np.int64)
-        self.within = np.zeros(n_robots)
+    start: Floats
+    lost: Floats
+    intervals: NDArray[np.int64]
+    within: Floats
+    duration: float = 0.0
+
+    @classmethod
+    def at_zero(cls, n_robots: int) -> Clock:
+        """Clock of robots that have not begun."""
+        nothing = np.zeros(n_robots)
+        return cls(nothing, nothing, np.zeros(n_robots, dtype=np.int64), nothing)
 
     @property
     def time(self) -> Floats:
         """Simulated time [s], shape (n_robots,)."""
         return np.asarray(self.start + self.intervals * self.duration + self.within + self.lost)
 
-    def set(self, chosen: NDArray[np.bool_] | slice, time: Floats | float) -> None:
-        """Set the time [s] of the chosen robots, between intervals."""
-        for name, value in zip(COUNTED, (time, 0, 0, 0), strict=True):
-            counted = getattr(self, name).copy()
-            counted[chosen] = value
-            setattr(self, name, counted)
+    def put(self, chosen: NDArray[np.bool_] | slice, time: Floats | float) -> Clock:
+        """Clock on which the chosen robots have this time [s], between intervals."""
+        start, lost = self.start.copy(), self.lost.copy()
+        intervals, within = self.intervals.copy(), self.within.copy()
+        start[chosen], lost[chosen], intervals[chosen], within[chosen] = time, 0.0, 0, 0.0
+        return Clock(start, lost, intervals, within, self.duration)
 
-    def begin(self, duration: float) -> None:
-        """Begin an interval of this length [s] now, even where the last one was not completed."""
-        if duration != self.duration:
-            self._add(np.asarray(self.intervals * self.duration))
-            self.intervals = np.zeros_like(self.intervals)
-            self.duration = duration
-        if np.count_nonzero(self.within):
-            self._add(self.within)
-            self.within = np.zeros_like(self.within)
+    def begun(self, duration: float) -> Clock:
+        """Clock of an interval of this length [s] that begins now, even where the last one was not completed."""
+        clock = self
+        if duration != clock.duration:
+            counted = clock._added(np.asarray(clock.intervals * clock.duration))
+            clock = counted._replace(intervals=np.zeros_like(clock.intervals), duration=duration)
+        if np.count_nonzero(clock.within):
+            clock = clock._added(clock.within)._replace(within=np.zeros_like(clock.within))
+        return clock
 
-    def _add(self, time: Floats) -> None:
-        """Add to the start, and keep what rounding leaves out [s] (Knuth's two-sum), shape (n_robots,)."""
+    def _added(self, time: Floats) -> Clock:
+        """Clock with a later start, which keeps what rounding leaves out [s] (Knuth's two-sum), shape (n_robots,)."""
         total = self.start + time
         added = total - self.start
-        self.lost = self.lost + ((self.start - (total - added)) + (time - added))
-        self.start = total
+        lost = self.lost + ((self.start - (total - added)) + (time - added))
+        return self._replace(start=total, lost=lost)
 
-    def advance_to(self, covered: Floats) -> None:
-        """Advance to this time since the interval began [s], shape (n_robots,)."""
-        self.within = covered
-
-    def end(self, failed: NDArray[np.bool_], covered: Floats) -> None:
-        """Count the interval, or add the time covered [s] for robots that failed; shapes (n_robots,)."""
+    def ended(self, failed: NDArray[np.bool_], covered: Floats) -> Clock:
+        """Clock after the interval, or after the time covered [s] for robots that failed; shapes (n_robots,)."""
         if np.count_nonzero(failed):
-            self.intervals, self.within = self.intervals + ~failed, np.where(failed, covered, 0.0)
-        else:
-            self.intervals, self.within = self.intervals + 1, np.zeros(len(failed))
+            return self._replace(intervals=self.intervals + ~failed, within=np.where(failed, covered, 0.0))
+        return self._replace(intervals=self.intervals + 1, within=np.zeros(len(failed)))
 
 
 def best_fit_heading(positions: Floats, rest: Floats) -> Floats:

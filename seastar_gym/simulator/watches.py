@@ -23,10 +23,10 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
@@ -38,28 +38,8 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-class Swimmers(Protocol):
-    """What watches ask of robots, and a twin does, as a `Simulator` does it."""
-
-    scene: Scene
-
-    def advance(self, duration: float, commands: ArrayLike | None = None) -> object: ...
-    def reset(self, mask: ArrayLike | None = None, heading: ArrayLike = 0.0) -> None: ...
-    def get_state(self) -> State: ...
-    def set_state(self, state: State) -> None: ...
-    def set_scene(self, scene: Scene, mask: ArrayLike | None = None) -> None: ...
-    def set_limb_strengths(self, strengths: ArrayLike) -> None: ...
-    def hub_position(self) -> Floats: ...
-    @property
-    def failed(self) -> Mask: ...
-    def kinetic_energy(self, relative_to_water: bool = False) -> Floats: ...
-    @property
-    def time(self) -> Floats: ...
-    def close(self) -> None: ...
-
-
 class Watch:
-    """Watches the robots of a simulator, and tells a number of each in every report. It moves none of them."""
+    """Watches the robots of a `Simulator`, and tells a number of each in every report. It moves none of them."""
 
     @property
     def told(self) -> Floats:
@@ -69,8 +49,8 @@ class Watch:
     def begin(self, duration: float, commands: Floats | None) -> None:
         """Begin an interval [s] with commands, shape (n_robots, n_limbs), None for none."""
 
-    def end(self, robots: Swimmers, failed: Mask) -> None:
-        """End an interval. failed: Robots whose solver has given up, shape (n_robots,)."""
+    def end(self, robots: Any, failed: Mask) -> None:
+        """End an interval of a `Simulator`. failed: Robots whose solver has given up, shape (n_robots,)."""
 
     def reset(self, chosen: Mask, heading: Floats) -> None:
         """Some robots were put at rest, see `Simulator.reset`."""
@@ -151,7 +131,7 @@ class EnergyGrowth(Watch):
         self._duration = duration
         self._commands = np.zeros(len(self._begin)) if commands is None else np.abs(commands).max(axis=1)
 
-    def end(self, robots: Swimmers, failed: Mask) -> None:
+    def end(self, robots: Any, failed: Mask) -> None:
         self._largest = np.maximum(self._largest, self._commands)
         self._elapsed += self._duration
         periods = 1 if self._is_early.any() else EVERY
@@ -193,13 +173,6 @@ OF_ONE_MESH = (
 )
 
 
-class Snapshot(NamedTuple):
-    """Copies of what an interval changes, made before it."""
-
-    twin: State
-    largest: Floats
-
-
 def twin_scene(scene: Scene) -> Scene:
     """The scene with edges and time steps half as long."""
     if not isinstance(scene, Scene):
@@ -224,10 +197,10 @@ def factor(scene: Scene) -> float:
 class ErrorBars(Watch):
     """Error estimates of a batch of robots, and the twin that they come from.
 
-    twin: As many robots of their `twin_scene`, at rest.
+    twin: `Simulator` of as many robots of their `twin_scene`, at rest.
     """
 
-    def __init__(self, twin: Swimmers, n_robots: int):
+    def __init__(self, twin: Any, n_robots: int):
         self.twin = twin
         self._largest = np.zeros(n_robots)  # distance of the two hubs since the reset [m], NaN where unknown
 
@@ -241,7 +214,7 @@ class ErrorBars(Watch):
     def begin(self, duration: float, commands: Floats | None) -> None:
         self.twin.advance(duration, commands)
 
-    def end(self, robots: Swimmers, failed: Mask) -> None:
+    def end(self, robots: Any, failed: Mask) -> None:
         distance = np.linalg.norm(robots.hub_position() - self.twin.hub_position(), axis=1)
         known = ~(failed | self.twin.failed)
         self._largest = np.maximum(self._largest, np.where(known, distance, np.nan))  # NaN stays until the reset
@@ -264,13 +237,13 @@ class ErrorBars(Watch):
     def set_limb_strengths(self, strengths: Floats) -> None:
         self.twin.set_limb_strengths(strengths)
 
-    def save(self) -> Snapshot:
-        return Snapshot(self.twin.get_state(), self._largest.copy())
+    def save(self) -> tuple[State, Floats]:
+        return self.twin.get_state(), self._largest.copy()
 
     def restore(self, before: Any) -> None:
         """Undo an interval. Robots on which the solver failed before swim again in the twin, but have no estimate."""
-        self.twin.set_state(before.twin)
-        self._largest = before.largest
+        state, self._largest = before
+        self.twin.set_state(state)
 
     def close(self) -> None:
         self.twin.close()

@@ -86,7 +86,7 @@ def test_the_last_step_of_an_episode_has_the_environment_s_own_reward(fitted):
 def test_a_training_has_it_where_it_is_asked_for(asked, monkeypatch):
     monkeypatch.setattr("agents.ppo.ROBOTS", 32)
     hyperparameters = ppo.Hyperparameters(num_envs=8, rollout=8, batch_size=32, decision_period=PERIOD, coasting=asked)
-    env = ppo.make_training_env(hyperparameters, "random", True, "fast", threads=1)
+    env = ppo.make_training_env(hyperparameters, "random", True, fidelity="fast", threads=1)
     assert env.env_is_wrapped(ppo.CoastingProgress)[0] == asked
     env.reset()
     _, rewards, _, infos = env.step(np.arange(8))

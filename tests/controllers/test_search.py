@@ -18,8 +18,8 @@ from seastar_gym.controllers.search import (
     state_of,
     waypoints_of,
 )
+from seastar_gym.envs.group import action_table, transform_commands
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry import action_table, transform_commands
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import evolved_gaits, pair_gait

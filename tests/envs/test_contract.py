@@ -115,7 +115,10 @@ def test_the_reward_and_info_are_those_of_the_tables():
 def test_the_arguments_are_those_of_the_constructors():
     one, batch = SeastarSwimEnv, SeastarSwimVectorEnv
     assert arguments(one) == list(inspect.signature(one).parameters)
-    assert {*arguments(one), *arguments(batch)} == set(inspect.signature(batch).parameters)
+    both = {*inspect.signature(one).parameters, *inspect.signature(batch).parameters}
+    assert {*arguments(one), *arguments(batch)} == both - {"arguments"}
+    with pytest.raises(TypeError, match=r"^SeastarSwimEnv has no argument 'paths'\.$"):
+        batch(2, paths="line")
     assert all(f'"{name}"' in section("Arguments") for name in PATHS)
 
 

@@ -37,6 +37,7 @@ from seastar_gym import (
 )
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table, to_commands
+from seastar_gym.envs.group import compose, inverse, limb_order, transform_commands
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
@@ -103,14 +104,14 @@ def test_the_group_is_found_from_limbs_body_and_attachments(name):
     group = symmetry.symmetry_of(scene)
     assert (n_turns, axis) == pytest.approx(turns_and_axis(group), abs=1e-12)
     nodes, elements = scene.robot.nodes()[1:].reshape(scene.robot.n_limbs, -1, 2), elements_of(group)
-    undone = symmetry.inverse(elements, group)
-    np.testing.assert_array_equal(symmetry.compose(undone, elements, group), 0)
-    np.testing.assert_array_equal(symmetry.compose(elements, undone, group), 0)
+    undone = inverse(elements, group)
+    np.testing.assert_array_equal(compose(undone, elements, group), 0)
+    np.testing.assert_array_equal(compose(elements, undone, group), 0)
     for element in elements:
         carried = nodes @ matrix(element, group).T
-        np.testing.assert_allclose(carried[symmetry.limb_order(group)[element]], nodes, atol=1e-15)
+        np.testing.assert_allclose(carried[limb_order(group)[element]], nodes, atol=1e-15)
         for other in elements:
-            product = matrix(symmetry.compose(other, element, group), group)
+            product = matrix(compose(other, element, group), group)
             np.testing.assert_allclose(product, matrix(other, group) @ matrix(element, group), atol=1e-12)
 
 
@@ -121,7 +122,7 @@ def test_the_group_is_found_from_limbs_body_and_attachments(name):
 def test_every_vector_is_carried_by_the_matrix_and_moves_with_its_limb(name):
     scene = GROUPS[name][0]
     group, n_limbs = symmetry.symmetry_of(scene), scene.robot.n_limbs
-    elements, order = elements_of(group), symmetry.limb_order(group)
+    elements, order = elements_of(group), limb_order(group)
     observations = observations_of(n_limbs, n=len(elements))
     carried = symmetry_for(group).carry(observations, elements)
     for element, before, after in zip(elements, observations, carried, strict=True):
@@ -143,7 +144,7 @@ def test_reduced_waypoints_lie_in_sector_zero_and_carried_robots_are_not_told_ap
     assert reduced.dtype == dtype and set(elements) == set(elements_of(group))
     width = (2.0 if axis is None else 1.0) * np.pi / n_turns
     assert ((direction(reduced) - (axis or 0.0) + atol) % (2.0 * np.pi)).max() <= width + 2.0 * atol
-    restored = symmetry_for(group).carry(reduced, symmetry.inverse(elements, group))
+    restored = symmetry_for(group).carry(reduced, inverse(elements, group))
     np.testing.assert_allclose(restored, observations, atol=1e-14 if dtype is np.float64 else ROUNDING)
     for element in elements_of(group) if dtype is np.float64 else ():
         carried = symmetry_for(group).carry(observations, np.full(500, element))
@@ -183,9 +184,9 @@ def test_action_maps_say_what_the_command_map_says_and_are_a_group_action(mode, 
     for first in range(2 * n_limbs):
         carried = to_commands(mode, n_limbs, carry(actions, first), 30)
         commands = to_commands(mode, n_limbs, actions, 30)
-        np.testing.assert_array_equal(carried, symmetry.transform_commands(commands, first * everywhere))
+        np.testing.assert_array_equal(carried, transform_commands(commands, first * everywhere))
         for second in range(2 * n_limbs):
-            at_once = carry(actions, symmetry.compose(second, first, n_limbs))
+            at_once = carry(actions, compose(second, first, n_limbs))
             np.testing.assert_array_equal(carry(carry(actions, first), second), at_once)
 
 

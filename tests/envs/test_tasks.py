@@ -10,10 +10,11 @@ import pytest
 import seastar_gym
 from refusals import assert_refused
 from seastar_gym import FailBlind, Miswired, ObstTrap, Prey, Prizes, Sight, Station
+from seastar_gym.envs.group import limb_order, transform_commands
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.randomization import drawn_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry import limb_order, symmetry_in, transform_commands
+from seastar_gym.envs.symmetry import symmetry_in
 from seastar_gym.envs.tasks import NAMED
 from seastar_gym.envs.tasks.obst_trap import draw_discs, rims, ways
 from seastar_gym.envs.tasks.prey import CHASE, Courses, Pursuit, draw_course

@@ -206,7 +206,7 @@ def break_off(monkeypatch, what: str, change: Callable[[], Any]) -> None:
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    owner, name = {"reset": (Clock, "set"), "set_scene": (Coefficients, "set_scene")}[what]
+    owner, name = {"reset": (Clock, "put"), "set_scene": (Coefficients, "set_scene")}[what]
     with monkeypatch.context() as patch:
         patch.setattr(owner, name, interrupted)
         with pytest.raises(KeyboardInterrupt):

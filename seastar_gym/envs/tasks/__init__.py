@@ -84,7 +84,7 @@ def chosen_task(task: Task | Mapping[str, Any] | str | None, **of_swim: Any) -> 
         return AlongPath(**of_swim)
     found = read_task(task)
     for one in fields(AlongPath):
-        value = of_swim[one.name]
+        value = of_swim.get(one.name, one.default)
         if type(value) is not type(one.default) or value != one.default:
             raise ValueError(f"{one.name} belongs to swims along a path: leave it out with task={shown(task)}.")
     return found
