@@ -1,6 +1,7 @@
 """Trains the bundled policy of every task, and writes its card.
 
     python -m agents.tasks
+    python -m agents.tasks --benchmark    # cells of the benchmark instead, see `agents.methods`
 
 PPO is trained on a task's split "train", with the project's hyperparameters, the horizon of the task and a memory. Of
 several seeds, the one with the largest mean return in other episodes of that split is published, with a card that says
@@ -268,9 +269,15 @@ def write_card(id: str, policy: LearnedPolicy, file: Path) -> Path:
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     given = sys.argv[1:] if arguments is None else list(arguments)
+    prog = "python -m agents.tasks"
 
     def train_all() -> None:
-        options = tyro.cli(Options, prog="python -m agents.tasks", args=given)
+        if "--benchmark" in given:
+            from agents.methods import BenchmarkOptions, train_cells  # needs sb3-contrib
+
+            left = [word for word in given if word != "--benchmark"]
+            return train_cells(tyro.cli(BenchmarkOptions, prog=f"{prog} --benchmark", args=left))
+        options = tyro.cli(Options, prog=prog, args=given)
         for id in options.tasks:
             if not options.cards_only:
                 publish(id, options, shlex.join(["python", "-m", "agents.tasks", *given]))

@@ -468,7 +468,7 @@ def swimmers(
 
     waypoints: Arguments of an environment whose task is a path.
     """
-    robots = Robots(chosen_task(task, **waypoints), options, n_robots, threads, split=split)
+    robots = Robots(chosen_task(task, split, **waypoints), options, n_robots, threads, split=split)
     if robots.task.tells_errors:
         warn_undamped(robots.scene, robots.timed)
         warn_uncertified(robots.scene, robots.options.fidelity_of_scene, robots.certificate, robots.timed)
