@@ -38,9 +38,10 @@ from seastar_gym.evaluation.benchmark import (
     Track,
     contract,
     make,
+    require_ids,
+    write,
 )
 from seastar_gym.evaluation.benchmark import swum as swum_by
-from seastar_gym.evaluation.benchmark import require_ids, write
 from seastar_gym.evaluation.rollout import Batch
 from seastar_gym.files import beside
 from seastar_gym.scene.checks import require_count
@@ -82,8 +83,8 @@ METHODS: dict[str, Method] = {
     "PPO, ours, frame stack": Method(_ours, 128, tracks=("symmetric",), stacked=True),
     "RecurrentPPO": Method(
         lambda env, id, seed: RecurrentPPO(
-            "MlpLstmPolicy", env, n_steps=32, batch_size=1024, n_epochs=6, learning_rate=1e-3, gae_lambda=0.9, seed=seed,
-            device="cpu", policy_kwargs={"net_arch": [128, 128], "lstm_hidden_size": 64},
+            "MlpLstmPolicy", env, n_steps=32, batch_size=1024, n_epochs=6, learning_rate=1e-3, gae_lambda=0.9,
+            seed=seed, device="cpu", policy_kwargs={"net_arch": [128, 128], "lstm_hidden_size": 64},
         ),
         128, tracks=("plain",),
     ),
@@ -192,9 +193,8 @@ def train_cell(method: str, track: Track, id: str, seed: int, decisions: int, fi
     model.learn(decisions, callback=curve)
     found = curve.point()
     model.get_env().close()
-    with beside(file.with_suffix(".zip")) as part:
-        with part.open("wb") as stream:
-            model.save(stream)
+    with beside(file.with_suffix(".zip")) as part, part.open("wb") as stream:
+        model.save(stream)
     seconds = float(curve.points[-1]["seconds"])
     write(
         [

@@ -182,8 +182,8 @@ class SeastarSwimEnv(OneRobotEnv):
     draws the number, from two billion in the split "train", from a thousand in "test". `info["instance"]` tells it, and
     `reset(options={"instance": number})` swims a certain one. The splits share no episode.
 
-    Random paths have splits, too: with `path="random", split="test"`, episodes are numbered likewise, and no seed of the
-    split "train" draws one of them.
+    Random paths have splits, too: with `path="random", split="test"`, episodes are numbered likewise, and no seed of
+    the split "train" draws one of them.
 
     ## Headings
     With `headings`, a waypoint is reached when the hub is within its radius and the robot's heading is within

@@ -56,9 +56,9 @@ ENTRIES: dict[str, Entry] = {
     "SeastarPreyTimed-v0": Entry("foresight over tens of seconds"),
     "SeastarPrizesTimed-v0": Entry("planning with nothing hidden"),
     "SeastarStation-v0": Entry("precision against a disturbance"),
-    "SeastarMiswiredTimed-v0": Entry("memory, with a clear ceiling", 0.5),
-    "SeastarFailBlind-v0": Entry("memory by twelve numbers", 0.5),
-    "SeastarSwimSimToReal-v0": Entry("delay, noise and a robot that is not known exactly", 0.5),
+    "SeastarMiswiredTimed-v0": Entry("memory, with a clear ceiling", 1.0),
+    "SeastarFailBlind-v0": Entry("memory by twelve numbers", 1.0),
+    "SeastarSwimSimToReal-v0": Entry("delay, noise and a robot that is not known exactly", 1.0),
 }
 BUDGETS, CURVE = (200_000, 1_000_000), (25_000, 50_000, 100_000, 200_000)
 """Decisions of trainings, and those after which their learning curves have a point."""
@@ -101,8 +101,8 @@ def contract(id: str) -> str:
     batch = make(id, 1, "test", 1)
     inner: Any = batch.unwrapped
     said = {
-        "id": id, "row": IDS[id]._replace(threshold=None)._asdict(), "task": to_dict(inner.task), "scene": to_dict(inner.scene),
-        "splits": SIZES, "episodes": EPISODES,
+        "id": id, "row": IDS[id]._replace(threshold=None)._asdict(), "task": to_dict(inner.task),
+        "scene": to_dict(inner.scene), "splits": SIZES, "episodes": EPISODES,
     }  # fmt: skip
     seen = [batch.reset(options={"instance": 0})[0]]
     for action in range(1, PROBED + 1):
@@ -192,9 +192,9 @@ def score(cell: Cell) -> float:
 # Results that merge
 
 
-def write(cells: Sequence[Cell], file: Path) -> None:
-    """Write cells as JSON, which `read` reads and merges."""
-    write_json(file, {"cells": [cell._asdict() for cell in cells]})
+def write(cells: Sequence[Cell], file: Path, **about: Any) -> None:
+    """Write cells as JSON, which `read` reads and merges. about: What else the file says."""
+    write_json(file, {**about, "cells": [cell._asdict() for cell in cells]})
 
 
 def read(files: Iterable[Path | str]) -> list[Cell]:
@@ -202,18 +202,25 @@ def read(files: Iterable[Path | str]) -> list[Cell]:
 
     ValueError: a file is none, or two are of different contracts.
     """
-    found, of = dict[tuple[Any, ...], Cell](), dict[str, tuple[str, Path | str]]()
+    parts = dict[str, list[Cell]]()
     for file in files:
         try:
-            cells = [Cell(**cell) for cell in read_json(file)["cells"]]
+            parts[str(file)] = [Cell(**cell) for cell in read_json(file)["cells"]]
         except (KeyError, TypeError) as wrong:
             raise ValueError(f"{file} is no file of the benchmark.") from wrong
+    return merged(parts)
+
+
+def merged(parts: Mapping[str, Iterable[Cell]]) -> list[Cell]:
+    """Cells of several sources, by their names, as `read` merges files."""
+    found, of = dict[tuple[Any, ...], Cell](), dict[str, tuple[str, str]]()
+    for source, cells in parts.items():
         for cell in cells:
-            hashed, whose = of.setdefault(cell.id, (cell.contract, file))
+            hashed, whose = of.setdefault(cell.id, (cell.contract, source))
             if hashed != cell.contract:
                 raise ValueError(
-                    f"{whose} and {file} are of different contracts of {cell.id}, whose task, observation, reward, numerics "
-                    "or split changed in between: swim one of them again."
+                    f"{whose} and {source} are of different contracts of {cell.id}, whose task, observation, reward, "
+                    "numerics or split changed in between: swim one of them again."
                 )
             found[cell.agent, cell.track, cell.id, cell.seed, cell.first, cell.decisions] = cell
     return list(found.values())
@@ -280,8 +287,8 @@ def _shown(estimate: Estimate) -> str:
 def table_of(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
     """Titles and lines of the table of a track: means over seeds with intervals, and the number of seeds in brackets.
 
-    The last columns: the interquartile mean of the scores, the smallest difference of their mean that ten seeds can see,
-    and the probability that a seed scores more than one of the first row.
+    The last columns: the interquartile mean of the scores, the smallest difference of their mean that ten seeds can
+    see, and the probability that a seed scores more than one of the first row.
     """
     ids = [id for id in ENTRIES if any(id in row.cells for row in rows)]
     short = [id.removeprefix("Seastar").removesuffix("-v0") for id in ids]

@@ -24,7 +24,7 @@ FEWEST = 3
 
 
 class Estimate(NamedTuple):
-    """A mean, and the ends of its interval; NaN of no values, and the ends of a learner with fewer than FEWEST seeds."""
+    """A mean, and the ends of its interval; NaN of no values, and the ends of a learner with fewer than FEWEST."""
 
     mean: float
     low: float
