@@ -7,11 +7,10 @@ model lies beside it. The command goes on with the cells that are missing, sever
 thread. The processor time of a cell is that of its training, without the points of the curve.
 """
 
-import multiprocessing
 import os
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -45,6 +44,7 @@ from seastar_gym.evaluation.benchmark import swum as swum_by
 from seastar_gym.evaluation.rollout import Batch
 from seastar_gym.files import beside
 from seastar_gym.scene.checks import require_count
+from seastar_gym.sweep.executors import Processes
 
 
 class Method(NamedTuple):
@@ -216,12 +216,18 @@ def train_cell(method: str, track: Track, id: str, seed: int, decisions: int, fi
     return f"{file.stem}, {method}, {track}: {curve.points[-1]['measure']:.4g} after {seconds:.0f} s"
 
 
-def train_cells(options: BenchmarkOptions) -> None:
-    """Train the cells that are missing."""
+def train_cells(options: BenchmarkOptions) -> int:
+    """Train the cells that are missing; returns the exit code, 130 after Ctrl-C."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     cells = options.cells
     print(f"{len(cells)} cells to train", flush=True)
-    fresh = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(options.processes, mp_context=fresh, max_tasks_per_child=20) as pool:
+    pool = Processes(options.processes)
+    try:
         for done in as_completed([pool.submit(train_cell, *cell) for cell in cells]):
             print(done.result(), flush=True)
+    except KeyboardInterrupt:
+        print("Stopped: the same command goes on with the cells that are missing.", flush=True)
+        return 130
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return 0

@@ -271,7 +271,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else list(arguments)
     prog = "python -m agents.tasks"
 
-    def train_all() -> None:
+    def train_all() -> int | None:
         if "--benchmark" in given:
             from agents.methods import BenchmarkOptions, train_cells  # needs sb3-contrib
 
@@ -283,6 +283,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 publish(id, options, shlex.join(["python", "-m", "agents.tasks", *given]))
             file = file_of(id, options.out)
             print(write_card(id, load(file), file), flush=True)
+        return None
 
     return answered(train_all)
 

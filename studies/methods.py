@@ -92,7 +92,9 @@ def ids_table(found: Any) -> str:
 def rows_table(found: Any) -> str:
     """Tables of the rows that are trained."""
     cells = cells_of(found)
-    return benchmark.tables(cells, benchmark.as_markdown) if cells else "No row is trained yet."
+    if not cells:
+        return "No row is trained yet."
+    return f"{benchmark.tables(cells, benchmark.as_markdown)}\n![Scores against decisions and time](results/benchmark/curves.png)"
 
 
 def draw_curves(found: Any, file: Path) -> None:
