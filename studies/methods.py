@@ -94,7 +94,8 @@ def rows_table(found: Any) -> str:
     cells = cells_of(found)
     if not cells:
         return "No row is trained yet."
-    return f"{benchmark.tables(cells, benchmark.as_markdown)}\n![Scores against decisions and time](results/benchmark/curves.png)"
+    picture = "![Scores against decisions and time](results/benchmark/curves.png)"
+    return f"{benchmark.tables(cells, benchmark.as_markdown)}\n{picture}"
 
 
 def draw_curves(found: Any, file: Path) -> None:

@@ -109,7 +109,7 @@ def test_a_reset_tells_of_a_stroke_that_has_not_happened(scene, angle):
     info = env.reset(seed=0)[1]
     of_a_stroke = [*info][[*info].index("is_success") :]
     assert info["smallest_opening_angle"] == pytest.approx(angle) and info["is_success"] is False
-    assert len(of_a_stroke) == 10 and not any(info[name] for name in of_a_stroke if "angle" not in name)
+    assert len(of_a_stroke) == 11 and not any(info[name] for name in of_a_stroke if "angle" not in name)
     angle_then = env.step([0, 1, 0, 2, 0][: env.scene.robot.n_limbs])[4]["smallest_opening_angle"]
     assert (angle_then == np.pi) == (scene is not None)
 
