@@ -77,11 +77,11 @@ def cells_of(found: Any) -> list[Cell]:
 def ids_table(found: Any) -> str:
     """Why each id is there, and between which means scores are measured."""
     measures = {id: benchmark.measure_of_task(benchmark.task_of(id)) for id in ENTRIES}
-    scales = benchmark.scales()
+    means = {(cell.id, cell.agent): f"{np.mean(cell.measure):.3g}" for cell in benchmark.read([REFERENCES])}
     lines = [
         [
             f"`{id}`", entry.why, f"{measures[id].name} [{measures[id].unit}], {measures[id].better} is better",
-            *(f"{mean:.3g}" for mean in scales.get(id, ())), *["not swum yet"] * (2 - len(scales.get(id, ()))),
+            *(means.get((id, agent), "not swum yet") for agent in AGENTS),
             "-" if entry.price is None else f"{entry.price:g}",
         ]
         for id, entry in ENTRIES.items()
