@@ -23,6 +23,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.distillation import PAST
 from agents.ppo import make_model
+from agents.tasks import hyperparameters
 from seastar_gym import TASKS
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
@@ -58,8 +59,6 @@ class Method(NamedTuple):
 
 
 def _ours(env: BatchVecEnv, id: str, seed: int) -> Any:
-    from agents.tasks import hyperparameters
-
     batch: Any = env.env.unwrapped
     return make_model(env, hyperparameters(str(TASKS[id].task), float(batch.decision_period)), seed)
 

@@ -247,7 +247,7 @@ It was trained in simulation, and no real robot has swum by it.
 `python -m agents.tasks --cards-only` measures this, in {EPISODES} episodes of the split "test", where {measure.better}
 is better. Other agents stand in docs/tasks.md.
 
-| fidelity | {measure.name} [{measure.unit}]: mean (95 %) | success |
+| fidelity | {measure.name} [{measure.unit}]: mean (95 %, over episodes) | success |
 |---|---:|---:|
 {chr(10).join(_row(id, policy, fidelity) for fidelity in FIDELITIES)}
 """
