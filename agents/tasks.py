@@ -1,6 +1,7 @@
 """Trains the bundled policy of every task, and writes its card.
 
     python -m agents.tasks
+    python -m agents.tasks --benchmark    # cells of the benchmark instead, see `agents.methods`
 
 PPO is trained on a task's split "train", with the project's hyperparameters, the horizon of the task and a memory. Of
 several seeds, the one with the largest mean return in other episodes of that split is published, with a card that says
@@ -246,7 +247,7 @@ It was trained in simulation, and no real robot has swum by it.
 `python -m agents.tasks --cards-only` measures this, in {EPISODES} episodes of the split "test", where {measure.better}
 is better. Other agents stand in docs/tasks.md.
 
-| fidelity | {measure.name} [{measure.unit}]: mean (95 %) | success |
+| fidelity | {measure.name} [{measure.unit}]: mean (95 %, over episodes) | success |
 |---|---:|---:|
 {chr(10).join(_row(id, policy, fidelity) for fidelity in FIDELITIES)}
 """
@@ -268,14 +269,21 @@ def write_card(id: str, policy: LearnedPolicy, file: Path) -> Path:
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     given = sys.argv[1:] if arguments is None else list(arguments)
+    prog = "python -m agents.tasks"
 
-    def train_all() -> None:
-        options = tyro.cli(Options, prog="python -m agents.tasks", args=given)
+    def train_all() -> int | None:
+        if "--benchmark" in given:
+            from agents.methods import BenchmarkOptions, train_cells  # needs sb3-contrib
+
+            left = [word for word in given if word != "--benchmark"]
+            return train_cells(tyro.cli(BenchmarkOptions, prog=f"{prog} --benchmark", args=left))
+        options = tyro.cli(Options, prog=prog, args=given)
         for id in options.tasks:
             if not options.cards_only:
                 publish(id, options, shlex.join(["python", "-m", "agents.tasks", *given]))
             file = file_of(id, options.out)
             print(write_card(id, load(file), file), flush=True)
+        return None
 
     return answered(train_all)
 

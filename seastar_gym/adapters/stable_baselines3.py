@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -11,12 +12,15 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from seastar_gym.envs.vector import SeastarSwimVectorEnv, robot_by_robot
 
 Info = dict[str, Any]
 
+LONGEST_ROLLOUT = 16_384
+"""Decisions of a rollout beyond which somebody is told: 200,000 of them have few updates then."""
 DRAWN = 16
 """Robots in a picture of the batch: of more, none could be recognised."""
 HOW_TO_MAKE = (
@@ -60,6 +64,7 @@ class BatchVecEnv(VecEnv):
 
     def reset(self) -> VecEnvObs:
         """Begin episodes of all robots, with the seeds and options set for this reset."""
+        _warn_of_long_rollouts(self.num_envs)
         options = self._options[0]
         if any(other is not options for other in self._options if other or options):
             raise ValueError("The robots share one environment: set_options takes one dictionary for all of them.")
@@ -161,6 +166,20 @@ class BatchVecEnv(VecEnv):
         if self.render_mode is None or not isinstance(batch, SeastarSwimVectorEnv):
             return [None] * self.num_envs
         return batch.render_robots(range(min(DRAWN, self.num_envs))) or ()
+
+
+def _warn_of_long_rollouts(n_robots: int) -> None:
+    """Warn the learner that resets a batch, if one does, where its rollout is so long that it hardly updates."""
+    frame = sys._getframe(1)
+    while frame.f_back is not None:
+        frame, learner = frame.f_back, frame.f_back.f_locals.get("self")
+        if isinstance(learner, OnPolicyAlgorithm):
+            if learner.n_steps * n_robots > LONGEST_ROLLOUT:
+                gym.logger.warn(
+                    f"{type(learner).__name__} updates once in {learner.n_steps * n_robots:,} decisions, a rollout of "
+                    f"{n_robots} robots: give it n_steps={max(1, 2048 // n_robots)}, which makes it about 2,048."
+                )
+            return
 
 
 def _names(info: Info) -> list[str]:

@@ -9,6 +9,10 @@ With --task, agents swim held-out episodes of registered tasks, one for each see
 confidence intervals and, with --out, a file of them, .csv, or .json with every episode. LABEL=A,B,C is one agent whose
 seeds are swum by policies A, B, C in turn, as by ten trainings.
 
+With --benchmark, LABEL=A,B,C are trainings of one learner, each of which swims the 64 test episodes of the six ids of
+docs/benchmark.md, or those that --task names; --out is a folder for the table as CSV, Markdown, LaTeX and JSON. --merge
+adds the results of such files.
+
 A named agent that does not fit the robot is left out with a sentence, and the exit code is 2.
 """
 
@@ -27,7 +31,7 @@ from seastar_gym.controllers.registry import DEFAULTS, HELP, fitting_agents, loa
 from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import scene_at
 from seastar_gym.envs.paths import PATH_HELP, WAYPOINT_RADIUS, load_path
-from seastar_gym.evaluation import scores
+from seastar_gym.evaluation import benchmark, scores
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.results import Row, write_csv
 from seastar_gym.evaluation.rollout import require_task, task_ids
@@ -83,6 +87,9 @@ def parser() -> argparse.ArgumentParser:
     tasks.add_argument("--task", nargs="+", metavar="ID", help="ids, module:id for one of your own, or all")
     tasks.add_argument("--seeds", type=int, default=10, help=f"number of held-out episodes {DEFAULT}")
     tasks.add_argument("--decisions", type=int, help="time limit [decisions] (default: that of the task)")
+    tasks.add_argument("--benchmark", nargs="?", const="test", choices=tuple(benchmark.FIRST),
+                       help="the protocol of docs/benchmark.md; check: on its other 64 episodes")  # fmt: skip
+    tasks.add_argument("--merge", nargs="+", type=Path, default=[], help="results of --benchmark to show as well")
     many.add_argument("--num-threads", type=int, help="threads of the simulator (default: one for every processor)")
     return found
 
@@ -195,11 +202,46 @@ def measured_on_tasks(options: argparse.Namespace) -> int:
     return 0 if len(found) == len(tasks) * len(agents) else 2
 
 
+def measured_on_benchmark(options: argparse.Namespace) -> int:
+    """Let the agents swim the benchmark; returns the exit code, 2 where one did not fit."""
+    require_sound(options)
+    ids, left_out = options.task or list(benchmark.ENTRIES), 0
+    benchmark.require_ids(ids)
+    fixed = {
+        "--fidelity": options.fidelity,
+        "--scene": options.scene,
+        "--decisions": options.decisions,
+        "--sets": options.sets,
+    }
+    if given := [name for name, value in fixed.items() if value is not None]:
+        raise ValueError(f"The benchmark says how it is swum: leave out {given[0]}.")
+    cells, first = benchmark.read([*options.merge]), benchmark.FIRST[options.benchmark or "test"]
+    agents = [policies_of(agent) for agent in options.agents or ()]
+    for id, (label, names) in itertools.product(ids, agents):
+        try:
+            found = benchmark.measured(id, label, names, first, options.num_threads)
+        except (ValueError, FileNotFoundError) as unfit:
+            print(f"{label} does not swim {id}: {unfit}", file=sys.stderr)
+            left_out += 1
+            continue
+        cells = benchmark.merged({"--merge": cells, label: found})
+        if options.out is not None:
+            benchmark.write_all(cells, options.out)
+    if not cells:
+        raise ValueError("There is nothing to show: name --agents that fit, or files to --merge.")
+    if options.out is not None:
+        benchmark.write_all(cells, options.out)
+    print(benchmark.tables(cells))
+    return 2 if left_out else 0
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     options = parser().parse_args(given)
     command = shlex.join(["seastar", "evaluate", *given])
+    if options.benchmark is not None or options.merge:
+        return answered(lambda: measured_on_benchmark(options))
     if options.task is not None:
         return answered(lambda: measured_on_tasks(options))
     return answered(lambda: compared(options, command) if options.sets is None else swum_often(options))

@@ -150,6 +150,7 @@ class RewardWeights:
     effort: Price of heating one wire for PULSE = 0.1 s.
     aim: Distance from a waypoint's centre, as a fraction of its radius, at which the rewarded route passes it, 0 to 1.
     heading: Reward per radian by which there is less left to turn [1/rad], where headings are asked for.
+    time: Price of a second [1/s].
     """
 
     progress: Annotated[float, not_negative("1")] = 200.0
@@ -165,6 +166,9 @@ class RewardWeights:
     heading: Annotated[float, not_negative("1")] = 8.0
     """Reward per radian by which there is less left to turn [1/rad], where headings are asked for. A second of the
     turning wave, 0.19 rad, earns about as much as a second of the lagged pairs, 7.3 mm."""
+    time: Annotated[float, not_negative("1/s")] = 0.0
+    """Price of a second [1/s]. Without it, an episode pays its route, however long that takes: returns and times are
+    uncorrelated where discounts are near 1."""
 
     def __post_init__(self) -> None:
         check_numbers(self, "RewardWeights.")
@@ -188,6 +192,7 @@ class Weights(NamedTuple):
     effort: NDArray[np.float64]
     aim: NDArray[np.float64]
     heading: NDArray[np.float64]
+    time: NDArray[np.float64]
 
 
 def reward_terms(
@@ -195,18 +200,20 @@ def reward_terms(
     progress: NDArray[np.float64],
     waypoints_reached: NDArray[np.int64],
     pulses: NDArray[np.float64],
+    seconds: float,
     turned: NDArray[np.float64] | None = None,
 ) -> dict[str, NDArray[np.float64]]:
     """Terms of the reward by their names in `info`, each of shape (n_robots,).
 
     progress: Decrease of the way to go [m]. waypoints_reached: Their number. pulses: Heat, see `pulses_of`.
-    turned: Decrease of what is left to turn [rad], None where no headings are asked for. All are of this decision,
-    shapes (n_robots,).
+    seconds: Duration of the decision [s]. turned: Decrease of what is left to turn [rad], None where no headings are
+    asked for. All others are of this decision, shapes (n_robots,).
     """
     return {
         "reward_progress": weights.progress * progress,
         "reward_waypoint": np.asarray(weights.waypoint * waypoints_reached, np.float64),
         "reward_effort": -weights.effort * pulses,
+        "reward_time": np.broadcast_to(0.0 - weights.time * seconds, np.shape(progress)).copy(),
         **({} if turned is None else {"reward_heading": weights.heading * turned}),
     }
 

@@ -109,6 +109,8 @@ class Task(ABC):
     """Whether an episode is about reaching waypoints, in an observation that tells of them in their places only."""
     option = "instance"
     """Name of the option by which a reset asks for a certain episode."""
+    spawn_key: tuple[int, ...] = ()
+    """Of the seeds of numbered episodes, see `numpy.random.SeedSequence`: no seed of a reset gives those with a key."""
     per_episode: tuple[str, ...] = ()
     """Fields that an environment may change from one episode to the next."""
 
@@ -181,7 +183,7 @@ class Robots:
         require_choice("split", split, get_args(Split))
         if task.option != "instance" and split != "train":
             raise ValueError(
-                "split is for tasks, whose episodes are numbered: leave it out for paths, which have seeds."
+                'split is for tasks and path="random", whose episodes are numbered: leave it out for other paths.'
             )
         draws = options.randomization if task.randomization is None else task.randomization
         if task.randomization is not None and options.randomization is not None:
@@ -325,7 +327,8 @@ class Robots:
         for robot in np.flatnonzero(robots).tolist():
             number = generators[robot].integers(SIZES[self.split]) if wanted is None else wanted[robot]
             self.instance[robot] = number
-            of_episodes[robot] = np.random.default_rng([list(SIZES).index(self.split), int(number)])
+            entropy, key = [list(SIZES).index(self.split), int(number)], self.task.spawn_key
+            of_episodes[robot] = np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=key))
         return of_episodes
 
     def _checked_numbers(self, asked: object) -> NDArray[np.int64]:

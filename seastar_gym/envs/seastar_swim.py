@@ -190,6 +190,9 @@ class SeastarSwimEnv(OneRobotEnv):
     draws the number, from two billion in the split "train", from a thousand in "test". `info["instance"]` tells it, and
     `reset(options={"instance": number})` swims a certain one. The splits share no episode.
 
+    Random paths have splits, too: with `path="random", split="test"`, episodes are numbered likewise, and no seed of
+    the split "train" draws one of them.
+
     ## Headings
     With `headings`, a waypoint is reached when the hub is within its radius and the robot's heading is within
     `HeadingTargets.tolerance`, by default 10 degrees, of the target heading. The heading is the direction of the body
@@ -272,6 +275,7 @@ class SeastarSwimEnv(OneRobotEnv):
     | `reward_progress` | decrease of the length of the route to the last waypoint [m] | 200 per metre  |
     | `reward_waypoint` | waypoints reached in the decision                            | 1 per waypoint |
     | `reward_effort`   | minus the time for which wires were heated, in pulses        | 0.01 per pulse |
+    | `reward_time`     | minus the duration of the decision [s]                       | 0 per second   |
     | `reward_heading`  | decrease of what is left to turn [rad], only with `headings` | 8 per radian   |
 
     A pulse heats one wire for 0.1 s, as a full command of a stroke does. Where an actuator does not say how long it is
@@ -314,6 +318,7 @@ class SeastarSwimEnv(OneRobotEnv):
     | `reward_progress`        | float      | 1    | term of the reward                                               |
     | `reward_waypoint`        | float      | 1    | term of the reward                                               |
     | `reward_effort`          | float      | 1    | term of the reward                                               |
+    | `reward_time`            | float      | 1    | term of the reward                                               |
     | `reward_heading`         | float      | 1    | term of the reward, only with `headings`                         |
 
     `SolverStatus(info["solver_status"]).sentence` says what to do about a status other than 0.
@@ -367,7 +372,7 @@ class SeastarSwimEnv(OneRobotEnv):
         and rounded up to 0.01 s. Actuators other than wires need a multiple of the decision period.
     task: Name of a task, or a task with numbers of your own, as an object or in plain form; `path`, `reward`,
         `waypoint_radius`, `random_heading` and `headings` are then its own. None means waypoints.
-    split: Which episodes of a task are drawn: "train" or "test".
+    split: Which episodes of a task, or of random paths, are drawn: "train" or "test".
     render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
         `frames_per_stroke` pictures of every decision since the last call, the last 100 at most or those of one
         decision. "human": a window shows as many; without a display, a warning says so. `metadata["render_fps"]` is

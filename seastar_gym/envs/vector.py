@@ -443,7 +443,7 @@ def swimmers(n_robots: int, threads: int | None, task: Any = None, split: Split 
     if unknown := sorted({*arguments} - OF_ROBOTS):
         raise TypeError(f"SeastarSwimEnv has no argument {unknown[0]!r}.")
     options = SwimOptions(**{name: arguments.pop(name) for name in arguments_of(SwimOptions) & {*arguments}})
-    robots = Robots(chosen_task(task, **arguments), options, n_robots, threads, split=split)
+    robots = Robots(chosen_task(task, split, **arguments), options, n_robots, threads, split=split)
     if robots.task.tells_errors:
         warn_undamped(robots.scene, robots.timed)
         warn_uncertified(robots.scene, robots.options.fidelity_of_scene, robots.certificate, robots.timed)

@@ -45,7 +45,7 @@ class Waypoints(Task):
     and aim [m], `RewardWeights` as numbers, the legs of the robots, and what is left to swim [m] and to turn [rad].
     """
 
-    terms: tuple[str, ...] = ("reward_progress", "reward_waypoint", "reward_effort")
+    terms: tuple[str, ...] = ("reward_progress", "reward_waypoint", "reward_effort", "reward_time")
     goals_are_waypoints = True
     path: Path = "random"
     waypoint_radius: float = WAYPOINT_RADIUS
@@ -129,7 +129,8 @@ class Waypoints(Task):
             turn_before, now.turn_to_go = now.turn_to_go, self._left_to_turn(robots, heading)
             turned = turn_before - now.turn_to_go
         success = robots.waypoint_index == now.n_waypoints
-        terms = reward_terms(Weights(*now.weights.T), before - now.way_to_go, reached, pulses, turned)
+        seconds, weights = robots.decision_period, Weights(*now.weights.T)
+        terms = reward_terms(weights, before - now.way_to_go, reached, pulses, seconds, turned)
         return Score(terms, success, success)
 
     def _pass_waypoints(self, robots: Robots, hub: Floats, heading: Floats | None) -> NDArray[np.int64]:
@@ -220,6 +221,19 @@ class AlongPath(Waypoints):
     def terms(self) -> tuple[str, ...]:  # type: ignore[override]
         """Names of the reward's terms."""
         return Waypoints.terms if self.headings is None else (*Waypoints.terms, "reward_heading")
+
+
+@dataclass(frozen=True)
+class HeldOutPaths(AlongPath):
+    """Random paths of the split "test": numbered episodes, which no reset with a seed draws."""
+
+    option = "instance"
+    spawn_key = (0,)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.path, str) or self.path != "random":
+            raise ValueError('split="test" is for tasks and path="random": other paths are no draws.')
 
 
 def _turns(asked: Floats) -> dict[str, Floats]:

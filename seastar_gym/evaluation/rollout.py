@@ -232,7 +232,7 @@ def require_task(task: str) -> None:
         raise ValueError(f"There is no task {task!r}: choose of {', '.join(task_ids())}, or module:id.")
 
 
-def make_task(task: str, **arguments: Any) -> gym.Env[Any, Any]:
+def make_task(task: str, /, **arguments: Any) -> gym.Env[Any, Any]:
     """Environment of an id with these arguments instead of its own."""
     require_task(task)
     env: gym.Env[Any, Any] = gym.make(spec_of(task), disable_env_checker=True, **arguments)
@@ -247,7 +247,7 @@ def held_out(task: str, fidelity: Fidelity | None = None, split: Split = "test")
     )
 
 
-def env_of(task: str, **arguments: Any) -> Any:
+def env_of(task: str, /, **arguments: Any) -> Any:
     """Environment of a task, of one robot, without wrappers."""
     return make_task(task, **arguments).unwrapped
 

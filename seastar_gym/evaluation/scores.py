@@ -4,8 +4,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from seastar_gym.controllers.registry import load_agent
-from seastar_gym.evaluation.results import Estimate, mean_with_interval, number, text_table, write_csv
+import numpy as np
+
+from seastar_gym.controllers.registry import is_file, learned_file, load_agent
+from seastar_gym.evaluation.results import Estimate, mean_with_interval, number, over_trainings, text_table, write_csv
 from seastar_gym.evaluation.rollout import env_of, held_out, measure_of, swim_episodes
 from seastar_gym.evaluation.swim import HELD_OUT_SEED
 from seastar_gym.files import write_json
@@ -17,6 +19,7 @@ class Scores(NamedTuple):
     """What an agent reached in a task, in the order of the seeds.
 
     measure, unit, better: What scores are, and whether "less" or "more" is better. fidelity: None means the task's own.
+    trainings: Number of trainings that took turns over the seeds; 0 for a rule.
     """
 
     task: str
@@ -30,11 +33,18 @@ class Scores(NamedTuple):
     success: list[bool]
     returns: list[float]
     decisions: list[int]
+    trainings: int = 0
 
     @property
     def mean(self) -> Estimate:
-        """Mean score, failures among them, with its interval over seeds; no interval for one seed."""
+        """Mean score, failures among them, with its interval: over episodes for a rule, over trainings for a learner.
+
+        There is none for one episode, nor for a learner with fewer than three trainings.
+        """
         mean = mean_with_interval(self.scores)
+        if self.trainings:
+            each = over_trainings([np.mean(self.scores[k :: self.trainings]) for k in range(self.trainings)])
+            return mean._replace(low=each.low, high=each.high)
         return mean if len(self.seeds) > 1 else Estimate(mean.mean, float("nan"), float("nan"))
 
     def row(self) -> dict[str, Any]:
@@ -42,7 +52,8 @@ class Scores(NamedTuple):
         named = {name: getattr(self, name) for name in self._fields[:6]}
         score = dict(zip(("score", "score_low", "score_high"), self.mean, strict=True))
         return named | score | {
-            "success_rate": sum(self.success) / len(self.seeds), "seeds": len(self.seeds), "version": __version__
+            "success_rate": sum(self.success) / len(self.seeds), "seeds": len(self.seeds),
+            "trainings": self.trainings, "version": __version__
         }  # fmt: skip
 
 
@@ -73,15 +84,17 @@ def measured(
         rows = (column.tolist() for column in (measure.of(swum), swum.success, swum.returns, swum.decisions))
         found |= zip(own, zip(*rows, strict=True), strict=True)
     columns: Any = map(list, zip(*(found[seed] for seed in sorted(found)), strict=True))
-    return Scores(task, label, fidelity, measure.name, measure.unit, measure.better, sorted(found), *columns)
+    trainings = sum(is_file(name) or learned_file(name) is not None for name in names[:seeds])
+    what = task, label, fidelity, measure.name, measure.unit, measure.better
+    return Scores(*what, sorted(found), *columns, trainings=trainings)
 
 
 def as_text(found: Sequence[Scores]) -> str:
     """Table for a terminal, a line for every agent on every task."""
-    titles = "agent", "task", "measure", "better", "mean [95 %]", "success [%]", "seeds"
+    titles = "agent", "task", "measure", "better", "mean [95 %]", "success [%]", "episodes", "trainings"
     return text_table(titles, [
         [one.agent, one.task, f"{one.measure} [{one.unit}]", one.better, str(one.mean),
-         number(100.0 * one.row()["success_rate"]), str(len(one.seeds))]
+         number(100.0 * one.row()["success_rate"]), str(len(one.seeds)), str(one.trainings or "–")]
         for one in found
     ])  # fmt: skip
 

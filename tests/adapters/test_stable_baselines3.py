@@ -148,6 +148,17 @@ def test_normalisation_goes_on_top_and_evaluation_takes_its_statistics():
         np.testing.assert_allclose(found, raw - 1.0, rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.parametrize("steps, warns", [(4096, False), (4097, True)])
+def test_a_rollout_of_more_than_16384_decisions_is_told_of(steps, warns, recwarn):
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    learner = PPO("MlpPolicy", VecMonitor(make_batch()), n_steps=steps, batch_size=4 * steps)
+    learner._setup_learn(1)
+    told = [str(one.message) for one in recwarn if "updates once in" in str(one.message)]
+    assert ("PPO updates once in 16,388 decisions" in "".join(told)) == warns == bool(told)
+
+
 def test_stable_baselines_records_a_video(tmp_path):
     pytest.importorskip("pygame")
     pytest.importorskip("moviepy")

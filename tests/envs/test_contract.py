@@ -97,7 +97,7 @@ def test_the_observation_is_that_of_the_table():
 def test_the_reward_and_info_are_those_of_the_tables():
     weights = RewardWeights()
     documented = {row["term"]: float(row["default weight"].split()[0]) for row in table("Reward")}
-    expected = {name: getattr(weights, name) for name in ("progress", "waypoint", "effort", "heading")}
+    expected = {name: getattr(weights, name) for name in ("progress", "waypoint", "effort", "time", "heading")}
     assert documented == {f"reward_{name}": weight for name, weight in expected.items()}
     assert f"within {weights.aim} of its radius" in section("Reward")
     numerics = Numerics("implicit-midpoint", 5e-3, 1e-5)

@@ -171,7 +171,7 @@ REFUSED = {
     "no task": (lambda: SeastarSwimEnv(task="swim"), "one of 'miswired', 'prey', 'fast-prey', 'station'"),
     "a task in plain": (lambda: SeastarSwimEnv(task={"kind": "Prey"}), "a dict with a version"),
     "a path of a task": (lambda: SeastarSwimEnv([[0.1, 0.0]], task="prey"), "path belongs to swims along a path"),
-    "a split of paths": (lambda: SeastarSwimEnv(split="test"), "split is for tasks"),
+    "a split of paths": (lambda: SeastarSwimEnv(split="test"), "other paths are no draws"),
     "two draws": (lambda: drawing("fluid.drag_coefficient", 0.5, 1.0, task="fail-blind"), "leave out randomization"),
     "no split": (lambda: SeastarSwimVectorEnv(task="prey", split="validation"), "split must be one of 'train', 'test'"),
     "pictures too small": (lambda: drawn_by(size=(100, 100)), "at least 320 x 240 pixels, not 100 x 100"),

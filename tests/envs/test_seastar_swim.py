@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from episodes import break_robot
+from refusals import assert_refused
 from seastar_gym import (
     Body,
     DomainRandomization,
@@ -108,7 +109,7 @@ def test_a_reset_tells_of_a_stroke_that_has_not_happened(scene, angle):
     info = env.reset(seed=0)[1]
     of_a_stroke = [*info][[*info].index("is_success") :]
     assert info["smallest_opening_angle"] == pytest.approx(angle) and info["is_success"] is False
-    assert len(of_a_stroke) == 10 and not any(info[name] for name in of_a_stroke if "angle" not in name)
+    assert len(of_a_stroke) == 11 and not any(info[name] for name in of_a_stroke if "angle" not in name)
     angle_then = env.step([0, 1, 0, 2, 0][: env.scene.robot.n_limbs])[4]["smallest_opening_angle"]
     assert (angle_then == np.pi) == (scene is not None)
 
@@ -144,7 +145,7 @@ def test_the_same_episode_under_another_heading_looks_the_same():
 
 def test_reward_is_the_sum_of_its_terms_and_they_are_what_their_names_say():
     path = np.array([[0.002, 0.001], [0.004, 0.0], [0.15, 0.1]])
-    weights = RewardWeights(progress=150.0, waypoint=2.5, effort=0.03, aim=0.6)
+    weights = RewardWeights(progress=150.0, waypoint=2.5, effort=0.03, aim=0.6, time=0.25)
     env, rng = fast(path=path, waypoint_radius=0.004, reward=weights), np.random.default_rng(0)
     env.reset(seed=0)
     hub, index = np.zeros(2), 0
@@ -167,9 +168,9 @@ def test_reward_is_the_sum_of_its_terms_and_they_are_what_their_names_say():
         assert info["reward_progress"] == pytest.approx(150.0 * (way_to_go(hub, index) - way_to_go(new_hub, new_index)))
         assert info["reward_waypoint"] == 2.5 * (new_index - index)
         assert info["reward_effort"] == pytest.approx(-0.03 * np.count_nonzero(action))
-        assert reward == pytest.approx(
-            info["reward_progress"] + info["reward_waypoint"] + info["reward_effort"], rel=1e-14
-        )
+        assert info["reward_time"] == -0.25
+        terms = [info[f"reward_{name}"] for name in ("progress", "waypoint", "effort", "time")]
+        assert reward == pytest.approx(sum(terms), rel=1e-14)
         assert info["distance"] == pytest.approx(np.linalg.norm(path[new_index] - new_hub))
         start = path[new_index - 1] if new_index else np.zeros(2)
         assert info["cross_track_error"] == pytest.approx(float(cross_track_error(new_hub, start, path[new_index])))
@@ -310,3 +311,18 @@ def test_a_path_is_copied_when_it_is_asked_for_at_making_or_for_one_episode():
     np.testing.assert_array_equal(env.waypoints, [[0.3, 0.0]])
     env.reset()
     np.testing.assert_array_equal(env.waypoints, expected)
+
+
+def test_random_paths_of_the_test_split_are_numbered_and_no_seed_draws_one():
+    held, trained = (fast(path="random", random_heading=True, split=split) for split in ("test", "train"))
+    paths = {}
+    for number in (0, 999, 0):
+        _, info = held.reset(seed=number, options={"instance": number})
+        assert info["instance"] == number
+        paths.setdefault(number, held.waypoints)
+        np.testing.assert_array_equal(held.waypoints, paths[number])
+    for seed in (0, 999, 1, 1 + 999 * 2**32, 1 + 999 * 2**32 + 2**128):  # entropies of the split's tasks among them
+        trained.reset(seed=seed)
+        assert all(np.abs(trained.waypoints - path).max() > 1e-3 for path in paths.values())
+    with assert_refused("instance must be a whole number from 0 to 999"):
+        held.reset(options={"instance": 1000})

@@ -12,20 +12,20 @@ prizes.py     more prizes than can be reached, and the best choice of them
 """
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import gymnasium as gym
 
 from seastar_gym.envs import ENVIRONMENTS
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.robots import Task
+from seastar_gym.envs.robots import Split, Task
 from seastar_gym.envs.tasks.hidden import FailBlind, Miswired, SimToReal
 from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.station import Station
-from seastar_gym.envs.waypoints import AlongPath
+from seastar_gym.envs.waypoints import AlongPath, HeldOutPaths
 from seastar_gym.scene.checks import require_choice, require_number, require_period, shown
 from seastar_gym.scene.serial import read, to_dict
 
@@ -78,10 +78,10 @@ def read_task(task: Task | Mapping[str, Any] | str) -> Task:
     return found
 
 
-def chosen_task(task: Task | Mapping[str, Any] | str | None, **of_swim: Any) -> Task:
+def chosen_task(task: Task | Mapping[str, Any] | str | None, split: Split, **of_swim: Any) -> Task:
     """Task that is given, or the `AlongPath` of these arguments, all of which belong to that alone."""
     if task is None:
-        return AlongPath(**of_swim)
+        return HeldOutPaths(**of_swim) if split == "test" else AlongPath(**of_swim)
     found = read_task(task)
     for one in fields(AlongPath):
         value = of_swim.get(one.name, one.default)
@@ -91,5 +91,12 @@ def chosen_task(task: Task | Mapping[str, Any] | str | None, **of_swim: Any) -> 
 
 
 def name_of(task: Task | None) -> str | None:
-    """Name of a task; None for waypoints, or where it has no name."""
-    return next((name for name, known in NAMED.items() if known == task), None)
+    """Name of a task, whatever its rewards weigh; None for waypoints, or where it has no name."""
+    return next(
+        (name for name, known in NAMED.items() if type(known) is type(task) and known == _paid_as(known, task)), None
+    )
+
+
+def _paid_as(known: Any, task: Any) -> Any:
+    """A task with the `RewardWeights` of another of its kind."""
+    return replace(task, reward=known.reward) if hasattr(known, "reward") else task

@@ -56,6 +56,7 @@ class Miswired(Waypoints):
     | `reward_progress` | decrease of the length of the route to the last waypoint [m] | 200 per metre  |
     | `reward_waypoint` | waypoints reached in the decision                            | 1 per waypoint |
     | `reward_effort`   | minus the time for which wires were heated, in pulses        | 0.01 per pulse |
+    | `reward_time`     | minus the duration of the decision [s]                       | 0 per second   |
 
     The return says how far the robot got. Robots that arrive are compared by their time, the task's measure.
 
@@ -149,6 +150,7 @@ class FailBlind(Waypoints):
     | `reward_progress` | decrease of the length of the route to the last waypoint [m] | 200 per metre  |
     | `reward_waypoint` | waypoints reached in the decision                            | 1 per waypoint |
     | `reward_effort`   | minus the time for which wires were heated, in pulses        | 0.01 per pulse |
+    | `reward_time`     | minus the duration of the decision [s]                       | 0 per second   |
 
     Robots that arrive are compared by their time, the task's measure.
 
@@ -257,6 +259,7 @@ class SimToReal(Waypoints):
     | `reward_progress` | decrease of the length of the route to the last waypoint [m] | 200 per metre  |
     | `reward_waypoint` | waypoints reached in the decision                            | 1 per waypoint |
     | `reward_effort`   | minus the time for which wires were heated, in pulses        | 0.01 per pulse |
+    | `reward_time`     | minus the duration of the decision [s]                       | 0 per second   |
 
     Robots that arrive are compared by their time, the task's measure.
 

@@ -188,6 +188,7 @@ class ObstTrap(Waypoints):
     | `reward_progress` | decrease of the way to the goal [m], see `potential`    | 200 per metre  |
     | `reward_waypoint` | 1 in the decision in which the goal is reached          | 1              |
     | `reward_effort`   | minus the time for which wires were heated, in pulses   | 0.01 per pulse |
+    | `reward_time`     | minus the duration of the decision [s]                  | 0 per second   |
     | `reward_touch`    | -1 in the decision in which a disc is touched           | 20             |
 
     With `potential="straight"`, the default, the way is the straight line to the goal through all discs. It leads into

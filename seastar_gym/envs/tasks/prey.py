@@ -162,8 +162,8 @@ class Prey(Task):
     The task's measure is the number of prey caught in 200 s.
 
     ## Info
-    That of `SeastarSwim-v0` without `waypoint_index`, `cross_track_error`, `energy_per_metre` and `reward_waypoint`;
-    `is_success` says whether `wanted` prey are caught. Besides,
+    That of `SeastarSwim-v0` without `waypoint_index`, `cross_track_error`, `energy_per_metre`, `reward_waypoint` and
+    `reward_time`; `is_success` says whether `wanted` prey are caught. Besides,
 
     | name           | type       | unit | meaning                                         |
     |----------------|------------|------|-------------------------------------------------|

@@ -151,8 +151,8 @@ class Prizes(Task):
     The task's measure is the worth of all prizes taken.
 
     ## Info
-    That of `SeastarSwim-v0` without `waypoint_index`, `cross_track_error`, `energy_per_metre` and `reward_waypoint`;
-    `is_success` says whether all prizes are taken. Besides,
+    That of `SeastarSwim-v0` without `waypoint_index`, `cross_track_error`, `energy_per_metre`, `reward_waypoint` and
+    `reward_time`; `is_success` says whether all prizes are taken. Besides,
 
     | name           | type          | unit | meaning                                                 |
     |----------------|---------------|------|---------------------------------------------------------|

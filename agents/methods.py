@@ -1,0 +1,232 @@
+"""Methods of the benchmark, and the training of its cells: a method, a track, an id and a seed.
+
+    python -m agents.tasks --benchmark --methods PPO --ids SeastarStation-v0 --seeds 0 1 2
+
+A cell is a file, written when its training is over, with the test episodes of the last policy and a learning curve; the
+model lies beside it. The command goes on with the cells that are missing, several at once, each in a process with one
+thread. The processor time of a cell is that of its training, without the points of the curve.
+"""
+
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import as_completed
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import torch
+from sb3_contrib import RecurrentPPO
+from stable_baselines3 import DQN, PPO, SAC
+from stable_baselines3.common.callbacks import BaseCallback
+
+from agents.distillation import PAST
+from agents.ppo import make_model
+from agents.tasks import hyperparameters
+from seastar_gym import TASKS
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
+from seastar_gym.evaluation.benchmark import (
+    BUDGETS,
+    CURVE,
+    ENTRIES,
+    EPISODES,
+    SEEDS,
+    TRACKS,
+    Cell,
+    Track,
+    contract,
+    make,
+    require_ids,
+    write,
+)
+from seastar_gym.evaluation.benchmark import swum as swum_by
+from seastar_gym.evaluation.rollout import Batch
+from seastar_gym.files import beside
+from seastar_gym.scene.checks import require_count
+from seastar_gym.sweep.executors import Processes
+
+
+class Method(NamedTuple):
+    """A learner. build: Makes it of environment, id and seed. robots: That learn side by side. continuous: Commands."""
+
+    build: Callable[[BatchVecEnv, str, int], Any]
+    robots: int = 64
+    continuous: bool = False
+    tracks: tuple[Track, ...] = TRACKS
+    stacked: bool = False
+
+
+def _ours(env: BatchVecEnv, id: str, seed: int) -> Any:
+    batch: Any = env.env.unwrapped
+    return make_model(env, hyperparameters(str(TASKS[id].task), float(batch.decision_period)), seed)
+
+
+def _off_policy(kind: Any, ratio: float, **how: Any) -> Callable[[BatchVecEnv, str, int], Any]:
+    """Learner with a replay buffer. ratio: Gradient steps per decision."""
+
+    def build(env: BatchVecEnv, id: str, seed: int) -> Any:
+        steps = max(1, round(ratio * env.num_envs))
+        return kind(
+            "MlpPolicy", env, seed=seed, device="cpu", buffer_size=200_000, learning_starts=2_000, train_freq=1,
+            gradient_steps=steps, **how,
+        )  # fmt: skip
+
+    return build
+
+
+METHODS: dict[str, Method] = {
+    "PPO": Method(lambda env, id, seed: PPO("MlpPolicy", env, n_steps=32, seed=seed, device="cpu")),
+    "PPO, ours": Method(_ours, 128),
+    "PPO, ours, frame stack": Method(_ours, 128, tracks=("symmetric",), stacked=True),
+    "RecurrentPPO": Method(
+        lambda env, id, seed: RecurrentPPO(
+            "MlpLstmPolicy", env, n_steps=32, batch_size=1024, n_epochs=6, learning_rate=1e-3, gae_lambda=0.9,
+            seed=seed, device="cpu", policy_kwargs={"net_arch": [128, 128], "lstm_hidden_size": 64},
+        ),
+        128, tracks=("plain",),
+    ),
+    "DQN": Method(_off_policy(DQN, 1 / 8, learning_rate=4e-4, exploration_fraction=0.2, target_update_interval=2_000)),
+    "SAC": Method(_off_policy(SAC, 1 / 16), continuous=True),
+}  # fmt: skip
+"""PPO and SAC as shipped by Stable-Baselines3 but for rollouts of 2,048 decisions and the ratio of gradient steps; ours
+with the hyperparameters of `agents.tasks`; an LSTM of 64, in one track: frames that turn from one decision to the next
+would turn its memory. DQN as shipped never arrives."""
+
+
+@dataclass(frozen=True)
+class BenchmarkOptions:
+    """Train the cells of the benchmark that are missing: methods, tracks, ids and seeds."""
+
+    methods: tuple[str, ...] = tuple(METHODS)
+    """Methods."""
+    tracks: tuple[Track, ...] = TRACKS
+    """Without or with symmetry reduction; methods that have one track are trained in that."""
+    ids: tuple[str, ...] = tuple(ENTRIES)
+    """Environments."""
+    seeds: tuple[int, ...] = SEEDS
+    """Seeds of the trainings."""
+    decisions: int = BUDGETS[0]
+    """Length of every training [decisions]."""
+    processes: int = 2
+    """Cells that are trained at once."""
+    out: Path = Path("runs/benchmark")
+    """Folder of the cells."""
+
+    def __post_init__(self) -> None:
+        if unknown := set(self.methods) - set(METHODS):
+            raise ValueError(f"There is no method {min(unknown)!r}: choose of {', '.join(METHODS)}.")
+        require_ids(self.ids)
+        require_count("decisions", self.decisions, 1, 10**9)
+        require_count("processes", self.processes, 1, 1_000)
+
+    @property
+    def cells(self) -> list[tuple[str, Track, str, int, int, Path]]:
+        """Cells that are missing, as arguments of `train_cell`: all ids of a seed before the next seed."""
+        return [
+            (method, track, id, seed, self.decisions, file)
+            for seed, method, track, id in product(self.seeds, self.methods, self.tracks, self.ids)
+            if track in METHODS[method].tracks
+            and not (file := file_of_cell(self.out, method, track, id, seed, self.decisions)).is_file()
+        ]
+
+
+def file_of_cell(folder: Path, method: str, track: Track, id: str, seed: int, decisions: int) -> Path:
+    """File of a cell."""
+    name = method.lower().replace(", ", "-").replace(" ", "-")
+    return folder / str(decisions) / f"{name}-{track}" / f"{id}-{seed}.json"
+
+
+def batch_of(method: Method, track: Track, id: str, n: int, train: bool) -> Batch:
+    """Batch that a method sees."""
+    more: dict[str, Any] = {"actions": "continuous"} if method.continuous else {}
+    if train:
+        more["autoreset_mode"] = "SameStep"
+    batch = make(id, n, "train" if train else "test", 1, **more)
+    if method.stacked:
+        return VectorFrameStack(batch, PAST)
+    return VectorSymmetryReduction(batch) if track == "symmetric" else batch
+
+
+class Curve(BaseCallback):
+    """Points of a learning curve. seconds: Processor time of the training so far [s], without that of the points."""
+
+    def __init__(self, marks: list[int], swim: Callable[[Any], dict[str, list[Any]]]):
+        super().__init__()
+        self._marks, self._swim, self._began = marks, swim, time.process_time()
+        self.points: list[dict[str, float]] = []
+
+    @property
+    def seconds(self) -> float:
+        return round(time.process_time() - self._began, 1)
+
+    def _on_rollout_start(self) -> None:
+        if self._marks and self.num_timesteps >= self._marks[0]:
+            self._marks = [mark for mark in self._marks if mark > self.num_timesteps]
+            self.point()
+
+    def _on_step(self) -> bool:
+        return True
+
+    def point(self) -> dict[str, list[Any]]:
+        """Swim the test episodes now, and note their means."""
+        seconds, before = self.seconds, time.process_time()
+        found = self._swim(self.model)
+        means = {name: round(sum(found[name]) / EPISODES, 4) for name in ("measure", "returns")}
+        self.points.append({"decisions": self.num_timesteps, "seconds": seconds, **means})
+        self._began += time.process_time() - before
+        return found
+
+
+def train_cell(method: str, track: Track, id: str, seed: int, decisions: int, file: Path) -> str:
+    """Train a cell and write its files; returns a line that says so."""
+    torch.set_num_threads(1)
+    learner = METHODS[method]
+    model = learner.build(BatchVecEnv(batch_of(learner, track, id, learner.robots, True)), id, seed)
+
+    def swim(model: Any) -> dict[str, list[Any]]:
+        return swum_by(batch_of(learner, track, id, EPISODES, False), model)
+
+    curve = Curve([mark for mark in CURVE if mark < decisions], swim)
+    model.learn(decisions, callback=curve)
+    found = curve.point()
+    model.get_env().close()
+    with beside(file.with_suffix(".zip")) as part, part.open("wb") as stream:
+        model.save(stream)
+    seconds = float(curve.points[-1]["seconds"])
+    write(
+        [
+            Cell(
+                method,
+                track,
+                id,
+                seed,
+                contract(id),
+                0,
+                **found,
+                decisions=decisions,
+                seconds=seconds,
+                curve=curve.points,
+            )
+        ],
+        file,
+    )
+    return f"{file.stem}, {method}, {track}: {curve.points[-1]['measure']:.4g} after {seconds:.0f} s"
+
+
+def train_cells(options: BenchmarkOptions) -> int:
+    """Train the cells that are missing; returns the exit code, 130 after Ctrl-C."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    cells = options.cells
+    print(f"{len(cells)} cells to train", flush=True)
+    pool = Processes(options.processes)
+    try:
+        for done in as_completed([pool.submit(train_cell, *cell) for cell in cells]):
+            print(done.result(), flush=True)
+    except KeyboardInterrupt:
+        print("Stopped: the same command goes on with the cells that are missing.", flush=True)
+        return 130
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return 0

@@ -1,0 +1,347 @@
+"""The benchmark: six ids, one protocol, scores from a greedy rule to an oracle, and results that merge.
+
+    from seastar_gym.evaluation.benchmark import make
+
+    batch = make("SeastarMiswiredTimed-v0", 64, autoreset_mode="SameStep")  # to train on
+    cells = measured("SeastarMiswiredTimed-v0", "mine", ["0.zip", "1.zip", "2.zip"])
+
+Learners train on the split "train", and their last policies swim the same test episodes, with deterministic actions.
+What `info` has of hidden state is for judges alone. docs/benchmark.md says why, and has the results.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.registry import load_agent
+from seastar_gym.envs import IDS
+from seastar_gym.envs.robots import SIZES, Split, Task
+from seastar_gym.envs.tasks import NAMED
+from seastar_gym.evaluation.results import (
+    Estimate,
+    interquartile_mean,
+    over_trainings,
+    probability_of_improvement,
+    smallest_difference,
+    text_table,
+    write_csv,
+)
+from seastar_gym.evaluation.rollout import RECORDED, Batch, env_of, make_batch, measure_of_task, require_seen, rollout
+from seastar_gym.files import read_json, write_atomically, write_json
+from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.scene.serial import to_dict
+
+Track = Literal["plain", "symmetric"]
+"""Whether a learner turns and mirrors what it sees into one sector. It outweighs the algorithm: never in one table."""
+TRACKS: tuple[Track, ...] = ("plain", "symmetric")
+
+
+class Entry(NamedTuple):
+    """An id of the benchmark. price: `RewardWeights.time` [1/s], with which returns agree with the measure."""
+
+    why: str
+    price: float | None = None
+
+
+ENTRIES: dict[str, Entry] = {
+    "SeastarPreyTimed-v0": Entry("foresight over tens of seconds"),
+    "SeastarPrizesTimed-v0": Entry("planning with nothing hidden"),
+    "SeastarStation-v0": Entry("precision against a disturbance"),
+    "SeastarMiswiredTimed-v0": Entry("memory, with a clear ceiling", 1.0),
+    "SeastarFailBlind-v0": Entry("memory by twelve numbers", 1.0),
+    "SeastarSwimSimToReal-v0": Entry("delay, noise and a robot that is not known exactly", 1.0),
+}
+BUDGETS, CURVE = (200_000, 1_000_000), (25_000, 50_000, 100_000, 200_000)
+"""Decisions of trainings, and those after which their learning curves have a point."""
+SEEDS = tuple(range(10))
+FIDELITY: Fidelity = "fast"
+EPISODES = 64
+FIRST = {"test": 0, "check": 64}
+"""Number of the first of EPISODES test episodes: those that everybody swims, and those of a last check."""
+
+
+def task_of(id: str) -> Task:
+    """Task of an id, with the price of time of the benchmark."""
+    task: Any = NAMED[str(IDS[id].task)]
+    price = ENTRIES[id].price
+    return task if price is None else replace(task, reward=replace(task.reward, time=price))  # type: ignore[no-any-return]
+
+
+def make(id: str, n: int, split: Split = "train", threads: int | None = None, **more: Any) -> Batch:
+    """Batch of n robots of an id, as the benchmark has it. more: Of the batch, such as autoreset_mode and actions."""
+    require_ids([id])
+    return make_batch(id, n, threads, **{"task": task_of(id), "split": split, "fidelity": FIDELITY, **more})
+
+
+def require_ids(ids: Iterable[str]) -> None:
+    """ValueError for an id that is not of the benchmark."""
+    if unknown := set(ids) - set(ENTRIES):
+        raise ValueError(f"{min(unknown)} is no id of the benchmark: choose of {', '.join(ENTRIES)}.")
+
+
+PROBED = 4
+"""Decisions whose observations and rewards are part of a contract."""
+
+
+@cache
+def contract(id: str) -> str:
+    """Hash of what a result of an id depends on: task, robot, numerics and splits as they are said, and their numbers.
+
+    The numbers are the first observations and rewards of a test episode, to three decimals: the same on any machine.
+    """
+    batch = make(id, 1, "test", 1)
+    inner: Any = batch.unwrapped
+    said = {
+        "id": id, "row": IDS[id]._replace(threshold=None)._asdict(), "task": to_dict(inner.task),
+        "scene": to_dict(inner.scene), "splits": SIZES, "episodes": EPISODES,
+    }  # fmt: skip
+    seen = [batch.reset(options={"instance": 0})[0]]
+    for action in range(1, PROBED + 1):
+        observations, rewards, *_ = batch.step(np.full(1, action))
+        seen += [observations, rewards]
+    batch.close()
+    numbers = np.round(np.concatenate([np.ravel(one) for one in seen]).astype(float), 3) + 0.0
+    text = json.dumps(said, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode() + numbers.tobytes()).hexdigest()[:16]
+
+
+class Cell(NamedTuple):
+    """What one training, or rule, reached in the test episodes of an id.
+
+    seed: Of the training. measure, returns, success: Of every episode. decisions, seconds: Length of the training, in
+    processor time; None where it is not known. curve: Points of it, with decisions, seconds, measure and returns.
+    """
+
+    agent: str
+    track: Track
+    id: str
+    seed: int
+    contract: str
+    first: int
+    measure: list[float]
+    returns: list[float]
+    success: list[bool]
+    decisions: int | None = None
+    seconds: float | None = None
+    curve: Sequence[Mapping[str, float]] = ()
+
+
+def swum(batch: Batch, policy: Policy, first: int = 0) -> dict[str, list[Any]]:
+    """Measure, return and success of every test episode that the robots of a batch swim; closes the batch.
+
+    first: Number of the first of them.
+    """
+    inner: Any = batch.unwrapped
+    episodes = rollout(batch, policy, seeds=0, record=RECORDED, options={"instance": first + np.arange(inner.num_envs)})
+    batch.close()
+    episodes = episodes._replace(limit=inner.max_episode_steps * inner.decision_period)
+    of = measure_of_task(inner.task).of(episodes)
+    return {
+        "measure": np.round(of, 4).tolist(), "returns": np.round(episodes.returns, 3).tolist(),
+        "success": episodes.success.tolist(),
+    }  # fmt: skip
+
+
+def measured(id: str, agent: str, names: Sequence[str], first: int = 0, threads: int | None = None) -> list[Cell]:
+    """Cells of an agent: what each of its policies reaches.
+
+    names: Names of policies as of `load_agent`, such as one file for each seed. ValueError for one that does not fit.
+    """
+    env, cells = env_of(id, task=task_of(id), split="test", fidelity=FIDELITY), list[Cell]()
+    for seed, name in enumerate(names):
+        policy = load_agent(name, env)
+        batch = make(id, EPISODES, "test", threads, actions=require_seen(policy, env))
+        cells.append(Cell(agent, track_of(policy), id, seed, contract(id), first, **swum(batch, policy, first)))
+    env.close()
+    return cells
+
+
+def track_of(policy: Policy) -> Track:
+    """Track of a policy, as its description says, or its attribute `symmetric`; plain if it says nothing."""
+    says = getattr(getattr(policy, "description", policy), "symmetry", getattr(policy, "symmetric", False))
+    return "symmetric" if says is True else "plain"
+
+
+REFERENCES = Path(__file__).with_name("references.json")
+"""Cells of the greedy rule and of the oracle, which `python -m studies.methods --references` makes."""
+GREEDY, ORACLE = "greedy", "oracle"
+
+
+@cache
+def scales() -> dict[str, tuple[float, float]]:
+    """Mean measures of the greedy rule and of the oracle in the test episodes, of ids that have both."""
+    means = {(cell.agent, cell.id): float(np.mean(cell.measure)) for cell in read([REFERENCES])}
+    return {id: (means[GREEDY, id], means[ORACLE, id]) for id in ENTRIES if (ORACLE, id) in means}
+
+
+def score(cell: Cell) -> float:
+    """0 for the greedy rule's mean, 1 for the oracle's; NaN where an id has no oracle."""
+    greedy, oracle = scales().get(cell.id, (np.nan, np.nan))
+    return float((greedy - np.mean(cell.measure)) / (greedy - oracle))
+
+
+# Results that merge
+
+
+def write(cells: Sequence[Cell], file: Path, **about: Any) -> None:
+    """Write cells as JSON, which `read` reads and merges. about: What else the file says."""
+    write_json(file, {**about, "cells": [cell._asdict() for cell in cells]})
+
+
+def read(files: Iterable[Path | str]) -> list[Cell]:
+    """Cells of all files, those of a later one instead of the same ones of an earlier one.
+
+    ValueError: a file is none, or two are of different contracts.
+    """
+    parts = dict[str, list[Cell]]()
+    for file in files:
+        try:
+            parts[str(file)] = [Cell(**cell) for cell in read_json(file)["cells"]]
+        except (KeyError, TypeError) as wrong:
+            raise ValueError(f"{file} is no file of the benchmark.") from wrong
+    return merged(parts)
+
+
+def merged(parts: Mapping[str, Iterable[Cell]]) -> list[Cell]:
+    """Cells of several sources, by their names, as `read` merges files."""
+    found, of = dict[tuple[Any, ...], Cell](), dict[str, tuple[str, str]]()
+    for source, cells in parts.items():
+        for cell in cells:
+            hashed, whose = of.setdefault(cell.id, (cell.contract, source))
+            if hashed != cell.contract:
+                raise ValueError(
+                    f"{whose} and {source} are of different contracts of {cell.id}, whose task, observation, reward, "
+                    "numerics or split changed in between: swim one of them again."
+                )
+            found[cell.agent, cell.track, cell.id, cell.seed, cell.first, cell.decisions] = cell
+    return list(found.values())
+
+
+# Tables
+
+
+class Row(NamedTuple):
+    """Trainings of an agent in one track, by id."""
+
+    agent: str
+    track: Track
+    cells: dict[str, list[Cell]]
+
+    def measure(self, id: str) -> Estimate:
+        """Mean measure over seeds, with its interval."""
+        return over_trainings([np.mean(cell.measure) for cell in self.cells[id]])
+
+    @property
+    def scores(self) -> dict[str, list[float]]:
+        """Scores of the seeds, of ids that have a scale."""
+        return {id: list(map(score, self.cells[id])) for id in ENTRIES if id in self.cells and id in scales()}
+
+    @property
+    def smallest(self) -> float:
+        """Smallest difference of the mean score over the ids that ten seeds can see; NaN below three seeds."""
+        each = [smallest_difference(scores) for scores in self.scores.values()]
+        return float(np.sqrt(np.sum(np.square(each))) / len(each)) if each else np.nan
+
+
+def rows_of(cells: Iterable[Cell]) -> list[Row]:
+    """Rows of cells, in their order."""
+    found = dict[tuple[str, Track], dict[str, list[Cell]]]()
+    for cell in cells:
+        found.setdefault((cell.agent, cell.track), {}).setdefault(cell.id, []).append(cell)
+    return [Row(*key, by_id) for key, by_id in found.items()]
+
+
+def records(cells: Iterable[Cell]) -> list[dict[str, Any]]:
+    """A record of every agent, track and id, by the names of the CSV."""
+    found = []
+    for row in rows_of(cells):
+        for id, own in row.cells.items():
+            mean, scores = row.measure(id), [score(cell) for cell in own]
+            found.append({
+                "agent": row.agent, "track": row.track, "id": id, "seeds": len(own),
+                "measure": mean.mean, "measure_low": mean.low, "measure_high": mean.high,
+                "return": float(np.mean([cell.returns for cell in own])),
+                "success_rate": float(np.mean([cell.success for cell in own])),
+                "score": float(np.mean(scores)), "smallest_difference": smallest_difference(scores),
+                "contract": own[0].contract,
+            })  # fmt: skip
+    return found
+
+
+def _shown(estimate: Estimate) -> str:
+    """An estimate as tables show it."""
+    if np.isnan(estimate.mean):
+        return "–"
+    return f"{estimate.mean:.3g}" + ("" if np.isnan(estimate.low) else f" [{estimate.low:.3g}, {estimate.high:.3g}]")
+
+
+def table_of(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
+    """Titles and lines of the table of a track: means over seeds with intervals, and the number of seeds in brackets.
+
+    The last columns: the interquartile mean of the scores, the smallest difference of their mean that ten seeds can
+    see, and the probability that a seed scores more than one of the first row.
+    """
+    ids = [id for id in ENTRIES if any(id in row.cells for row in rows)]
+    short = [id.removeprefix("Seastar").removesuffix("-v0") for id in ids]
+    titles, lines = ["agent", *short, "score", "seen by ten", "P(> first)"], list[list[str]]()
+    for row in rows:
+        shown = [f"{_shown(row.measure(id))} ({len(row.cells[id])})" if id in row.cells else "–" for id in ids]
+        common = [id for id in row.scores if id in rows[0].scores]
+        ours, theirs = ([each.scores[id] for id in common] for each in (row, rows[0]))
+        better = probability_of_improvement(ours, theirs) if common and row is not rows[0] else np.nan
+        last = [_shown(interquartile_mean(list(row.scores.values()))), f"{row.smallest:.2g}", f"{better:.2f}"]
+        lines.append([row.agent, *shown, *(text.replace("nan", "–") for text in last)])
+    return titles, lines
+
+
+def as_text(titles: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    """Table for a terminal."""
+    return text_table(titles, lines)
+
+
+def as_markdown(titles: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    """Table in Markdown."""
+    rule = ["---", *["---:"] * (len(titles) - 1)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in (titles, rule, *lines))
+
+
+def as_latex(titles: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    """Table in LaTeX, with the rules of the package booktabs."""
+    head, *body = (
+        " & ".join(cell.replace("_", r"\_").replace(">", "$>$").replace("–", "--") for cell in line) + r" \\"
+        for line in (titles, *lines)
+    )
+    parts = [rf"\begin{{tabular}}{{l{'r' * (len(titles) - 1)}}}", r"\toprule", head, r"\midrule", *body, r"\bottomrule"]
+    return "\n".join([*parts, r"\end{tabular}"])
+
+
+def tables(cells: Sequence[Cell], form: Callable[..., str] = as_text) -> str:
+    """Tables of cells: one of every track, and of every set of episodes and length of training."""
+    kinds = dict.fromkeys((cell.track, cell.first, cell.decisions) for cell in cells)
+    marks = {as_markdown: ("", ":"), as_latex: ("% ", "")}
+    before, after = marks.get(form, ("", ":"))
+    parts = []
+    for track, first, decisions in kinds:
+        own = [cell for cell in cells if (cell.track, cell.first, cell.decisions) == (track, first, decisions)]
+        of = "" if decisions is None else f", {decisions:,} decisions"
+        title = f"{before}Track {track}{of}, test episodes {first} to {first + EPISODES - 1}{after}"
+        parts.append(f"{title}\n\n{form(*table_of(rows_of(own)))}")
+    return "\n\n".join(parts) + "\n"
+
+
+def write_all(cells: Sequence[Cell], folder: Path) -> None:
+    """Write benchmark.json, which merges, and tables as benchmark.csv, .md and .tex into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write(cells, folder / "benchmark.json")
+    write_csv(records(cells), folder / "benchmark.csv")
+    for ending, form in {".md": as_markdown, ".tex": as_latex}.items():
+        write_atomically(folder / f"benchmark{ending}", tables(cells, form))

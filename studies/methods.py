@@ -1,0 +1,132 @@
+"""Methods on the benchmark: the page's tables and pictures, from the cells that `agents.tasks --benchmark` trained.
+
+--references swims the greedy rules and the oracle instead, between which scores are measured: an id after the other,
+those that are missing or of another contract.
+"""
+
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from seastar_gym.evaluation import benchmark
+from seastar_gym.evaluation.benchmark import ENTRIES, EPISODES, GREEDY, ORACLE, REFERENCES, Cell, contract
+from studies.frame import Results, Study, rounded
+from studies.oracle import Oracle
+from studies.pages import markdown
+from studies.provenance import provenance
+from studies.tasks import greedy
+
+AGENTS = {GREEDY: greedy, ORACLE: Oracle}
+
+
+@dataclass(frozen=True)
+class Options:
+    """Which cells are read, or whether references are swum."""
+
+    cells: Path = Path("runs/benchmark")
+    """Folder of the cells."""
+    references: bool = False
+    """Swim the greedy rules and the oracle, and write them into the package."""
+    ids: tuple[str, ...] = tuple(ENTRIES)
+    """Environments of the references."""
+
+    def __post_init__(self) -> None:
+        benchmark.require_ids(self.ids)
+
+
+def swim_references(ids: Sequence[str], file: Path = REFERENCES) -> None:
+    """Swim what is missing of greedy rules and oracle, and write the file after each."""
+    known = [cell for cell in benchmark.read([file]) if cell.contract == contract(cell.id)] if file.is_file() else []
+    commit = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True).stdout.strip()
+    for id in ids:
+        for agent, make_agent in AGENTS.items():
+            if (agent, id) in {(cell.agent, cell.id) for cell in known}:
+                continue
+            batch = benchmark.make(id, EPISODES, "test", 1)
+            swum = benchmark.swum(batch, make_agent(batch))
+            known.append(Cell(agent, "plain", id, 0, contract(id), 0, **swum))
+            about = provenance("python -m studies.methods --references") | {"commit": commit}
+            benchmark.write(known, file, **about)
+            print(f"{id}, {agent}: {np.mean(swum['measure']):.4g}, return {np.mean(swum['returns']):.4g}", flush=True)
+
+
+def run(options: Options, results: Results) -> str | None:
+    """Put the cells of all files together, or swim the references."""
+    if options.references:
+        swim_references(options.ids)
+        return None
+    cells = benchmark.read(sorted(options.cells.glob("*/*/*.json")))
+    if not cells:
+        return f"There are no cells in {options.cells}: python -m agents.tasks --benchmark trains them."
+    results["cells"] = [
+        cell._replace(measure=[rounded(x) for x in cell.measure], returns=[rounded(x) for x in cell.returns])._asdict()
+        for cell in cells
+    ]
+    return None
+
+
+def cells_of(found: Any) -> list[Cell]:
+    """Cells that results keep; none before any was trained."""
+    return [Cell(**cell) for cell in found.get("cells", [])]
+
+
+def ids_table(found: Any) -> str:
+    """Why each id is there, and between which means scores are measured."""
+    measures = {id: benchmark.measure_of_task(benchmark.task_of(id)) for id in ENTRIES}
+    means = {(cell.id, cell.agent): f"{np.mean(cell.measure):.3g}" for cell in benchmark.read([REFERENCES])}
+    lines = [
+        [
+            f"`{id}`", entry.why, f"{measures[id].name} [{measures[id].unit}], {measures[id].better} is better",
+            *(means.get((id, agent), "not swum yet") for agent in AGENTS),
+            "-" if entry.price is None else f"{entry.price:g}",
+        ]
+        for id, entry in ENTRIES.items()
+    ]  # fmt: skip
+    return markdown(["id", "asks for", "measure", "greedy", "oracle", "price of time [1/s]"], lines, (0, 1, 2))
+
+
+def rows_table(found: Any) -> str:
+    """Tables of the rows that are trained."""
+    cells = cells_of(found)
+    if not cells:
+        return "No row is trained yet."
+    picture = "![Scores against decisions and time](results/benchmark/curves.png)"
+    return f"{benchmark.tables(cells, benchmark.as_markdown)}\n{picture}"
+
+
+def draw_curves(found: Any, file: Path) -> None:
+    """Mean score of every row against decisions, and against processor time."""
+    import matplotlib.pyplot as plt
+
+    from seastar_gym.files import save_figure
+
+    figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.5), sharey=True)
+    for row in benchmark.rows_of(cells_of(found)):
+        curves = [(id, cell.curve) for id, own in row.cells.items() for cell in own if id in benchmark.scales()]
+        if not curves:
+            continue
+        points = []
+        for at in zip(*(curve for _, curve in curves), strict=False):
+            scales = [benchmark.scales()[id] for id, _ in curves]
+            scores = [(g - point["measure"]) / (g - o) for (g, o), point in zip(scales, at, strict=True)]
+            points.append(
+                [np.mean([point[name] for point in at]) for name in ("decisions", "seconds")] + [np.mean(scores)]
+            )
+        decisions, seconds, scores = np.transpose(points)
+        for axis, x in zip(axes, (decisions, seconds), strict=True):
+            axis.plot(x, scores, label=f"{row.agent}, {row.track}")
+    axes[0].set(xlabel="decisions", ylabel="mean score")
+    axes[1].set(xlabel="processor time of a training [s]", xscale="log")
+    axes[0].legend(fontsize="small")
+    save_figure(figure, file)
+    plt.close(figure)
+
+
+STUDY = Study(
+    "methods", run, Options, "benchmark/benchmark.json",
+    pictures={"curves.png": draw_curves}, tables={"benchmark ids": ids_table, "benchmark rows": rows_table},
+)  # fmt: skip

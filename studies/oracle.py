@@ -1,0 +1,160 @@
+"""Oracle of the benchmark: it is told what is hidden, and simulates the very robots ahead before every decision.
+
+It is the best controller that was found, which is no proof that nothing is better.
+"""
+
+import itertools
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.envs.commands import command_table
+from seastar_gym.envs.options import RewardWeights
+from seastar_gym.envs.paths import WAYPOINT_RADIUS
+from seastar_gym.envs.randomization import drawn_scene
+from seastar_gym.envs.robots import Robots
+from seastar_gym.envs.tasks.hidden import FailBlind
+from seastar_gym.envs.tasks.prey import Courses, Prey, Pursuit
+from seastar_gym.envs.tasks.prizes import Prizes, best_round, distances
+from seastar_gym.envs.tasks.station import Station
+from seastar_gym.simulator import Simulator, State
+from studies.frame import Floats
+
+Cost = Callable[[Floats, float], Floats]
+"""Cost of hubs in the world [m], shape (n, m, 2), so many seconds from now, shape (n, m)."""
+
+AHEAD = np.arange(0.0, 201.0)
+"""Times at which a prey is foreseen [s]."""
+NEVER = 1e3
+"""Time that a prey counts that is not met [s]."""
+
+
+class Search(NamedTuple):
+    """What a search tries.
+
+    commands: Of every robot, shape (n, k, n_limbs). depth: Decisions ahead. beam: States that are kept from one to the
+    next. coasting: Time for which robots swim on before they are compared [s].
+    """
+
+    commands: Floats
+    depth: int = 1
+    beam: int = 4
+    coasting: float = 0.0
+
+
+class Oracle:
+    """Policy of the robots of a batch, to whose simulator and episodes it looks."""
+
+    batched = True
+
+    def __init__(self, batch: Any):
+        inner = batch.unwrapped
+        self.robots: Robots = inner._robots
+        self._numbers = {command.tobytes(): number for number, command in enumerate(inner.command_table + 0.0)}
+        self._simulators: dict[int, Simulator] = {}
+        self._search: Search | None = None
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> Any:
+        """Actions of all robots, and None."""
+        robots = self.robots
+        if self._search is None:
+            self._search = search_of(robots)
+        best = self._best(robots.simulator.get_state(), cost_of(robots), self._search)
+        chosen = self._search.commands[np.arange(robots.n_robots), best]
+        if robots.wiring is not None:
+            chosen = chosen * robots.wiring
+        return np.array([self._numbers[command.tobytes()] for command in chosen + 0.0]), None
+
+    def _best(self, states: State, cost: Cost, search: Search) -> NDArray[np.intp]:
+        """Number of the first command of the sequence whose costs after all its decisions have the least sum."""
+        n, k = search.commands.shape[:2]
+        each = np.arange(n)[:, None]
+        states, period = states._replace(commands=None, phase=None), self.robots.decision_period
+        first, total = np.tile(np.arange(k), (n, 1)), np.zeros((n, k))
+        for decision in range(1, search.depth + 1):
+            width = total.shape[1]
+            simulator = self._simulator(width)
+            simulator.set_state(states.of_robots(np.repeat(np.arange(len(states.time)), k)))
+            simulator.advance(period, np.repeat(search.commands, width // k, axis=0).reshape(n * width, -1))
+            ends = simulator.get_state()._replace(commands=None, phase=None)
+            if search.coasting > 0.0:
+                simulator.advance(search.coasting)
+            hubs = simulator.hub_position().reshape(n, width, 2)
+            total = total + cost(hubs, decision * period + search.coasting)
+            if decision < search.depth:
+                kept = np.argsort(total, axis=1)[:, : search.beam]
+                states = ends.of_robots((each * width + kept).reshape(-1))
+                first, total = (np.repeat(values[each, kept], k, axis=1) for values in (first, total))
+        return np.asarray(first[each[:, 0], np.argmin(total, axis=1)])
+
+    def _simulator(self, copies: int) -> Simulator:
+        """Simulator of so many copies of every robot."""
+        if copies not in self._simulators:
+            robots = self.robots
+            drawn = {name: np.repeat(values, copies, axis=0) for name, values in robots.drawn.items()}
+            made = Simulator(drawn_scene(robots._drawn_from, drawn), copies * robots.n_robots, 1)
+            made.set_limb_strengths(np.repeat(robots.simulator.limb_strengths, copies, axis=0))
+            self._simulators[copies] = made
+        return self._simulators[copies]
+
+
+def search_of(robots: Robots) -> Search:
+    """Search in the task of robots whose episodes have begun."""
+    n, n_limbs, task = robots.n_robots, robots.scene.robot.n_limbs, robots.task
+    pairs = np.tile(command_table("pairs", n_limbs), (n, 1, 1))
+    if isinstance(task, FailBlind):
+        live = [strengths > 0.0 for strengths in robots.simulator.limb_strengths]
+        return Search(
+            np.array([list(itertools.product(*((0.0, 1.0, -1.0)[: 1 + 2 * on] for on in limbs))) for limbs in live]), 2
+        )
+    if isinstance(task, Station):
+        every = command_table("joint", n_limbs)
+        return Search(np.tile(every[np.count_nonzero(every, axis=1) <= 2], (n, 1, 1)), 2)
+    if robots.decision_period < 0.5:
+        return Search(pairs, 2, 3, 0.8)
+    return Search(pairs, 2, 6, 0.5) if isinstance(task, Prizes) else Search(pairs, 1, 1, 0.5)
+
+
+def cost_of(robots: Robots) -> Cost:
+    """Cost of the ends of decisions in the task of robots, by their present episodes."""
+    task, now = robots.task, robots.episode
+    if isinstance(task, Prey):
+        return partial(
+            _until_met, Pursuit(0.0075, 0.9 * task.catch_radius), now.course[:, None, None], robots.simulator.time
+        )
+    if isinstance(task, Station):
+        return lambda hubs, _: np.hypot(*np.moveaxis(hubs - now.station[:, None], -1, 0))
+    if isinstance(task, Prizes):
+        ends, radius = _next_prizes(robots, task), task.radius
+    else:
+        ends, radius = task.targets(robots), WAYPOINT_RADIUS
+    first, second = ends[:, None, :2], ends[:, None, 2:]
+    return lambda hubs, _: RewardWeights().way_to_next(hubs, first, second, radius)
+
+
+def _until_met(pursuit: Pursuit, courses: Floats, time: Floats, hubs: Floats, since: float) -> Floats:
+    """Time until the prey is met [s]; where it is not, the time that is lacking at least, on top of NEVER."""
+    prey = Courses(courses).place(time[:, None, None] + since + AHEAD)
+    prey = np.broadcast_to(prey, (*hubs.shape[:2], *prey.shape[2:]))
+    lacking = pursuit.gaps(hubs, prey, AHEAD).min(axis=-1) / pursuit.speed
+    return np.minimum(pursuit.meeting_time(hubs, prey, AHEAD), NEVER + np.maximum(lacking, 0.0))
+
+
+def _next_prizes(robots: Robots, task: Prizes) -> Floats:
+    """First and second prizes of the best rounds through what is left [m], shape (n, 4)."""
+    hubs, ends = robots.simulator.hub_position(), np.zeros((robots.n_robots, 4))
+    ways = 0.0075 * np.maximum(0.0, task.seconds - robots.simulator.time)
+    for robot, (hub, prizes) in enumerate(zip(hubs, robots.episode.prizes, strict=True)):
+        left = prizes[prizes[:, 2] > 0.0]
+        if len(left) == 0:
+            continue
+        to = np.hypot(*(left[:, :2] - hub).T)
+        first, between = np.maximum(0.0, to - task.radius), np.maximum(0.0, distances(left[:, :2]) - task.radius)
+        order = best_round(first, between, left[:, 2], float(ways[robot])).order or [int(np.argmin(to))]
+        ends[robot] = left[(order * 2)[:2], :2].reshape(-1)
+    return ends

@@ -1,0 +1,117 @@
+"""The benchmark: one contract for an id, results that merge, and tables that say how many seeds they have."""
+
+import json
+
+import numpy as np
+import pytest
+
+from refusals import assert_refused
+from seastar_gym.cli.main import main
+from seastar_gym.evaluation import benchmark
+from seastar_gym.evaluation.benchmark import ENTRIES, Cell, contract, make, read, tables, write
+from seastar_gym.evaluation.results import interquartile_mean, over_trainings, probability_of_improvement
+
+PREY, STATION = "SeastarPreyTimed-v0", "SeastarStation-v0"
+SCALES = {PREY: (0.0, 8.0), STATION: (2.0, 0.5)}
+
+
+def cell(agent, id, seed, mean, track="plain", contract="a"):
+    return Cell(agent, track, id, seed, contract, 0, [mean - 0.1, mean + 0.1], [1.0, 2.0], [True, False])
+
+
+def row(agent, means, id=PREY, **how):
+    return [cell(agent, id, seed, mean, **how) for seed, mean in enumerate(means)]
+
+
+@pytest.fixture
+def scales(monkeypatch):
+    monkeypatch.setattr(benchmark, "scales", lambda: SCALES)
+
+
+# Statistics
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_a_learner_has_an_interval_from_three_seeds_on(n, scales):
+    seeds = np.arange(1.0, n + 1.0)
+    for found in (over_trainings(seeds), interquartile_mean([seeds, [1.0, 2.0, 3.0]])):
+        assert found.mean > 0.0 and np.isnan([found.low, found.high]).all() == (n < 3)
+    (text,) = (line for line in tables(row("mine", seeds)).splitlines() if line.startswith("mine"))
+    assert f"({n})" in text and ("[" in text) == (n == 3)
+
+
+def test_an_interval_of_the_score_holds_for_other_seeds():
+    """Of 200 draws of ten seeds on six ids, 95 % of the intervals have the true mean; a bootstrap has a few less."""
+    rng, held = np.random.default_rng(0), 0
+    for _ in range(200):
+        found = interquartile_mean(rng.normal(size=(6, 10)))
+        held += found.low < 0.0 < found.high
+    assert 0.88 < held / 200 < 0.99
+
+
+def test_the_probability_of_improvement_counts_pairs_of_seeds_and_ids_alike():
+    assert probability_of_improvement([[1.0, 3.0], [2.0]], [[2.0, 2.0], [1.0]]) == pytest.approx((0.5 + 1.0) / 2.0)
+
+
+def test_a_score_is_0_for_the_greedy_rule_and_1_for_the_oracle_whichever_is_better(scales):
+    means = {PREY: (0.0, 8.0, 4.0), STATION: (2.0, 0.5, 1.25)}
+    for id, values in means.items():
+        assert [benchmark.score(cell("a", id, 0, mean)) for mean in values] == pytest.approx([0.0, 1.0, 0.5])
+    assert np.isnan(benchmark.score(cell("a", "SeastarFailBlind-v0", 0, 1.0)))
+
+
+# Files
+
+
+def test_files_of_one_contract_merge_and_a_later_one_counts(tmp_path, scales):
+    write(row("mine", [1.0, 2.0]), tmp_path / "a.json")
+    write(row("mine", [5.0]) + row("yours", [3.0], track="symmetric"), tmp_path / "b.json")
+    found = read([tmp_path / "a.json", tmp_path / "b.json"])
+    assert [np.mean(one.measure) for one in found] == pytest.approx([5.0, 2.0, 3.0])
+    plain, symmetric = tables(found).split("Track symmetric")
+    assert "mine" in plain and "yours" not in plain and "yours" in symmetric
+
+
+def test_files_of_different_contracts_are_refused_in_a_sentence(tmp_path, capsys):
+    for name in "ab":
+        write([cell("mine", PREY, 0, 1.0, contract=name)], tmp_path / f"{name}.json")
+    (tmp_path / "c.json").write_text('{"runs": 3}')
+    files = [str(tmp_path / f"{name}.json") for name in "abc"]
+    assert main(["evaluate", "--merge", *files[:2]]) == 2
+    assert f"{files[0]} and {files[1]} are of different contracts of {PREY}" in capsys.readouterr().err
+    with assert_refused("c.json is no file of the benchmark"):
+        read(files[2:])
+
+
+def test_tables_are_written_in_every_form(tmp_path, scales):
+    benchmark.write_all(row("ppo_lstm", [1.0, 2.0, 4.0]) + row("mine", [2.0, 3.0, 4.0], STATION), tmp_path)
+    tex = (tmp_path / "benchmark.tex").read_text("utf-8")
+    assert r"\toprule" in tex and r"ppo\_lstm & 2.33 [1, 4] (3)" in tex and tex.count(r"\\") == 3
+    assert "| ppo_lstm | 2.33 [1, 4] (3) |" in (tmp_path / "benchmark.md").read_text("utf-8")
+    assert (tmp_path / "benchmark.csv").read_text().splitlines()[1].startswith(f"ppo_lstm,plain,{PREY},3,")
+    assert len(json.loads((tmp_path / "benchmark.json").read_text())["cells"]) == 6
+
+
+# Contracts
+
+
+def test_a_contract_is_of_observations_rewards_and_numbers_of_the_task(monkeypatch):
+    known = contract(PREY)
+    contract.cache_clear()
+    assert contract(PREY) == known
+    for name, changed in {"EPISODES": 32, "FIDELITY": "rapid", "PROBED": 3}.items():
+        with monkeypatch.context() as patch:
+            patch.setattr(benchmark, name, changed)
+            contract.cache_clear()
+            assert contract(PREY) != known, name
+    contract.cache_clear()
+
+
+def test_a_price_of_time_is_charged_where_returns_would_not_see_it():
+    batch = make("SeastarMiswiredTimed-v0", 2, "test", 1)
+    batch.reset(options={"instance": 0})
+    _, rewards, _, _, info = batch.step([0, 0])
+    assert info["reward_time"].tolist() == [-0.5, -0.5] and (rewards < -0.4).all()
+    assert sum(entry.price is not None for entry in ENTRIES.values()) == 3
+    with assert_refused("SeastarSwim-v0 is no id of the benchmark"):
+        make("SeastarSwim-v0", 2)
