@@ -69,7 +69,7 @@ def swims(hub, heading=None):
     """Swims with these hubs [m], shape (strokes, n, 2), and headings [rad]."""
     hub = np.asarray(hub, float)
     zeros = np.zeros(hub.shape[:2])
-    return measure.Swims(hub, zeros if heading is None else np.asarray(heading, float), *[zeros] * 5)
+    return measure.Swims(hub, zeros if heading is None else np.asarray(heading, float), *[zeros] * 4)
 
 
 def test_errors_of_paths_and_ends_are_over_the_length_of_the_converged_path_and_those_of_headings_are_turns():
