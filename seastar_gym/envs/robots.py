@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from seastar_gym.accuracy.chapters import errors_in_info, read_certificate
 from seastar_gym.envs.commands import action_masks, can_be_masked, masked_limbs
 from seastar_gym.envs.delays import Lag, Piece, Tracker
+from seastar_gym.envs.instances import SIZES, Split, generator_of, keep, numbers_of
 from seastar_gym.envs.layout import N_STATIONS, Entry, Layout
 from seastar_gym.envs.observation import axes_of, lengths_of, observed_rows, rows_on_device, to_float32
 from seastar_gym.envs.options import SwimOptions, pulses_of
@@ -28,7 +29,7 @@ from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.sight import Lateness, Sees, Sight, bounds_of, entries_of, stations_seen
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.base import Mirror, complete
-from seastar_gym.scene.checks import as_array, require_choice, shown
+from seastar_gym.scene.checks import require_choice
 from seastar_gym.scene.number import check_numbers
 from seastar_gym.simulator import Simulator, StrokeReport
 from seastar_gym.simulator.report import report_of_pieces
@@ -40,10 +41,6 @@ Flags = NDArray[np.bool_]
 
 ROUNDING = 1e-9
 """Fraction of a time that is no time."""
-
-Split = Literal["train", "test"]
-SIZES: dict[Split, int] = {"train": 2_000_000_000, "test": 1_000}
-"""Number of episodes of each split. They share none."""
 
 
 class Outcome(NamedTuple):
@@ -297,7 +294,7 @@ class Robots:
             tasks = self._changed(self.task.option, [asked] * self.n_robots)
         headings = np.zeros(self.n_robots)
         for robot in np.flatnonzero(robots).tolist():
-            self._keep(robot, tasks[robot].draw(generators[robot], self.scene))
+            keep(vars(self.episode), robot, self.n_robots, tasks[robot].draw(generators[robot], self.scene))
             if tasks[robot].random_heading:
                 headings[robot] = generators[robot].uniform(-np.pi, np.pi)
             if self._draws is not None:
@@ -322,38 +319,13 @@ class Robots:
 
         asked: Number of the episode, or one for each robot, shape (n_robots,); None draws them.
         """
-        wanted = None if asked is None else self._checked_numbers(asked)
+        wanted = None if asked is None else numbers_of(asked, self.split, self.n_robots)
         of_episodes = list(generators)
         for robot in np.flatnonzero(robots).tolist():
             number = generators[robot].integers(SIZES[self.split]) if wanted is None else wanted[robot]
             self.instance[robot] = number
-            entropy, key = [list(SIZES).index(self.split), int(number)], self.task.spawn_key
-            of_episodes[robot] = np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=key))
+            of_episodes[robot] = generator_of(int(number), self.split, self.task.spawn_key)
         return of_episodes
-
-    def _checked_numbers(self, asked: object) -> NDArray[np.int64]:
-        numbers = as_array("instance", asked)
-        whole = numbers.dtype.kind in "iu" and numbers.shape in ((), (self.n_robots,))
-        if not whole or not ((numbers >= 0) & (numbers < SIZES[self.split])).all():
-            raise ValueError(
-                f'instance must be a whole number from 0 to {SIZES[self.split] - 1} in the split "{self.split}", or '
-                f"one for each of {self.n_robots} robot(s), not {shown(asked)}."
-            )
-        return np.broadcast_to(numbers.astype(np.int64), (self.n_robots,))
-
-    def _keep(self, robot: int, drawn: dict[str, Any]) -> None:
-        """Keep what was drawn for a robot. Rows of different lengths stand side by side, behind the shorter ones 0."""
-        kept = vars(self.episode)
-        for name, value in drawn.items():
-            value = np.asarray(value)
-            if name not in kept:
-                kept[name] = np.zeros((self.n_robots, *value.shape), value.dtype)
-            if value.ndim == 0:
-                kept[name][robot] = value
-                continue
-            if (missing := len(value) - kept[name].shape[1]) > 0:
-                kept[name] = np.pad(kept[name], [(0, 0), (0, missing), *[(0, 0)] * (value.ndim - 1)])
-            kept[name][robot, : len(value)], kept[name][robot, len(value) :] = value, 0
 
     def observe(self) -> NDArray[np.float32]:
         """Observations, shape (n_robots, size), a fresh array; see observation.py."""

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from seastar_gym.accuracy.chapters import warn_uncertified, warn_undamped
 from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
 from seastar_gym.envs.commands import as_array, sampling_mask, to_commands
+from seastar_gym.envs.instances import Split
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.rendering import BatchPictures, Picture
-from seastar_gym.envs.robots import Outcome, Robots, Split
+from seastar_gym.envs.robots import Outcome, Robots
 from seastar_gym.envs.tasks import chosen_task
 from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.scene import Scene

@@ -26,8 +26,9 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.contract import Policy, actions_in, require_fit, require_policy
 from seastar_gym.controllers.search import Searcher
 from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.instances import Split
 from seastar_gym.envs.layout import Layout
-from seastar_gym.envs.robots import Split, Task
+from seastar_gym.envs.robots import Task
 from seastar_gym.envs.sight import told
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.envs.tasks.prizes import Prizes

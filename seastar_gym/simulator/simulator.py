@@ -56,15 +56,13 @@ def pausing(
 
 def completed(steps: Generator[float, None, Result], look: Callable[[float], object] = lambda _: None) -> Result:
     """What an interval returns in the end. look: Called with the time [s] at every pause."""
-
-    def unseen(time: float) -> None:
-        look(time)
-
-    try:
-        next(pausing(steps, unseen))
-    except StopIteration as over:
-        return over.value
-    raise AssertionError("It has no pauses of its own.")
+    with contextlib.closing(steps):
+        while True:
+            try:
+                time = next(steps)
+            except StopIteration as over:
+                return over.value
+            look(time)
 
 
 Floats = NDArray[np.float64]
