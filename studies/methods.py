@@ -7,6 +7,7 @@ those that are missing or of another contract.
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -42,16 +43,15 @@ def swim_references(ids: Sequence[str], file: Path = REFERENCES) -> None:
     """Swim what is missing of greedy rules and oracle, and write the file after each."""
     known = [cell for cell in benchmark.read([file]) if cell.contract == contract(cell.id)] if file.is_file() else []
     commit = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True).stdout.strip()
-    for id in ids:
-        for agent, make_agent in AGENTS.items():
-            if (agent, id) in {(cell.agent, cell.id) for cell in known}:
-                continue
-            batch = benchmark.make(id, EPISODES, "test", 1)
-            swum = benchmark.swum(batch, make_agent(batch))
-            known.append(Cell(agent, "plain", id, 0, contract(id), 0, **swum))
-            about = provenance("python -m studies.methods --references") | {"commit": commit}
-            benchmark.write(known, file, **about)
-            print(f"{id}, {agent}: {np.mean(swum['measure']):.4g}, return {np.mean(swum['returns']):.4g}", flush=True)
+    for (agent, make_agent), id in product(AGENTS.items(), ids):
+        if (agent, id) in {(cell.agent, cell.id) for cell in known}:
+            continue
+        batch = benchmark.make(id, EPISODES, "test", 1)
+        swum = benchmark.swum(batch, make_agent(batch))
+        known.append(Cell(agent, "plain", id, 0, contract(id), 0, **swum))
+        about = provenance("python -m studies.methods --references") | {"commit": commit}
+        benchmark.write(known, file, **about)
+        print(f"{id}, {agent}: {np.mean(swum['measure']):.4g}, return {np.mean(swum['returns']):.4g}", flush=True)
 
 
 def run(options: Options, results: Results) -> str | None:
