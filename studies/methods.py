@@ -15,6 +15,7 @@ import numpy as np
 
 from seastar_gym.evaluation import benchmark
 from seastar_gym.evaluation.benchmark import ENTRIES, EPISODES, GREEDY, ORACLE, REFERENCES, Cell, contract
+from seastar_gym.evaluation.rollout import measure_of_task
 from studies.frame import Results, Study, rounded
 from studies.oracle import Oracle
 from studies.pages import markdown
@@ -76,7 +77,7 @@ def cells_of(found: Any) -> list[Cell]:
 
 def ids_table(found: Any) -> str:
     """Why each id is there, and between which means scores are measured."""
-    measures = {id: benchmark.measure_of_task(benchmark.task_of(id)) for id in ENTRIES}
+    measures = {id: measure_of_task(benchmark.task_of(id)) for id in ENTRIES}
     means = {(cell.id, cell.agent): f"{np.mean(cell.measure):.3g}" for cell in benchmark.read([REFERENCES])}
     lines = [
         [

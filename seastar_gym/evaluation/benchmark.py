@@ -75,7 +75,7 @@ def task_of(id: str) -> Task:
     """Task of an id, with the price of time of the benchmark."""
     task: Any = NAMED[str(IDS[id].task)]
     price = ENTRIES[id].price
-    return task if price is None else replace(task, reward=replace(task.reward, time=price))  # type: ignore[no-any-return]
+    return task if price is None else replace(task, reward=replace(task.reward, time=price))
 
 
 def make(id: str, n: int, split: Split = "train", threads: int | None = None, **more: Any) -> Batch:
@@ -137,7 +137,7 @@ class Cell(NamedTuple):
     curve: Sequence[Mapping[str, float]] = ()
 
 
-def swum(batch: Batch, policy: Policy, first: int = 0) -> dict[str, list[Any]]:
+def swum(batch: Batch, policy: Policy, first: int = 0) -> dict[str, Any]:
     """Measure, return and success of every test episode that the robots of a batch swim; closes the batch.
 
     first: Number of the first of them.
