@@ -1,7 +1,7 @@
 """Methods on the benchmark: the page's tables and pictures, from the cells that `agents.tasks --benchmark` trained.
 
 --references swims the greedy rules and the oracle instead, between which scores are measured: an id after the other,
-those that are missing or of another contract. --agreement measures how far returns agree with measures, by price of time.
+those that are missing or of another contract. --agreement correlates returns with measures, by price of time.
 """
 
 import subprocess
