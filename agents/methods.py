@@ -22,8 +22,7 @@ from stable_baselines3 import DQN, PPO, SAC
 from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.distillation import PAST
-from agents.ppo import make_model
-from agents.tasks import hyperparameters
+from agents.ppo import hyperparameters, make_model
 from seastar_gym import TASKS
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
