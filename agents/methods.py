@@ -22,8 +22,7 @@ from stable_baselines3 import DQN, PPO, SAC
 from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.distillation import PAST
-from agents.ppo import make_model
-from agents.tasks import hyperparameters
+from agents.ppo import hyperparameters, make_model
 from seastar_gym import TASKS
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
@@ -152,7 +151,7 @@ def batch_of(method: Method, track: Track, id: str, n: int, train: bool) -> Batc
 class Curve(BaseCallback):
     """Points of a learning curve. seconds: Processor time of the training so far [s], without that of the points."""
 
-    def __init__(self, marks: list[int], swim: Callable[[Any], dict[str, list[Any]]]):
+    def __init__(self, marks: list[int], swim: Callable[[Any], dict[str, Any]]):
         super().__init__()
         self._marks, self._swim, self._began = marks, swim, time.process_time()
         self.points: list[dict[str, float]] = []
@@ -169,7 +168,7 @@ class Curve(BaseCallback):
     def _on_step(self) -> bool:
         return True
 
-    def point(self) -> dict[str, list[Any]]:
+    def point(self) -> dict[str, Any]:
         """Swim the test episodes now, and note their means."""
         seconds, before = self.seconds, time.process_time()
         found = self._swim(self.model)
@@ -185,7 +184,7 @@ def train_cell(method: str, track: Track, id: str, seed: int, decisions: int, fi
     learner = METHODS[method]
     model = learner.build(BatchVecEnv(batch_of(learner, track, id, learner.robots, True)), id, seed)
 
-    def swim(model: Any) -> dict[str, list[Any]]:
+    def swim(model: Any) -> dict[str, Any]:
         return swum_by(batch_of(learner, track, id, EPISODES, False), model)
 
     curve = Curve([mark for mark in CURVE if mark < decisions], swim)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 import gymnasium as gym
@@ -160,6 +160,25 @@ class Hyperparameters:
     def _seconds(self) -> float:
         """Time between decisions [s]."""
         return 1.0 if self.decision_period is None else self.decision_period
+
+
+OWN: dict[str, dict[str, Any]] = {
+    "miswired": {"discount": 0.9},
+    "prey": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
+    "fast-prey": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
+    "station": {"discount": 0.9},
+    "fail-blind": {"discount": 0.9},
+    "obst-trap": {"discount": 0.95},
+    "prizes": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
+    "fast-prizes": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
+    "sim-to-real": {"discount": 0.3, "gae_lambda": 0.95},
+}
+"""Hyperparameters that differ from the project's, by task: prey and prizes are met after many seconds."""
+
+
+def hyperparameters(task: str, decision_period: float) -> Hyperparameters:
+    """Those of the project, with the horizon of the task."""
+    return replace(Hyperparameters(), decision_period=decision_period, **OWN[task])
 
 
 Floats = NDArray[np.floating[Any]]

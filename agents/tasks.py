@@ -14,7 +14,7 @@ import shlex
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from stable_baselines3 import PPO
 
 from agents.cards import training_facts
 from agents.distillation import ENOUGH, PAST, distil
-from agents.ppo import Hyperparameters, make_model, policy_of
+from agents.ppo import Hyperparameters, hyperparameters, make_model, policy_of
 from agents.run import versions_and_machine
 from seastar_gym import TASKS, SmaPulse
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
@@ -41,19 +41,6 @@ from seastar_gym.evaluation.swim import HELD_OUT_SEED
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
-
-OWN: dict[str, dict[str, Any]] = {
-    "miswired": {"discount": 0.9},
-    "prey": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
-    "fast-prey": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
-    "station": {"discount": 0.9},
-    "fail-blind": {"discount": 0.9},
-    "obst-trap": {"discount": 0.95},
-    "prizes": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
-    "fast-prizes": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
-    "sim-to-real": {"discount": 0.3, "gae_lambda": 0.95},
-}
-"""Hyperparameters that differ from the project's, by task: prey and prizes are met after many seconds."""
 
 IMITATION = "imitation"
 """Learner that imitates the bundled policy of waypoints, which sees the true state, see `agents.distillation`."""
@@ -94,11 +81,6 @@ class Options:
         require_count("decisions", self.decisions, 1, 10**9)
         if not self.seeds:
             raise ValueError("There must be at least one seed.")
-
-
-def hyperparameters(task: str, decision_period: float) -> Hyperparameters:
-    """Those of the project, with the horizon of the task."""
-    return replace(Hyperparameters(), decision_period=decision_period, **OWN[task])
 
 
 def training_batch(id: str, fidelity: Fidelity, threads: int | None, told_the_way: bool = False) -> VectorFrameStack:

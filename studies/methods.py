@@ -1,22 +1,27 @@
 """Methods on the benchmark: the page's tables and pictures, from the cells that `agents.tasks --benchmark` trained.
 
 --references swims the greedy rules and the oracle instead, between which scores are measured: an id after the other,
-those that are missing or of another contract.
+those that are missing or of another contract. --agreement correlates returns with measures, by price of time.
 """
 
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from agents.tasks import file_of
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.learned import load
 from seastar_gym.evaluation import benchmark
 from seastar_gym.evaluation.benchmark import ENTRIES, EPISODES, GREEDY, ORACLE, REFERENCES, Cell, contract
+from seastar_gym.evaluation.rollout import measure_of_task
 from studies.frame import Results, Study, rounded
 from studies.oracle import Oracle
-from studies.pages import markdown
+from studies.pages import markdown, show
 from studies.provenance import provenance
 from studies.tasks import greedy
 
@@ -25,14 +30,16 @@ AGENTS = {GREEDY: greedy, ORACLE: Oracle}
 
 @dataclass(frozen=True)
 class Options:
-    """Which cells are read, or whether references are swum."""
+    """Which cells are read, or whether references or agreement are swum instead."""
 
     cells: Path = Path("runs/benchmark")
     """Folder of the cells."""
     references: bool = False
     """Swim the greedy rules and the oracle, and write them into the package."""
+    agreement: bool = False
+    """Correlate returns with measures, of ids with a price of time."""
     ids: tuple[str, ...] = tuple(ENTRIES)
-    """Environments of the references."""
+    """Environments that are swum."""
 
     def __post_init__(self) -> None:
         benchmark.require_ids(self.ids)
@@ -42,22 +49,70 @@ def swim_references(ids: Sequence[str], file: Path = REFERENCES) -> None:
     """Swim what is missing of greedy rules and oracle, and write the file after each."""
     known = [cell for cell in benchmark.read([file]) if cell.contract == contract(cell.id)] if file.is_file() else []
     commit = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True).stdout.strip()
-    for id in ids:
-        for agent, make_agent in AGENTS.items():
-            if (agent, id) in {(cell.agent, cell.id) for cell in known}:
-                continue
-            batch = benchmark.make(id, EPISODES, "test", 1)
-            swum = benchmark.swum(batch, make_agent(batch))
-            known.append(Cell(agent, "plain", id, 0, contract(id), 0, **swum))
-            about = provenance("python -m studies.methods --references") | {"commit": commit}
-            benchmark.write(known, file, **about)
-            print(f"{id}, {agent}: {np.mean(swum['measure']):.4g}, return {np.mean(swum['returns']):.4g}", flush=True)
+    for (agent, make_agent), id in product(AGENTS.items(), ids):
+        if (agent, id) in {(cell.agent, cell.id) for cell in known}:
+            continue
+        batch = benchmark.make(id, EPISODES, "test", 1)
+        swum = benchmark.swum(batch, make_agent(batch))
+        known.append(Cell(agent, "plain", id, 0, contract(id), 0, **swum))
+        about = provenance("python -m studies.methods --references") | {"commit": commit}
+        benchmark.write(known, file, **about)
+        print(f"{id}, {agent}: {np.mean(swum['measure']):.4g}, return {np.mean(swum['returns']):.4g}", flush=True)
+
+
+class Perturbed:
+    """Policy that takes a share of its actions at random."""
+
+    batched = True
+
+    def __init__(self, policy: Policy, share: float, n_actions: int):
+        self._policy, self._share, self._n, self._rng = policy, share, n_actions, np.random.default_rng(0)
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> Any:
+        """Actions and state of the policy, some actions at random."""
+        actions, state = self._policy.predict(observation, state, episode_start, deterministic)
+        at_random = self._rng.random(len(actions)) < self._share
+        return np.where(at_random, self._rng.integers(self._n, size=len(actions)), actions), state
+
+
+SHARES, PRICES = (0.0, 0.1, 0.3, 0.5), (0.0, 1.0)
+
+
+def agreement(id: str) -> list[str]:
+    """Correlation of return and measure by price of time, over all episodes of `SHARES` and of both agents.
+
+    In brackets that over solved ones. Time of unsolved episodes is the limit, as in the measure.
+    """
+    found, price = [], ENTRIES[id].price or 0.0
+    for share, is_bundled in product(SHARES, (False, True)):
+        bundled = load(file_of(id)) if is_bundled else None
+        batch = benchmark.make(id, EPISODES, "test", 1, **({} if bundled is None else {"actions": bundled.actions}))
+        space: Any = batch.single_action_space
+        swum = benchmark.swum(batch, Perturbed(bundled or greedy(batch), share, int(space.n)))
+        found.append([swum[name] for name in ("measure", "returns", "success")])
+    measure, returns, success = (np.concatenate(column) for column in zip(*found, strict=True))
+    told = []
+    for other in PRICES:
+        paid = returns + (price - other) * measure
+        every, solved = (np.corrcoef(paid[of], measure[of])[0, 1] for of in (slice(None), success))
+        told.append(f"{every:.2f} ({solved:.2f})")
+    return told
 
 
 def run(options: Options, results: Results) -> str | None:
-    """Put the cells of all files together, or swim the references."""
+    """Put the cells of all files together, or swim the references, or the agreement."""
     if options.references:
         swim_references(options.ids)
+        return None
+    if options.agreement:
+        ids = [id for id in options.ids if ENTRIES[id].price is not None]
+        show(
+            markdown(
+                ["id", *(f"{price:g} per second" for price in PRICES)], [[f"`{id}`", *agreement(id)] for id in ids]
+            )
+        )
         return None
     cells = benchmark.read(sorted(options.cells.glob("*/*/*.json")))
     if not cells:
@@ -76,7 +131,7 @@ def cells_of(found: Any) -> list[Cell]:
 
 def ids_table(found: Any) -> str:
     """Why each id is there, and between which means scores are measured."""
-    measures = {id: benchmark.measure_of_task(benchmark.task_of(id)) for id in ENTRIES}
+    measures = {id: measure_of_task(benchmark.task_of(id)) for id in ENTRIES}
     means = {(cell.id, cell.agent): f"{np.mean(cell.measure):.3g}" for cell in benchmark.read([REFERENCES])}
     lines = [
         [

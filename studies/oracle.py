@@ -89,7 +89,7 @@ class Oracle:
             if decision < search.depth:
                 kept = np.argsort(total, axis=1)[:, : search.beam]
                 states = ends.of_robots((each * width + kept).reshape(-1))
-                first, total = (np.repeat(values[each, kept], k, axis=1) for values in (first, total))
+                first, total = np.repeat(first[each, kept], k, axis=1), np.repeat(total[each, kept], k, axis=1)
         return np.asarray(first[each[:, 0], np.argmin(total, axis=1)])
 
     def _simulator(self, copies: int) -> Simulator:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Sequence
+from types import FrameType
 from typing import Any
 
 import gymnasium as gym
@@ -170,9 +171,9 @@ class BatchVecEnv(VecEnv):
 
 def _warn_of_long_rollouts(n_robots: int) -> None:
     """Warn the learner that resets a batch, if one does, where its rollout is so long that it hardly updates."""
-    frame = sys._getframe(1)
-    while frame.f_back is not None:
-        frame, learner = frame.f_back, frame.f_back.f_locals.get("self")
+    frame: FrameType | None = sys._getframe(1)
+    while (frame := frame and frame.f_back) is not None:
+        learner = frame.f_locals.get("self")
         if isinstance(learner, OnPolicyAlgorithm):
             if learner.n_steps * n_robots > LONGEST_ROLLOUT:
                 gym.logger.warn(

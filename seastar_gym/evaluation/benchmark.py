@@ -22,9 +22,11 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.controllers.registry import load_agent
 from seastar_gym.envs import IDS
 from seastar_gym.envs.robots import SIZES, Split, Task
+from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.envs.tasks import NAMED
 from seastar_gym.evaluation.results import (
     Estimate,
@@ -73,7 +75,7 @@ def task_of(id: str) -> Task:
     """Task of an id, with the price of time of the benchmark."""
     task: Any = NAMED[str(IDS[id].task)]
     price = ENTRIES[id].price
-    return task if price is None else replace(task, reward=replace(task.reward, time=price))  # type: ignore[no-any-return]
+    return task if price is None else replace(task, reward=replace(task.reward, time=price))
 
 
 def make(id: str, n: int, split: Split = "train", threads: int | None = None, **more: Any) -> Batch:
@@ -135,7 +137,7 @@ class Cell(NamedTuple):
     curve: Sequence[Mapping[str, float]] = ()
 
 
-def swum(batch: Batch, policy: Policy, first: int = 0) -> dict[str, list[Any]]:
+def swum(batch: Batch, policy: Policy, first: int = 0) -> dict[str, Any]:
     """Measure, return and success of every test episode that the robots of a batch swim; closes the batch.
 
     first: Number of the first of them.
@@ -151,24 +153,27 @@ def swum(batch: Batch, policy: Policy, first: int = 0) -> dict[str, list[Any]]:
     }  # fmt: skip
 
 
-def measured(id: str, agent: str, names: Sequence[str], first: int = 0, threads: int | None = None) -> list[Cell]:
+def measured(
+    id: str, agent: str, names: Sequence[str], first: int = 0, threads: int | None = None, track: Track = "plain"
+) -> list[Cell]:
     """Cells of an agent: what each of its policies reaches.
 
-    names: Names of policies as of `load_agent`, such as one file for each seed. ValueError for one that does not fit.
+    names: Names of policies as of `load_agent`, such as one file for each seed. track: Of policies that
+    do not say it, such as models of Stable-Baselines3: "symmetric" puts them behind `VectorSymmetryReduction`, as they
+    were trained. ValueError for one that does not fit.
     """
     env, cells = env_of(id, task=task_of(id), split="test", fidelity=FIDELITY), list[Cell]()
     for seed, name in enumerate(names):
         policy = load_agent(name, env)
         batch = make(id, EPISODES, "test", threads, actions=require_seen(policy, env))
-        cells.append(Cell(agent, track_of(policy), id, seed, contract(id), first, **swum(batch, policy, first)))
+        own = track
+        if isinstance(policy, LearnedPolicy):
+            own = "symmetric" if policy.description.symmetry else "plain"
+        elif track == "symmetric":
+            batch = VectorSymmetryReduction(batch)
+        cells.append(Cell(agent, own, id, seed, contract(id), first, **swum(batch, policy, first)))
     env.close()
     return cells
-
-
-def track_of(policy: Policy) -> Track:
-    """Track of a policy, as its description says, or its attribute `symmetric`; plain if it says nothing."""
-    says = getattr(getattr(policy, "description", policy), "symmetry", getattr(policy, "symmetric", False))
-    return "symmetric" if says is True else "plain"
 
 
 REFERENCES = Path(__file__).with_name("references.json")

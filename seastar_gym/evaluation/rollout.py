@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import Policy, actions_in, require_fit, require_policy
 from seastar_gym.controllers.search import Searcher
+from seastar_gym.envs import IDS
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.instances import Split
 from seastar_gym.envs.layout import Layout
@@ -242,10 +243,14 @@ def make_task(task: str, /, **arguments: Any) -> gym.Env[Any, Any]:
 
 def held_out(task: str, fidelity: Fidelity | None = None, split: Split = "test") -> dict[str, Any]:
     """Arguments that keep a task to the episodes of a split, where it has splits; by default those that no training
-    draws. fidelity: None means the task's own."""
-    return ({"split": split} if "task" in spec_of(task).kwargs else {}) | (
-        {} if fidelity is None else {"fidelity": fidelity}
-    )
+    draws. The package's ids of waypoints swim random paths: those that they begin with are one episode.
+
+    fidelity: None means the task's own."""
+    spec = spec_of(task)
+    is_swim = spec.id in IDS and IDS[spec.id].task is None
+    drawn = {"path": "random", "random_heading": True} if is_swim else {}
+    has_splits = is_swim or "task" in spec.kwargs
+    return drawn | ({"split": split} if has_splits else {}) | ({} if fidelity is None else {"fidelity": fidelity})
 
 
 def env_of(task: str, /, **arguments: Any) -> Any:

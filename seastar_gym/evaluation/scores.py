@@ -86,7 +86,7 @@ def measured(
     columns: Any = map(list, zip(*(found[seed] for seed in sorted(found)), strict=True))
     trainings = sum(is_file(name) or learned_file(name) is not None for name in names[:seeds])
     what = task, label, fidelity, measure.name, measure.unit, measure.better
-    return Scores(*what, sorted(found), *columns, trainings=trainings)
+    return Scores(*what, sorted(found), *columns)._replace(trainings=trainings)
 
 
 def as_text(found: Sequence[Scores]) -> str:

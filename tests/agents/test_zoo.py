@@ -21,7 +21,7 @@ IDS = [name for name in SETTINGS if name.endswith("-v0")]
 
 def ours(id):
     """Hyperparameters of the project for an id."""
-    from agents.tasks import OWN
+    from agents.ppo import OWN
 
     row = seastar_gym.IDS[id]
     if row.task is not None:

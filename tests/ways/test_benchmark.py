@@ -4,12 +4,12 @@ import json
 
 from ways.story import command
 
-CELL = "--methods PPO --tracks plain --ids SeastarStation-v0 --decisions 4096 --processes 1"
+CELL = "--methods PPO --tracks symmetric --ids SeastarStation-v0 --decisions 4096 --processes 1"
 
 
 def test_a_row_is_trained_after_a_stop_evaluated_and_merged(story):
     train = f"python -m agents.tasks --benchmark {CELL}"
-    files = [story.folder / f"runs/benchmark/4096/ppo-plain/SeastarStation-v0-{seed}.json" for seed in (0, 1)]
+    files = [story.folder / f"runs/benchmark/4096/ppo-symmetric/SeastarStation-v0-{seed}.json" for seed in (0, 1)]
     story.types(f"{train} --seeds 0 1", ends=130, stop=files[0].is_file)
     assert files[0].is_file() and not files[1].is_file()
     first = files[0].read_bytes()
@@ -17,7 +17,7 @@ def test_a_row_is_trained_after_a_stop_evaluated_and_merged(story):
     assert "1 cells to train" in story.told and files[0].read_bytes() == first and files[1].is_file()
     evaluate = command("docs/benchmark.md", "seastar evaluate --benchmark --agents").partition("--agents")[0]
     zips = ",".join(str(file.with_suffix(".zip").relative_to(story.folder)) for file in files)
-    story.types(f"{evaluate} --task SeastarStation-v0 --agents mine={zips} --out runs/mine")
+    story.types(f"{evaluate} --task SeastarStation-v0 --agents mine={zips} --track symmetric --out runs/mine")
     mine = json.loads((story.folder / "runs/mine/benchmark.json").read_text())["cells"]
     trained = [json.loads(file.read_text())["cells"][0] for file in files]
     assert [one["measure"] for one in mine] == [one["measure"] for one in trained]

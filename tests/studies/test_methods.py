@@ -1,0 +1,39 @@
+"""The study of the benchmark: a page from cells, and an oracle that is told what is hidden."""
+
+import numpy as np
+
+from seastar_gym.evaluation import benchmark
+from seastar_gym.evaluation.benchmark import Cell
+from studies.command import main
+from studies.methods import AGENTS, ids_table, rows_table
+
+PREY = "SeastarPreyTimed-v0"
+
+
+def test_cells_become_a_file_a_picture_and_a_table(tmp_path, monkeypatch, capsys):
+    assert main(["methods", "--cells", str(tmp_path), "--out", str(tmp_path / "page")]) == 1
+    assert "There are no cells" in capsys.readouterr().err
+    monkeypatch.setattr(benchmark, "scales", lambda: {PREY: (0.0, 8.0)})
+    for seed in range(3):
+        curve = [{"decisions": 10, "seconds": 1.0, "measure": 1.0}, {"decisions": 20, "seconds": 2.0, "measure": 4.0}]
+        cell = Cell("PPO", "plain", PREY, seed, "a", 0, [4.0 + seed], [1.0], [True], 20, 2.0, curve)
+        file = tmp_path / f"20/ppo-plain/{PREY}-{seed}.json"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        benchmark.write([cell], file)
+    assert main(["methods", "--cells", str(tmp_path), "--out", str(tmp_path / "page")]) == 0
+    assert {file.name for file in (tmp_path / "page").iterdir()} == {"benchmark.json", "curves.png"}
+    assert "| PPO | 5 [4, 6] (3) | 0.625 [0.5, 0.75] |" in capsys.readouterr().out
+    assert rows_table({}) == "No row is trained yet." and all(id in ids_table({}) for id in benchmark.ENTRIES)
+
+
+def test_an_oracle_keeps_a_station_better_than_the_greedy_rule():
+    ends = {}
+    for agent, make_agent in AGENTS.items():
+        batch = benchmark.make("SeastarStation-v0", 4, "test", 1)
+        policy = make_agent(batch)
+        observations, info = batch.reset(seed=0)
+        for _ in range(15):
+            observations, *_, info = batch.step(policy.predict(observations)[0])
+        ends[agent] = info["distance"]
+        batch.close()
+    assert np.mean(ends["oracle"]) < 0.6 * np.mean(ends["greedy"])
