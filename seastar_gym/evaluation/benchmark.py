@@ -25,7 +25,8 @@ from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.controllers.registry import load_agent
 from seastar_gym.envs import IDS
-from seastar_gym.envs.robots import SIZES, Split, Task
+from seastar_gym.envs.instances import SIZES, Split
+from seastar_gym.envs.robots import Task
 from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.envs.tasks import NAMED
 from seastar_gym.evaluation.results import (

@@ -19,7 +19,8 @@ import gymnasium as gym
 
 from seastar_gym.envs import ENVIRONMENTS
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.robots import Split, Task
+from seastar_gym.envs.instances import Split
+from seastar_gym.envs.robots import Task
 from seastar_gym.envs.tasks.hidden import FailBlind, Miswired, SimToReal
 from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.envs.tasks.prey import Prey
