@@ -225,7 +225,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "Hyperparameters": dict(vars(training())),
         "make_model": dict(env=training_env(), hyperparameters=training(), seed=0),
         "make_training_env": dict(hyperparameters=training(), path=PATH, random_heading=False, scene=FAST, threads=1,
-                                  actions="pairs", randomization=None),
+                                  actions="pairs", fidelity=None, randomization=None),
         "read_deeplabcut": dict(file=tracked(DEEPLABCUT), rate=30.0),
         "read_motive": dict(file=tracked(MOTIVE)),
         "read_table": dict(file=tracked("time,x,y\n0,1,2\n")),

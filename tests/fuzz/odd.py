@@ -81,9 +81,9 @@ MADE: Calls = {
     "SeastarSwimEnv": (SeastarSwimEnv, dict(
         path="line", fidelity="fast", scene=SCENE, frames_per_stroke=2, randomization=DENSITIES, decision_period=1.0,
         observe_actuators=True, headings=HeadingTargets(), sight=Sight(), action_delay=1.0)),
-    "SeastarSwimVectorEnv": (SeastarSwimVectorEnv, dict(
+    "SeastarSwimVectorEnv": (SeastarSwimVectorEnv, complete(SeastarSwimEnv, dict(
         num_envs=2, max_episode_steps=3, path="line", actions="pairs", fidelity="fast", scene=SCENE,
-        random_heading=True, threads=1)),
+        random_heading=True, threads=1))),
 }  # fmt: skip
 PARTS: Calls = {name: (make, complete(make, given)) for name, (make, given) in MADE.items()}
 """What is made, and arguments with which it can be."""
