@@ -32,8 +32,8 @@ from seastar_gym.controllers.registry import task_of
 from seastar_gym.controllers.search import turned
 from seastar_gym.envs.commands import Discrete, command_table
 from seastar_gym.envs.layout import Layout
-from seastar_gym.envs.options import RewardWeights
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
+from seastar_gym.envs.rewards import RewardWeights
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction, observed_mirror
 from seastar_gym.envs.vector import SeastarSwimVectorEnv

@@ -57,12 +57,12 @@ from .accuracy.chapters import scene_for as scene_for
 from .accuracy.measure import certify as certify
 from .envs import IDS as IDS
 from .envs import TASKS as TASKS
-from .envs.options import HeadingTargets as HeadingTargets
-from .envs.options import RewardWeights as RewardWeights
+from .envs.headings import HeadingTargets as HeadingTargets
 from .envs.randomization import DomainRandomization as DomainRandomization
 from .envs.randomization import LogUniform as LogUniform
 from .envs.randomization import Normal as Normal
 from .envs.randomization import Uniform as Uniform
+from .envs.rewards import RewardWeights as RewardWeights
 from .envs.sight import Sight as Sight
 from .envs.symmetry import SymmetryReduction as SymmetryReduction
 from .envs.symmetry import VectorSymmetryReduction as VectorSymmetryReduction

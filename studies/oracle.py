@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import command_table
-from seastar_gym.envs.options import RewardWeights
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.randomization import drawn_scene
+from seastar_gym.envs.rewards import RewardWeights
 from seastar_gym.envs.robots import Robots
 from seastar_gym.envs.tasks.hidden import FailBlind
 from seastar_gym.envs.tasks.prey import Courses, Prey, Pursuit

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.learned import bundled_file, load
-from seastar_gym.envs.options import wrapped
+from seastar_gym.envs.headings import wrapped
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.rendering import limb_nodes
 from seastar_gym.envs.stations import heading_of

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from seastar_gym import TASKS
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.search import Searcher, displacement_map, waypoints_of
-from seastar_gym.envs.options import RewardWeights
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
+from seastar_gym.envs.rewards import RewardWeights
 from seastar_gym.envs.tasks.obst_trap import ObstTrap, rims
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.envs.tasks.prizes import Prizes

@@ -32,9 +32,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.controllers.contract import can_be_decided_by, observed, starts
 from seastar_gym.envs.commands import Actions, checked_decision_period, command_table, decisions_in
+from seastar_gym.envs.headings import HeadingTargets, wrapped
 from seastar_gym.envs.layout import HEADINGS, N_STATIONS, OBSERVATION_LAYOUT, VELOCITY_SCALE, Layout, memory_size
-from seastar_gym.envs.options import HeadingTargets, RewardWeights, make_scene, wrapped
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
+from seastar_gym.envs.rewards import RewardWeights
 from seastar_gym.envs.stations import body_heading, heading_of, node_weights, of_beginning
 from seastar_gym.files import beside
 from seastar_gym.gaits import evolved_gaits

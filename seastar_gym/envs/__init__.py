@@ -2,7 +2,8 @@
 
 In come actions, out go observations and rewards. An environment (seastar_swim.py, vector.py) holds robots (robots.py),
 which ask a task where its targets are and how a decision is scored: `AlongPath` in waypoints.py, or those of `tasks`.
-The terms of rewards are in options.py.
+The terms of rewards are in rewards.py, and
+`Robots` adds them up.
 
 `SeastarSwim-v0`, the same with continuous commands, the timed environments that decide several times a second, one that
 asks for headings, and the tasks of `seastar_gym.envs.tasks`: every id is a row of `IDS`.

@@ -18,9 +18,9 @@ from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, action_space, command_table
+from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.instances import Split
 from seastar_gym.envs.layout import Layout
-from seastar_gym.envs.options import HeadingTargets
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.robots import Robots, Task
 from seastar_gym.envs.sight import Drawn, Sight

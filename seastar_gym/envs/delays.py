@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.envs.headings import wrapped
 from seastar_gym.envs.layout import N_STATIONS, VELOCITY_SCALE
 from seastar_gym.envs.observation import lengths_of, pictures_of
-from seastar_gym.envs.options import wrapped
 from seastar_gym.envs.randomization import Distribution
 from seastar_gym.envs.sight import Drawn, Sees, bounds_of, stations_seen
 from seastar_gym.scene.actuators.base import Actuator, WirePair

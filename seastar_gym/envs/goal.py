@@ -11,7 +11,7 @@ from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
-from seastar_gym.envs.options import wrapped
+from seastar_gym.envs.headings import wrapped
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.envs.symmetry import SymmetryReduction

@@ -23,8 +23,9 @@ from seastar_gym.envs.delays import Lag, Piece, Tracker
 from seastar_gym.envs.instances import SIZES, Split, generator_of, keep, numbers_of
 from seastar_gym.envs.layout import N_STATIONS, Entry, Layout
 from seastar_gym.envs.observation import axes_of, lengths_of, observed_rows, rows_on_device, to_float32
-from seastar_gym.envs.options import SwimOptions, pulses_of
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.randomization import ACTION_DELAY, LIMB_STRENGTHS, DomainRandomization, drawn_scene
+from seastar_gym.envs.rewards import pulses_of
 from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.sight import Lateness, Sees, Sight, bounds_of, entries_of, stations_seen
 from seastar_gym.scene import Scene

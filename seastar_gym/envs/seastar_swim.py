@@ -14,11 +14,13 @@ from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.envs import IDS
 from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
 from seastar_gym.envs.commands import Actions, sampling_mask
+from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.instances import Split
-from seastar_gym.envs.options import HeadingTargets, Plain, RewardWeights
+from seastar_gym.envs.options import Plain
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.rendering import BatchPictures, Frame
+from seastar_gym.envs.rewards import RewardWeights
 from seastar_gym.envs.robots import Robots, Task
 from seastar_gym.envs.sight import Drawn, Sight
 from seastar_gym.envs.vector import FRAMES_PER_SECOND, ManyRobotsEnv, swimmers

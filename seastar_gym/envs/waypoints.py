@@ -1,7 +1,7 @@
 """Swims along waypoints: what tasks along a path have in common, and that of `SeastarSwim-v0`.
 
-What is left to swim is the length of the rewarded route, see `seastar_gym.envs.options`; what is left to turn is known
-by the shortest way round, from one asked heading to the next, see `seastar_gym.envs.options`.
+What is left to swim is the length of the rewarded route, see `rewards.py`; what is left to turn is known
+by the shortest way round, from one asked heading to the next, see `headings.py`.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.envs.headings import HeadingTargets, wrapped
 from seastar_gym.envs.layout import HEADINGS, Entry
-from seastar_gym.envs.options import HeadingTargets, RewardWeights, Weights, reward_terms, wrapped
 from seastar_gym.envs.paths import FARTHEST, WAYPOINT_RADIUS, cross_track_error, make_path, shortest_way
+from seastar_gym.envs.rewards import RewardWeights, Weights, reward_terms
 from seastar_gym.envs.robots import Flags, Floats, Robots, Score, Task
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_float, require_flag, require_kind, require_number, shown

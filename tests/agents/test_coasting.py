@@ -5,7 +5,8 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from later import Later
-from seastar_gym.envs.options import RewardWeights, make_scene
+from seastar_gym.envs.options import make_scene
+from seastar_gym.envs.rewards import RewardWeights
 from seastar_gym.envs.stations import body_heading
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.simulator import Simulator

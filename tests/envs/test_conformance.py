@@ -46,7 +46,7 @@ from seastar_gym import (
     Water,
 )
 from seastar_gym.accuracy.chapters import NAMES
-from seastar_gym.envs.options import pulses_of
+from seastar_gym.envs.rewards import pulses_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.lanes.registers import N_LANES

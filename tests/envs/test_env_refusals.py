@@ -29,10 +29,11 @@ from seastar_gym import (
 from seastar_gym.envs.attributes import checked_options
 from seastar_gym.envs.commands import action_space, choices, command_table, to_commands
 from seastar_gym.envs.goal import GoalForm
+from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.layout import Layout
-from seastar_gym.envs.options import HeadingTargets, RewardWeights
 from seastar_gym.envs.paths import PATHS, make_path, register_path
 from seastar_gym.envs.rendering import Frame, Renderer
+from seastar_gym.envs.rewards import RewardWeights
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.sight import TEMPLATE, read_camera
 from seastar_gym.envs.symmetry import Symmetry, VectorFrameStack, VectorSymmetryReduction, memory_mirror

@@ -13,9 +13,10 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.envs.headings import wrapped
 from seastar_gym.envs.layout import VELOCITY_SCALE
-from seastar_gym.envs.options import RewardWeights, wrapped
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, LogUniform, Uniform
+from seastar_gym.envs.rewards import RewardWeights
 from seastar_gym.envs.robots import Flags, Floats, Robots, Score
 from seastar_gym.envs.scenery import Scenery
 from seastar_gym.envs.sight import Sight

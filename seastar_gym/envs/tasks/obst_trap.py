@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.options import RewardWeights
+from seastar_gym.envs.rewards import RewardWeights
 from seastar_gym.envs.robots import Floats, Robots, Score
 from seastar_gym.envs.scenery import Ring, Scenery
 from seastar_gym.envs.waypoints import Waypoints

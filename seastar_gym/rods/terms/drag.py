@@ -1,5 +1,7 @@
 """Quadratic drag (13.8): F = -c |w| w with c = 1/2 rho_f C_d D dl_i, from the dissipation potential c |w|^3 / 3.
 
+`drag_slopes` is this law; `node_slopes` in potential.py adds it to the other terms of a node.
+
 w = v - u is a node's velocity relative to the fluid. With a coefficient C_t < C_d of its own for flow along a limb,
 c has C_t for C_d, and the flow across each edge that a node ends adds -c_n |w_n| w_n n, w_n = w n, from the potential
 c_n |w_n|^3 / 3: half the edge belongs to the node, so c_n = 1/2 rho_f (C_d - C_t) D l/2. Across a limb the two make

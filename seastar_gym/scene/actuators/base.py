@@ -233,7 +233,7 @@ class WirePair(ActuatorBase):
         rest = np.broadcast_to(self.rest, (n_robots, 1, self.rest.shape[-1]))
         return self.respond(from_start, np.ones((n_robots, 1)), rest)[0][1:].reshape(*t.shape, n_robots)
 
-    def _left(self, t: Floats, commands: Floats, state: Floats) -> Floats:
+    def _seconds_to_heat(self, t: Floats, commands: Floats, state: Floats) -> Floats:
         """Time for which every wire is heated from t[0] on [s], shape (*S, 2).
 
         Commands that are new at t[0] = 0 heat the wire of their sign.
@@ -250,4 +250,4 @@ class WirePair(ActuatorBase):
 
     def seconds_heated(self, t: Floats, commands: Floats, state: Floats) -> Floats:
         """Time for which the wires of each limb are heated from t[0] to t[-1] [s], shape of `commands`."""
-        return np.asarray(np.minimum(self._left(t, commands, state), t[-1] - t[0]).sum(axis=-1))
+        return np.asarray(np.minimum(self._seconds_to_heat(t, commands, state), t[-1] - t[0]).sum(axis=-1))

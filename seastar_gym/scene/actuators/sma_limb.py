@@ -191,7 +191,7 @@ class SmaLimb(WirePair):
 
     def _pulse(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
         """Time from t[0] until every wire is heated, and time for which it is heated then [s], shape (*S, 2) each."""
-        left = self._left(t, commands, state)
+        left = self._seconds_to_heat(t, commands, state)
         return np.where((left > 0.0) & (state[..., 4:] == 0.0), self.delay, state[..., 2:4]), left
 
     def observe(self, state: Floats) -> Floats:

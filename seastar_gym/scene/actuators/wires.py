@@ -1,5 +1,6 @@
 """Wires of shape memory alloy, two for every limb: `SmaWires` with the linear heating and cooling of Fig. 13.5b, and
-`ThermalSma` with temperatures, by Joule heating, cooling in water and hysteresis.
+`ThermalSma` with temperatures, by Joule heating, cooling in water and hysteresis. The default of strokes, `SmaPulse`,
+has no wires to remember, see curves.py.
 
 `ThermalSma`: every limb has two wires, one for each direction of rotation. A command heats the wire of its sign for a
 fraction of the heating time (pulse width), from now on, however warm it is; the other wire goes on with what is left of
@@ -99,14 +100,14 @@ class SmaWires(WirePair):
 
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
         """Rotations and state as in `ActuatorBase`, exact at all times t."""
-        since, left = t - t[0], self._left(t, commands, state)
+        since, left = t - t[0], self._seconds_to_heat(t, commands, state)
         contraction = self._contraction(since.reshape(-1, *(1,) * left.ndim), state[..., :2], left)
         turned = column(self.peak_angle) * (contraction[..., 0] - contraction[..., 1])
         return turned, np.concatenate([contraction[-1], self._left_after(since[-1], left)], axis=-1)
 
-    def _left(self, t: Floats, commands: Floats, state: Floats) -> Floats:
+    def _seconds_to_heat(self, t: Floats, commands: Floats, state: Floats) -> Floats:
         heard = np.where(self.refractory_wires(state)[..., 0], 0.0, commands) if self.refractory else commands
-        return super()._left(t, heard, state)
+        return super()._seconds_to_heat(t, heard, state)
 
     def _contraction(self, since: Floats, before: Floats, left: Floats) -> Floats:
         """Contraction of wires after times `since` [s], from the one `before`, if they are heated for `left` [s]."""
@@ -209,7 +210,7 @@ class ThermalSma(HeatingAndCooling, WirePair):
 
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
         """Rotations and state as in `ActuatorBase`, exact at all times t."""
-        heated, t = self._left(t, commands, state), t - t[0]
+        heated, t = self._seconds_to_heat(t, commands, state), t - t[0]
         tau, cold = column(self.time_constant, 2), column(self.water_temperature, 2)
         hot = cold + column(self.steady_rise, 2)
         start, before = state[..., :2], state[..., 2:4]
@@ -228,8 +229,8 @@ class ThermalSma(HeatingAndCooling, WirePair):
         left = self._left_after(t[-1], heated)
         return turned, np.concatenate([temperature[-1], austenite[-1], left], axis=-1)
 
-    def _left(self, t: Floats, commands: Floats, state: Floats) -> Floats:
-        left = super()._left(t, commands, state)
+    def _seconds_to_heat(self, t: Floats, commands: Floats, state: Floats) -> Floats:
+        left = super()._seconds_to_heat(t, commands, state)
         return left if self.largest_temperature is None else np.minimum(left, self._time_to_limit(state[..., :2]))
 
     def _time_to_limit(self, temperature: Floats) -> Floats:
