@@ -255,7 +255,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def train_all() -> int | None:
         if "--benchmark" in given:
-            from agents.methods import BenchmarkOptions, train_cells  # needs sb3-contrib
+            from agents.methods import BenchmarkOptions, train_cells
 
             left = [word for word in given if word != "--benchmark"]
             return train_cells(tyro.cli(BenchmarkOptions, prog=f"{prog} --benchmark", args=left))
