@@ -32,9 +32,10 @@ from typing import Any, get_args
 import numpy as np
 
 from seastar_gym.controllers import learned
-from seastar_gym.controllers.contract import Policy, actions_of, require_fit
+from seastar_gym.controllers.contract import Policy, actions_of, is_batched, require_fit
 from seastar_gym.controllers.learned import reason_of
 from seastar_gym.controllers.open_loop import GAITS, scripted
+from seastar_gym.controllers.reduced import as_it_learned
 from seastar_gym.controllers.search import GreedyPolicy, Planner, gait_planner
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import OneRobotEnv, SeastarSwimEnv
@@ -82,13 +83,8 @@ def call_function(name: str, env: OneRobotEnv) -> Policy:
     policy = make(env)
     if not callable(getattr(policy, "predict", None)):
         raise ValueError(f"The agent {name!r} is a {type(policy).__name__}, which has no predict(observation, ...).")
-    return policy if _is_batched(policy) else RobotByRobot(policy)
-
-
-def _is_batched(policy: Any) -> bool:
-    """Whether a policy answers for many robots at once."""
-    third_party = {each.__module__.partition(".")[0] for each in type(policy).__mro__}
-    return bool(getattr(policy, "batched", not third_party.isdisjoint({"stable_baselines3", "sb3_contrib"})))
+    policy = as_it_learned(policy, lambda: env)
+    return policy if is_batched(policy) else RobotByRobot(policy)
 
 
 class RobotByRobot:
@@ -143,9 +139,10 @@ def is_model(path: str | Path) -> bool:
 
 
 def load_model(path: str | Path) -> Policy:
-    """The policy of any algorithm of Stable-Baselines3, trained on the plain environment. Unpickles: see above.
+    """The policy of any algorithm of Stable-Baselines3, as it is in the file. Unpickles: see above.
 
-    ValueError, with one sentence, if there is none in the file.
+    One that learned behind `VectorSymmetryReduction` is to be given reduced observations, see `ReducedPolicy`; agents
+    by name are behind it already. ValueError, with one sentence, if there is none in the file.
     """
     from stable_baselines3.common.save_util import load_from_zip_file
 
@@ -345,7 +342,9 @@ def _load_agent(
         return policy
     if is_function(name):
         return call_function(name, make_env())
-    return _load_file(name) if is_file(name) else _scripted(name, seed, decision_period, scene.robot.n_limbs)
+    if is_file(name):
+        return as_it_learned(_load_file(name), make_env)
+    return _scripted(name, seed, decision_period, scene.robot.n_limbs)
 
 
 def _scripted(name: str, seed: int, decision_period: float | None, n_limbs: int) -> Policy:
