@@ -20,6 +20,7 @@ import importlib
 import importlib.util
 import pickle
 import re
+import warnings
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
@@ -161,7 +162,22 @@ def load_model(path: str | Path) -> Policy:
         raise ValueError(f"{path} is damaged, or no model of Stable-Baselines3: {reason_of(unfit)}.") from unfit
     if not all(np.isfinite(one.cpu().numpy()).all() for one in policy.state_dict().values()):
         raise ValueError(f"{path} has weights that are not finite numbers.")
+    _warn_of_normalised(path, data)
     return policy
+
+
+def _warn_of_normalised(path: str | Path, data: dict[str, Any]) -> None:
+    """Warn where a model learned behind `VecNormalize`, whose statistics its file has not.
+
+    Learners on policy keep observations before normalisation there alone. Those with a replay buffer always do: their
+    files do not tell.
+    """
+    if data.get("_last_original_obs") is not None and "replay_buffer_class" not in data:
+        warnings.warn(
+            f"{path} learned behind VecNormalize: if that normalised observations, swim it by a module:function that "
+            "loads its statistics, too.",
+            stacklevel=2,
+        )
 
 
 def _no_learning(progress: float) -> Any:
