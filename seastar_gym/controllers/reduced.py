@@ -4,11 +4,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from gymnasium import spaces
+import gymnasium as gym
 
 from seastar_gym.controllers.contract import Policy, actions_in, is_batched, require_policy, sees_reduced
 from seastar_gym.controllers.learned import reason_of
 from seastar_gym.envs.symmetry import symmetry_in
+from seastar_gym.scene.checks import require_kind
 
 
 class ReducedPolicy:
@@ -25,6 +26,7 @@ class ReducedPolicy:
 
     def __init__(self, policy: Policy, env: Any):
         require_policy(policy)
+        require_kind("env", env, gym.Env | gym.vector.VectorEnv, "an environment or a batch")
         try:
             symmetry = symmetry_in(env)
         except ValueError as why:
@@ -34,7 +36,7 @@ class ReducedPolicy:
         self.batched = is_batched(policy)
         sees: Any = getattr(policy, "observation_space", None)
         if sees is not None:
-            self.observation_space = spaces.Box(sees.low, sees.high, sees.shape, sees.dtype)
+            self.observation_space = gym.spaces.Box(sees.low, sees.high, sees.shape, sees.dtype)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
