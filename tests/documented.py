@@ -195,6 +195,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "Symmetry": dict(group=5, mirror=(), layout=named("Layout")(5)),
         "VectorFrameStack": dict(env=batch(), past=1),
         "GoalForm": dict(env=env()),
+        "ReducedPolicy": dict(policy=straight(), env=env()),
         "LearnedPolicy": dict(description=learned().description, weights=learned().weights),
         "Planner": dict(scene=FAST, threads=1),
         "load": dict(path=bundled_file(None)),
@@ -252,7 +253,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     yield "register_path", name_of_path, dict(name="odd")
     yield "register_path", registered, dict(make=lambda rng: PATH)
     yield "run", ran, dict(cells=[], folder=folder(), executor=None, progress=None, at_once=1)
-    for policy in (straight(), learned(), named("RandomPolicy")(rng(0))):
+    for policy in (straight(), learned(), named("RandomPolicy")(rng(0)), named("ReducedPolicy")(straight(), env())):
         yield type(policy).__name__, policy.predict, dict(
             observation=observations(), state=None, episode_start=None, deterministic=True)  # fmt: skip
     yield "GreedyPolicy", named("GreedyPolicy")(FAST).choose, dict(observations=observations())

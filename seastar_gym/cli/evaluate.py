@@ -89,8 +89,6 @@ def parser() -> argparse.ArgumentParser:
     tasks.add_argument("--decisions", type=int, help="time limit [decisions] (default: that of the task)")
     tasks.add_argument("--benchmark", nargs="?", const="test", choices=tuple(benchmark.FIRST),
                        help="the protocol of docs/benchmark.md; check: on its other 64 episodes")  # fmt: skip
-    tasks.add_argument("--track", choices=benchmark.TRACKS, default="plain",
-                       help="whether models of Stable-Baselines3 learned behind VectorSymmetryReduction")  # fmt: skip
     tasks.add_argument("--merge", nargs="+", type=Path, default=[], help="results of --benchmark to show as well")
     many.add_argument("--num-threads", type=int, help="threads of the simulator (default: one for every processor)")
     return found
@@ -221,7 +219,7 @@ def measured_on_benchmark(options: argparse.Namespace) -> int:
     agents = [policies_of(agent) for agent in options.agents or ()]
     for id, (label, names) in itertools.product(ids, agents):
         try:
-            found = benchmark.measured(id, label, names, first, options.num_threads, options.track)
+            found = benchmark.measured(id, label, names, first, options.num_threads)
         except (ValueError, FileNotFoundError) as unfit:
             print(f"{label} does not swim {id}: {unfit}", file=sys.stderr)
             left_out += 1

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from seastar_gym.envs.commands import MOST_LIMBS, Actions, action_space
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.sight import Sight, told
+from seastar_gym.envs.symmetry import ReducedBox
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_array, shown
 
@@ -33,6 +34,17 @@ def require_policy(policy: object) -> None:
     """ValueError for what has no `predict`."""
     if not callable(getattr(policy, "predict", None)) or isinstance(policy, type):
         raise ValueError(f"A policy must have predict(observation, ...), which {shown(policy)} has not.")
+
+
+def is_batched(policy: Any) -> bool:
+    """Whether a policy answers for many robots at once."""
+    third_party = {each.__module__.partition(".")[0] for each in type(policy).__mro__}
+    return bool(getattr(policy, "batched", not third_party.isdisjoint({"stable_baselines3", "sb3_contrib"})))
+
+
+def sees_reduced(policy: Any) -> bool:
+    """Whether a policy is to be given reduced observations, as its observation space says."""
+    return isinstance(getattr(policy, "observation_space", None), ReducedBox)
 
 
 def memory_of(state: object, shape: tuple[int, ...], kinds: str, what: str) -> NDArray[Any] | None:
@@ -95,6 +107,10 @@ def require_fit(
         shown_by = "" if sight is None else f", by {told(sight)}"
         raise ValueError(
             f"The policy sees observations of shape {sees.shape}, the environment's have {(n_seen,)}{shown_by}."
+        )
+    if sees_reduced(policy):
+        raise ValueError(
+            "The policy learned behind a symmetry reduction: take ReducedPolicy(policy, env), or load its file by name."
         )
     acts = getattr(policy, "action_space", None)
     if acts is not None and acts != action_space(actions, scene.robot.n_limbs):

@@ -90,7 +90,7 @@ class LearnedPolicy:
         self.decision_period = stroke if description.decision_period is None else description.decision_period
         self.description = description._replace(decision_period=self.decision_period)
         self.weights = weights
-        self.actions = description.actions
+        self.actions, self.symmetric = description.actions, description.symmetry
         self.scene = description.scene
         self.reduction, self.frame_stack = description.reduction, description.frame_stack
         self._n_seen, self._outputs = description.observation_size, description.distributions  # asked every decision

@@ -20,6 +20,7 @@ import importlib
 import importlib.util
 import pickle
 import re
+import warnings
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
@@ -32,9 +33,10 @@ from typing import Any, get_args
 import numpy as np
 
 from seastar_gym.controllers import learned
-from seastar_gym.controllers.contract import Policy, actions_of, require_fit
+from seastar_gym.controllers.contract import Policy, actions_of, is_batched, require_fit
 from seastar_gym.controllers.learned import reason_of
 from seastar_gym.controllers.open_loop import GAITS, scripted
+from seastar_gym.controllers.reduced import as_it_learned
 from seastar_gym.controllers.search import GreedyPolicy, Planner, gait_planner
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import OneRobotEnv, SeastarSwimEnv
@@ -82,13 +84,8 @@ def call_function(name: str, env: OneRobotEnv) -> Policy:
     policy = make(env)
     if not callable(getattr(policy, "predict", None)):
         raise ValueError(f"The agent {name!r} is a {type(policy).__name__}, which has no predict(observation, ...).")
-    return policy if _is_batched(policy) else RobotByRobot(policy)
-
-
-def _is_batched(policy: Any) -> bool:
-    """Whether a policy answers for many robots at once."""
-    third_party = {each.__module__.partition(".")[0] for each in type(policy).__mro__}
-    return bool(getattr(policy, "batched", not third_party.isdisjoint({"stable_baselines3", "sb3_contrib"})))
+    policy = as_it_learned(policy, lambda: env)
+    return policy if is_batched(policy) else RobotByRobot(policy)
 
 
 class RobotByRobot:
@@ -143,9 +140,10 @@ def is_model(path: str | Path) -> bool:
 
 
 def load_model(path: str | Path) -> Policy:
-    """The policy of any algorithm of Stable-Baselines3, trained on the plain environment. Unpickles: see above.
+    """The policy of any algorithm of Stable-Baselines3, as it is in the file. Unpickles: see above.
 
-    ValueError, with one sentence, if there is none in the file.
+    One that learned behind `VectorSymmetryReduction` is to be given reduced observations, see `ReducedPolicy`; agents
+    by name are behind it already. ValueError, with one sentence, if there is none in the file.
     """
     from stable_baselines3.common.save_util import load_from_zip_file
 
@@ -164,7 +162,22 @@ def load_model(path: str | Path) -> Policy:
         raise ValueError(f"{path} is damaged, or no model of Stable-Baselines3: {reason_of(unfit)}.") from unfit
     if not all(np.isfinite(one.cpu().numpy()).all() for one in policy.state_dict().values()):
         raise ValueError(f"{path} has weights that are not finite numbers.")
+    _warn_of_normalised(path, data)
     return policy
+
+
+def _warn_of_normalised(path: str | Path, data: dict[str, Any]) -> None:
+    """Warn where a model learned behind `VecNormalize`, whose statistics its file has not.
+
+    Learners on policy keep observations before normalisation there alone. Those with a replay buffer always do: their
+    files do not tell.
+    """
+    if data.get("_last_original_obs") is not None and "replay_buffer_class" not in data:
+        warnings.warn(
+            f"{path} learned behind VecNormalize: if that normalised observations, swim it by a module:function that "
+            "loads its statistics, too.",
+            stacklevel=2,
+        )
 
 
 def _no_learning(progress: float) -> Any:
@@ -345,7 +358,9 @@ def _load_agent(
         return policy
     if is_function(name):
         return call_function(name, make_env())
-    return _load_file(name) if is_file(name) else _scripted(name, seed, decision_period, scene.robot.n_limbs)
+    if is_file(name):
+        return as_it_learned(_load_file(name), make_env)
+    return _scripted(name, seed, decision_period, scene.robot.n_limbs)
 
 
 def _scripted(name: str, seed: int, decision_period: float | None, n_limbs: int) -> Policy:

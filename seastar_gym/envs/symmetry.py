@@ -397,10 +397,24 @@ def observed_mirror(env: Any) -> Mirror:
     return mirror + tuple((len(mirror) + index, sign) for index, sign in env.added_mirror)
 
 
+class ReducedBox(gym.spaces.Box):
+    """Space of reduced observations: a Box, equal to that of observations as they are, that says that they are reduced.
+
+    Files of models have the space that was learned in, and so say it, too.
+    """
+
+    @classmethod
+    def of(cls, space: Any) -> ReducedBox:
+        """The space of observations of a space, reduced; ValueError for observations that are no arrays."""
+        require_kind("The space of observations", space, gym.spaces.Box, "a Box: put other wrappers around this one")
+        return cls(space.low, space.high, space.shape, space.dtype)
+
+
 class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):
     """Wrapper that turns and mirrors observations so that the current waypoint lies in sector 0, and actions back.
 
-    Masks of actions, in info and of `action_masks`, are those of the reduced robot.
+    Masks of actions, in info and of `action_masks`, are those of the reduced robot. The observation space is a
+    `ReducedBox`.
     """
 
     def __init__(self, env: gym.Env[Any, Any]):
@@ -408,6 +422,7 @@ class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstru
         gym.utils.RecordConstructorArgs.__init__(self)
         gym.Wrapper.__init__(self, env)
         self._symmetry = symmetry_in(env)
+        self.observation_space = ReducedBox.of(env.observation_space)
         self._element = np.zeros((), np.intp)
 
     def _reduced(self, observation: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
@@ -447,6 +462,7 @@ class VectorSymmetryReduction(_VectorWrapper):
         require_kind("env", env, gym.vector.VectorEnv, "a batch, as gym.make_vec gives it")
         super().__init__(env)
         self._symmetry = symmetry_in(env)
+        self.single_observation_space = ReducedBox.of(env.single_observation_space)
         self._elements = np.zeros(env.num_envs, np.intp)
 
     @property

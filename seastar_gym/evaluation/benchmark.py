@@ -22,12 +22,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from seastar_gym.controllers.contract import Policy
-from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.controllers.registry import load_agent
 from seastar_gym.envs import IDS
 from seastar_gym.envs.instances import SIZES, Split
 from seastar_gym.envs.robots import Task
-from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.envs.tasks import NAMED
 from seastar_gym.evaluation.results import (
     Estimate,
@@ -154,25 +152,21 @@ def swum(batch: Batch, policy: Policy, first: int = 0) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def measured(
-    id: str, agent: str, names: Sequence[str], first: int = 0, threads: int | None = None, track: Track = "plain"
-) -> list[Cell]:
+def track_of(policy: Policy) -> Track:
+    """Track of a policy: its attribute `symmetric`, which learned ones and models have, says whether it reduces."""
+    return "symmetric" if getattr(policy, "symmetric", False) else "plain"
+
+
+def measured(id: str, agent: str, names: Sequence[str], first: int = 0, threads: int | None = None) -> list[Cell]:
     """Cells of an agent: what each of its policies reaches.
 
-    names: Names of policies as of `load_agent`, such as one file for each seed. track: Of policies that
-    do not say it, such as models of Stable-Baselines3: "symmetric" puts them behind `VectorSymmetryReduction`, as they
-    were trained. ValueError for one that does not fit.
+    names: Names of policies as of `load_agent`, such as one file for each seed. ValueError for one that does not fit.
     """
     env, cells = env_of(id, task=task_of(id), split="test", fidelity=FIDELITY), list[Cell]()
     for seed, name in enumerate(names):
         policy = load_agent(name, env)
         batch = make(id, EPISODES, "test", threads, actions=require_seen(policy, env))
-        own = track
-        if isinstance(policy, LearnedPolicy):
-            own = "symmetric" if policy.description.symmetry else "plain"
-        elif track == "symmetric":
-            batch = VectorSymmetryReduction(batch)
-        cells.append(Cell(agent, own, id, seed, contract(id), first, **swum(batch, policy, first)))
+        cells.append(Cell(agent, track_of(policy), id, seed, contract(id), first, **swum(batch, policy, first)))
     env.close()
     return cells
 

@@ -1,12 +1,15 @@
 """The benchmark: one contract for an id, results that merge, and tables that say how many seeds they have."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from refusals import assert_refused
 from seastar_gym.cli.main import main
+from seastar_gym.controllers.learned import pretrained
+from seastar_gym.controllers.open_loop import scripted
 from seastar_gym.evaluation import benchmark
 from seastar_gym.evaluation.benchmark import ENTRIES, Cell, contract, make, read, tables, write
 from seastar_gym.evaluation.results import interquartile_mean, over_trainings, probability_of_improvement
@@ -90,6 +93,18 @@ def test_tables_are_written_in_every_form(tmp_path, scales):
     assert "| ppo_lstm | 2.33 [1, 4] (3) |" in (tmp_path / "benchmark.md").read_text("utf-8")
     assert (tmp_path / "benchmark.csv").read_text().splitlines()[1].startswith(f"ppo_lstm,plain,{PREY},3,")
     assert len(json.loads((tmp_path / "benchmark.json").read_text())["cells"]) == 6
+
+
+# Tracks
+
+
+def test_a_policy_says_its_track():
+    for policy, track in (
+        (pretrained(), "symmetric"),
+        (scripted("rest"), "plain"),
+        (SimpleNamespace(symmetric=True), "symmetric"),
+    ):
+        assert benchmark.track_of(policy) == track
 
 
 # Contracts
