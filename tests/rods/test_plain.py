@@ -62,7 +62,7 @@ def on_bodies():
     outline = ((0.02, -0.01), (0.01, 0.02), (-0.02, 0.01), (-0.01, -0.02))
     for scheme, contact, body, blow in (
         ("implicit-euler", Contact(), Body(radius=0.02), 10.0),
-        ("implicit-midpoint", Contact(), Body(outline=outline, centre_of_mass=(2e-3, 1e-3)), 1.0),
+        ("implicit-midpoint", Contact(), Body(outline=outline, centre_of_mass=(2e-3, 1e-3)), 0.5),
         ("sdirk2", None, Body(outline=outline, mass=0.01), 20.0),
     ):
         robot = Seastar(3, 3, relaxation_time=4e-3, body=body, along=AlongLimb(0.7), stiffening=Stiffening(2.0))
