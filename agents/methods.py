@@ -136,7 +136,8 @@ class BenchmarkOptions:
 
         ValueError: one that is there is of another contract.
         """
-        every = product(*map(dict.fromkeys, (self.seeds, self.methods, self.tracks, self.ids)))
+        once = dict.fromkeys
+        every = product(once(self.seeds), once(self.methods), once(self.tracks), once(self.ids))
         return [
             (method, track, id, seed, self.decisions, file)
             for seed, method, track, id in every

@@ -220,7 +220,7 @@ def cells_in(file: Path | str) -> list[Cell]:
     data = read_json(file)
     try:
         cells = [Cell(**cell) for cell in data["cells"]]
-        if not all(np.size([cell.measure, cell.returns, cell.success]) for cell in cells):
+        if not all(np.array([cell.measure, cell.returns, cell.success], float).size for cell in cells):
             raise ValueError("no episodes")
     except (KeyError, TypeError, ValueError) as wrong:
         raise ValueError(f"{file} is no file of the benchmark.") from wrong

@@ -86,6 +86,7 @@ def test_files_of_one_contract_merge_unless_they_have_different_results_of_one_t
 
 
 WRONG = ['{"runs": 3}', '{"cells": [', '{"cells": [{"agent": "mine"}]}', ""]
+WRONG.append(json.dumps({"cells": [cell("mine", PREY, 0, 1.0)._replace(measure=["x", "y"])._asdict()]}))
 
 
 @pytest.mark.parametrize("text", WRONG)
