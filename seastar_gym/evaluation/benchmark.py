@@ -337,7 +337,7 @@ def _shown(estimate: Estimate) -> str:
 def _title(id: str) -> str:
     """Title of the column of an id: its name, the unit of its measure, and whether less or more of it is better."""
     measure = measure_of_task(task_of(id))
-    return f"{_short(id)}\n[{measure.unit}]\n{measure.better} is better"
+    return f"{_short(id)}\n[{measure.unit}],\n{measure.better} is better"
 
 
 def _short(id: str) -> str:
@@ -353,7 +353,7 @@ def table_of(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
     """
     ids = [id for id in ENTRIES if any(id in row.cells for row in rows)]
     scored = [id for id in ids if id in scales()]
-    over = f"score over\n{', '.join(map(_short, scored))}\nmore is better" if scored else "score"
+    over = f"score over\n{', '.join(map(_short, scored))},\nmore is better" if scored else "score"
     titles, lines = ["agent", *map(_title, ids), over, "seen by ten", "P(> first)"], list[list[str]]()
     first = [rows[0].scores[id] for id in scored] if rows[0].scores.keys() == {*scored} else []
     for row in rows:

@@ -161,7 +161,7 @@ def test_tables_are_written_in_every_form(tmp_path, scales):
     tex = (tmp_path / "benchmark.tex").read_text("utf-8")
     odd = benchmark.as_latex(["a"], [["a & 1%$#_{}"]]), benchmark.as_markdown(["a"], [["a|b"]])
     assert r"a \& 1\%\$\#\_\{\} \\" in odd[0] and r"| a\|b |" in odd[1]
-    assert "PreyTimed [1] more is better" in tex and "Station [mm] less is better" in tex
+    assert "PreyTimed [1], more is better" in tex and "Station [mm], less is better" in tex
     assert r"\toprule" in tex and r"ppo\_lstm & 2.33 [1, 4] (3)" in tex and tex.count(r"\\") == 3
     assert "| ppo_lstm | 2.33 [1, 4] (3) |" in (tmp_path / "benchmark.md").read_text("utf-8")
     assert (tmp_path / "benchmark.csv").read_text().splitlines()[1].startswith(f"ppo_lstm,plain,,0,{PREY},3,")
