@@ -233,6 +233,8 @@ def measured_on_benchmark(options: argparse.Namespace, given: Sequence[str]) -> 
     agents, first, left_out = labelled(options.agents or ()), benchmark.FIRST[options.benchmark or "test"], 0
     decisions = benchmark.BUDGETS[0] if options.decisions is None else options.decisions
     require_count("--decisions", decisions, 1, 10**9)
+    if options.decisions is not None and not agents:
+        raise ValueError("--decisions says how long --agents have learned: name them, or leave it out.")
     cells = known_cells(options.merge, ids, options.out)
     if agents and options.decisions is None:
         print(f"Trainings of --agents count as of {decisions:,} decisions: --decisions says another length.")

@@ -128,7 +128,7 @@ REFUSED = {
     "leave out --seeds": ["--seeds", "10"], "leave out --path": ["--path", "pentagon"],
     "leave out --decision-period": ["--decision-period", "0.5"], "leave out --random-heading": ["--random-heading"],
     "called greedy": ["--agents", "greedy", "greedy"], "lacks a label": ["--agents", "=a.zip"],
-    "--decisions": ["--decisions", "0"],
+    "--decisions": ["--decisions", "0"], "name them": ["--decisions", "10"],
 }  # fmt: skip
 
 
