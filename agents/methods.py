@@ -21,6 +21,7 @@ from sb3_contrib import RecurrentPPO
 from stable_baselines3 import DQN, PPO, SAC
 from stable_baselines3.common.callbacks import BaseCallback
 
+from agents import learner_file
 from agents.distillation import PAST
 from agents.ppo import hyperparameters, make_model
 from seastar_gym import TASKS
@@ -35,15 +36,17 @@ from seastar_gym.evaluation.benchmark import (
     TRACKS,
     Cell,
     Track,
+    cells_in,
     contract,
     make,
+    require_current,
     require_ids,
     write,
 )
 from seastar_gym.evaluation.benchmark import swum as swum_by
 from seastar_gym.evaluation.rollout import Batch
-from seastar_gym.files import beside
-from seastar_gym.scene.checks import require_count
+from seastar_gym.files import beside, require_writable
+from seastar_gym.scene.checks import require_count, require_seed
 from seastar_gym.sweep.executors import Processes
 
 
@@ -115,20 +118,45 @@ class BenchmarkOptions:
 
     def __post_init__(self) -> None:
         if unknown := set(self.methods) - set(METHODS):
-            raise ValueError(f"There is no method {min(unknown)!r}: choose of {', '.join(METHODS)}.")
+            raise ValueError(f"There is no method {min(unknown)!r}: choose of {'; '.join(METHODS)}.")
+        for method in self.methods if self.methods != tuple(METHODS) else ():
+            if not {*METHODS[method].tracks} & {*self.tracks}:
+                raise ValueError(f"{method} has no track but {METHODS[method].tracks[0]}: leave it or --tracks out.")
+        if not (self.methods and self.tracks and self.ids and self.seeds):
+            raise ValueError("There must be at least one method, track, id and seed.")
         require_ids(self.ids)
+        for seed in self.seeds:
+            require_seed(seed)
         require_count("decisions", self.decisions, 1, 10**9)
         require_count("processes", self.processes, 1, 1_000)
 
     @property
     def cells(self) -> list[tuple[str, Track, str, int, int, Path]]:
-        """Cells that are missing, as arguments of `train_cell`: all ids of a seed before the next seed."""
+        """Cells that are missing, as arguments of `train_cell`: all ids of a seed before the next seed.
+
+        ValueError: one that is there is of another contract.
+        """
+        once = dict.fromkeys
+        every = product(once(self.seeds), once(self.methods), once(self.tracks), once(self.ids))
         return [
             (method, track, id, seed, self.decisions, file)
-            for seed, method, track, id in product(self.seeds, self.methods, self.tracks, self.ids)
+            for seed, method, track, id in every
             if track in METHODS[method].tracks
-            and not (file := file_of_cell(self.out, method, track, id, seed, self.decisions)).is_file()
+            and not is_trained(file := file_of_cell(self.out, method, track, id, seed, self.decisions))
         ]
+
+
+def is_trained(file: Path) -> bool:
+    """Whether a cell is there. One that is damaged is not, and a note says so; ValueError for another contract."""
+    if not file.is_file():
+        return False
+    try:
+        cells = cells_in(file)
+    except ValueError as damaged:
+        print(f"{damaged} It is trained anew.", flush=True)
+        return False
+    require_current(cells, str(file))
+    return bool(cells)
 
 
 def file_of_cell(folder: Path, method: str, track: Track, id: str, seed: int, decisions: int) -> Path:
@@ -190,33 +218,22 @@ def train_cell(method: str, track: Track, id: str, seed: int, decisions: int, fi
     curve = Curve([mark for mark in CURVE if mark < decisions], swim)
     model.learn(decisions, callback=curve)
     found = curve.point()
+    if learner.stacked:  # what its frames are stands in files of our own
+        learner_file.save(model, file.with_suffix(".zip"))
+    else:
+        with beside(file.with_suffix(".zip")) as part, part.open("wb") as stream:
+            model.save(stream)
     model.get_env().close()
-    with beside(file.with_suffix(".zip")) as part, part.open("wb") as stream:
-        model.save(stream)
     seconds = float(curve.points[-1]["seconds"])
-    write(
-        [
-            Cell(
-                method,
-                track,
-                id,
-                seed,
-                contract(id),
-                0,
-                **found,
-                decisions=decisions,
-                seconds=seconds,
-                curve=curve.points,
-            )
-        ],
-        file,
-    )
+    cost: dict[str, Any] = {"decisions": decisions, "seconds": seconds, "curve": curve.points}
+    write([Cell(method, track, id, seed, contract(id), 0, **found, **cost)], file)
     return f"{file.stem}, {method}, {track}: {curve.points[-1]['measure']:.4g} after {seconds:.0f} s"
 
 
 def train_cells(options: BenchmarkOptions) -> int:
     """Train the cells that are missing; returns the exit code, 130 after Ctrl-C."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+    require_writable(options.out)
     cells = options.cells
     print(f"{len(cells)} cells to train", flush=True)
     pool = Processes(options.processes)

@@ -50,9 +50,13 @@ def answered(work: Callable[[], int | None]) -> int:
 
 
 def run_command(main: Callable[[], int | None]) -> NoReturn:
-    """Run a command line and exit with its code, or as `ended_by_disk` where it cannot write or read a file."""
+    """Run a command line and exit with its code, as `ended_by_disk` where it cannot write or read a file, or, after
+    Ctrl-C, with INTERRUPTED."""
     try:
         code = main()
     except OSError as failure:
         code = ended_by_disk(failure)
+    except KeyboardInterrupt:
+        print("Interrupted.", file=sys.stderr)
+        code = INTERRUPTED
     sys.exit(code)

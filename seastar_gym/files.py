@@ -95,6 +95,14 @@ def save_figure(figure: Any, path: str | os.PathLike[str], **options: Any) -> No
         figure.savefig(part, format=Path(path).suffix[1:].lower() or "png", **options)
 
 
+def require_writable(folder: str | os.PathLike[str]) -> None:
+    """Make a folder for files that are written later. OSError, now, where the disk refuses."""
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    probe = Path(folder, part_name("probe"))
+    probe.open("xb").close()
+    probe.unlink()
+
+
 @contextmanager
 def beside(path: str | os.PathLike[str], ending: str = PART) -> Iterator[Path]:
     """An empty file beside `path`, to write to. It takes its place at the end, when it is on the disk.

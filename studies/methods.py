@@ -46,17 +46,17 @@ class Options:
 
 
 def swim_references(ids: Sequence[str], file: Path = REFERENCES) -> None:
-    """Swim what is missing of greedy rules and oracle, and write the file after each."""
-    known = [cell for cell in benchmark.read([file]) if cell.contract == contract(cell.id)] if file.is_file() else []
+    """Swim what is missing of greedy rules and oracle, and write the file after each; all others stay."""
+    known = {(cell.agent, cell.id): cell for cell in benchmark.cells_in(file)} if file.is_file() else {}
     commit = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True).stdout.strip()
     for (agent, make_agent), id in product(AGENTS.items(), ids):
-        if (agent, id) in {(cell.agent, cell.id) for cell in known}:
+        if (agent, id) in known and known[agent, id].contract == contract(id):
             continue
         batch = benchmark.make(id, EPISODES, "test", 1)
         swum = benchmark.swum(batch, make_agent(batch))
-        known.append(Cell(agent, "plain", id, 0, contract(id), 0, **swum))
+        known[agent, id] = Cell(agent, "plain", id, 0, contract(id), 0, **swum)
         about = provenance("python -m studies.methods --references") | {"commit": commit}
-        benchmark.write(known, file, **about)
+        benchmark.write([*known.values()], file, **about)
         print(f"{id}, {agent}: {np.mean(swum['measure']):.4g}, return {np.mean(swum['returns']):.4g}", flush=True)
 
 
@@ -160,7 +160,7 @@ def draw_curves(found: Any, file: Path) -> None:
     from seastar_gym.files import save_figure
 
     figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.5), sharey=True)
-    for row in benchmark.rows_of(cells_of(found)):
+    for row in (row for *_, rows in benchmark.groups(cells_of(found)) for row in rows):
         curves = [(id, cell.curve) for id, own in row.cells.items() for cell in own if id in benchmark.scales()]
         if not curves:
             continue

@@ -43,12 +43,13 @@ def assert_says(done, extra, missing):
         (OSError(28, "No space left on device", "a.csv"), 1, "Cannot write or read a.csv: no space left on device.\n"),
         (OSError(28, "No space left on device"), 1, "Cannot write or read a file: no space left on device.\n"),
         (FileNotFoundError("There is no file out.csv."), 2, "There is no file out.csv.\n"),
+        (KeyboardInterrupt(), 130, "Interrupted.\n"),
         *((code, code, "") for code in (None, 0, 2)),
     ],
 )
 def test_a_command_keeps_its_exit_code_or_says_in_a_sentence_what_the_disk_refuses(end, code, sentence, capsys):
     def main():
-        if isinstance(end, OSError):
+        if isinstance(end, BaseException):
             raise end
         return end
 

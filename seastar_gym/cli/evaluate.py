@@ -10,8 +10,8 @@ confidence intervals and, with --out, a file of them, .csv, or .json with every 
 seeds are swum by policies A, B, C in turn, as by ten trainings.
 
 With --benchmark, LABEL=A,B,C are trainings of one learner, each of which swims the 64 test episodes of the six ids of
-docs/benchmark.md, or those that --task names; --out is a folder for the table as CSV, Markdown, LaTeX and JSON. --merge
-adds the results of such files.
+docs/benchmark.md, or those that --task names; --decisions is the length of the trainings. --out is a folder for the
+table as CSV, Markdown, LaTeX and JSON, to which another call adds. --merge adds the results of such files.
 
 A named agent that does not fit the robot is left out with a sentence, and the exit code is 2.
 """
@@ -32,13 +32,14 @@ from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import scene_at
 from seastar_gym.envs.paths import PATH_HELP, WAYPOINT_RADIUS, load_path
 from seastar_gym.evaluation import benchmark, scores
+from seastar_gym.evaluation.benchmark import Cell
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.results import Row, write_csv
 from seastar_gym.evaluation.rollout import require_task, task_ids
 from seastar_gym.evaluation.scores import Scores, measured, policies_of
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.evaluation.trials import SETS, as_text, trials
-from seastar_gym.files import require_extra
+from seastar_gym.files import require_extra, require_writable
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_number, require_period
 from seastar_gym.scene.numerics import Fidelity
@@ -86,7 +87,8 @@ def parser() -> argparse.ArgumentParser:
     tasks = found.add_argument_group("registered tasks")
     tasks.add_argument("--task", nargs="+", metavar="ID", help="ids, module:id for one of your own, or all")
     tasks.add_argument("--seeds", type=int, default=10, help=f"number of held-out episodes {DEFAULT}")
-    tasks.add_argument("--decisions", type=int, help="time limit [decisions] (default: that of the task)")
+    tasks.add_argument("--decisions", type=int, help="time limit [decisions] (default: that of the task); with "
+                       f"--benchmark length of the trainings (default: {benchmark.BUDGETS[0]})")  # fmt: skip
     tasks.add_argument("--benchmark", nargs="?", const="test", choices=tuple(benchmark.FIRST),
                        help="the protocol of docs/benchmark.md; check: on its other 64 episodes")  # fmt: skip
     tasks.add_argument("--merge", nargs="+", type=Path, default=[], help="results of --benchmark to show as well")
@@ -173,6 +175,16 @@ def swum_often(options: argparse.Namespace) -> int:
     return 0
 
 
+def labelled(agents: Sequence[str]) -> dict[str, list[str]]:
+    """Names of the policies of agents by their labels. ValueError where two have the same one."""
+    found = dict[str, list[str]]()
+    for label, names in map(policies_of, agents):
+        if label in found:
+            raise ValueError(f"Two agents are called {label}: name them with LABEL=AGENT.")
+        found[label] = names
+    return found
+
+
 def measured_on_tasks(options: argparse.Namespace) -> int:
     """Let the agents swim held-out episodes of tasks; returns the exit code, 2 where one did not fit."""
     require_sound(options)
@@ -182,9 +194,7 @@ def measured_on_tasks(options: argparse.Namespace) -> int:
     if options.sets is not None or options.scene is not None or options.decision_period is not None:
         raise ValueError("A task has its own robot, paths and decisions: leave out --sets, --scene, --decision-period.")
     agents, tasks = options.agents or OF_TASKS, task_ids() if options.task == ["all"] else options.task
-    labels = [policies_of(agent)[0] for agent in agents]
-    if len(set(labels)) < len(labels):
-        raise ValueError(f"Two agents are called {max(labels, key=labels.count)}: name them with LABEL=AGENT.")
+    labelled(agents)
     for task in tasks:
         require_task(task)
     found, fidelity = list[Scores](), (options.fidelity or [None])[0]
@@ -202,37 +212,62 @@ def measured_on_tasks(options: argparse.Namespace) -> int:
     return 0 if len(found) == len(tasks) * len(agents) else 2
 
 
-def measured_on_benchmark(options: argparse.Namespace) -> int:
-    """Let the agents swim the benchmark; returns the exit code, 2 where one did not fit."""
-    require_sound(options)
-    ids, left_out = options.task or list(benchmark.ENTRIES), 0
+OF_BENCHMARK = {"agents", "benchmark", "task", "merge", "out", "decisions", "num_threads"}
+"""Options of the benchmark; it says everything else itself."""
+
+
+def require_options_of_benchmark(given: Sequence[str]) -> None:
+    """ValueError, with one sentence, where one was typed that the benchmark would not heed."""
+    own, untyped = parser(), object()
+    own.set_defaults(**dict.fromkeys(vars(own.parse_args([])), untyped))
+    typed = (name for name, value in vars(own.parse_args(given)).items() if value is not untyped)
+    if others := sorted({*typed} - OF_BENCHMARK):
+        raise ValueError(f"The benchmark says how it is swum: leave out --{others[0].replace('_', '-')}.")
+
+
+def measured_on_benchmark(options: argparse.Namespace, given: Sequence[str]) -> int:
+    """Let the agents swim the benchmark; returns the exit code, 2 where one did not fit. given: What was typed."""
+    require_options_of_benchmark(given)
+    ids = list(benchmark.ENTRIES) if options.task in (None, ["all"]) else options.task
     benchmark.require_ids(ids)
-    fixed = {
-        "--fidelity": options.fidelity,
-        "--scene": options.scene,
-        "--decisions": options.decisions,
-        "--sets": options.sets,
-    }
-    if given := [name for name, value in fixed.items() if value is not None]:
-        raise ValueError(f"The benchmark says how it is swum: leave out {given[0]}.")
-    cells, first = benchmark.read([*options.merge]), benchmark.FIRST[options.benchmark or "test"]
-    agents = [policies_of(agent) for agent in options.agents or ()]
-    for id, (label, names) in itertools.product(ids, agents):
+    agents, first, left_out = labelled(options.agents or ()), benchmark.FIRST[options.benchmark or "test"], 0
+    decisions = benchmark.BUDGETS[0] if options.decisions is None else options.decisions
+    require_count("--decisions", decisions, 1, 10**9)
+    if options.decisions is not None and not agents:
+        raise ValueError("--decisions says how long --agents have learned: name them, or leave it out.")
+    cells = known_cells(options.merge, ids, options.out)
+    if agents and options.decisions is None:
+        print(f"Trainings of --agents count as of {decisions:,} decisions: --decisions says another length.")
+    for id, (label, names) in itertools.product(ids, agents.items()):
         try:
-            found = benchmark.measured(id, label, names, first, options.num_threads)
+            found = benchmark.measured(id, label, names, first, options.num_threads, decisions)
         except (ValueError, FileNotFoundError) as unfit:
             print(f"{label} does not swim {id}: {unfit}", file=sys.stderr)
             left_out += 1
             continue
-        cells = benchmark.merged({"--merge": cells, label: found})
+        cells = benchmark.merged({"What is known": cells, f"--agents {label}": found})
         if options.out is not None:
             benchmark.write_all(cells, options.out)
-    if not cells:
+    shown = [cell for cell in cells if cell.id in ids]
+    if not shown:
         raise ValueError("There is nothing to show: name --agents that fit, or files to --merge.")
     if options.out is not None:
         benchmark.write_all(cells, options.out)
-    print(benchmark.tables(cells))
+    print(benchmark.tables(shown))
     return 2 if left_out else 0
+
+
+def known_cells(files: Sequence[Path], ids: Sequence[str], out: Path | None) -> list[Cell]:
+    """Cells of ids in files, and all that a folder of results has; the folder is made, and can be written to."""
+    parts = {str(file): [cell for cell in benchmark.cells_in(file) if cell.id in ids] for file in files}
+    if out is not None:
+        require_writable(out)
+        if (kept := out / benchmark.RESULTS).exists():
+            parts[str(kept)] = benchmark.cells_in(kept)
+    cells = benchmark.merged(parts)
+    for source, own in parts.items():
+        benchmark.require_current(own, source)
+    return cells
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -241,7 +276,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(given)
     command = shlex.join(["seastar", "evaluate", *given])
     if options.benchmark is not None or options.merge:
-        return answered(lambda: measured_on_benchmark(options))
+        return answered(lambda: measured_on_benchmark(options, given))
     if options.task is not None:
         return answered(lambda: measured_on_tasks(options))
     return answered(lambda: compared(options, command) if options.sets is None else swum_often(options))

@@ -47,8 +47,8 @@ class RewardWeights:
     """Reward per radian by which there is less left to turn [1/rad], where headings are asked for. A second of the
     turning wave, 0.19 rad, earns about as much as a second of the lagged pairs, 7.3 mm."""
     time: Annotated[float, not_negative("1/s")] = 0.0
-    """Price of a second [1/s]. Without it, an episode pays its route, however long that takes: returns and times are
-    uncorrelated where discounts are near 1."""
+    """Price of a second [1/s]. Without it, an episode pays its route, however long that takes: returns and times of
+    `docs/benchmark.md` correlate by -0.6 to -0.9 over all episodes, and by -0.3 to 0.1 over solved ones."""
 
     def __post_init__(self) -> None:
         check_numbers(self, "RewardWeights.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from difflib import get_close_matches
 from operator import getitem
 from typing import Any, Literal, NamedTuple
 
@@ -420,6 +421,7 @@ class SeastarSwimVectorEnv(ManyRobotsEnv):
         disable_env_checker: bool | None = None,
         **arguments: Any,
     ):
+        """num_envs robots. arguments: Those of `SeastarSwimEnv`, by name. TypeError for any other."""
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
                 f'The batch draws with render_mode="rgb_array" only, not {shown(render_mode)}: '
@@ -430,19 +432,23 @@ class SeastarSwimVectorEnv(ManyRobotsEnv):
             require_flag("disable_env_checker", disable_env_checker)
         require_flag("on_device", on_device)
         self.threads, self.disable_env_checker = threads, disable_env_checker
+        if unknown := sorted({*arguments} - self._arguments):
+            near = get_close_matches(unknown[0], sorted(self._arguments), 1)
+            instead = f": the nearest is {near[0]!r}" if near else ""
+            raise TypeError(f"SeastarSwimVectorEnv has no argument {unknown[0]!r}{instead}.")
         robots = swimmers(num_envs, threads, **arguments)
         super().__init__(robots, max_episode_steps, autoreset_mode, render_mode, frames_per_stroke, bool(on_device))
 
     _arguments = arguments_of(__init__) | OF_ROBOTS
 
 
-def swimmers(n_robots: int, threads: int | None, task: Any = None, split: Split = "train", **arguments: Any) -> Robots:
+def swimmers(
+    n_robots: int, threads: int | None, /, task: Any = None, split: Split = "train", **arguments: Any
+) -> Robots:  # fmt: skip
     """Robots of an environment, with a warning if the task tells errors that nobody has measured of the scene.
 
     arguments: Of the environment, those in `OF_ROBOTS`.
     """
-    if unknown := sorted({*arguments} - OF_ROBOTS):
-        raise TypeError(f"SeastarSwimEnv has no argument {unknown[0]!r}.")
     options = SwimOptions(**{name: arguments.pop(name) for name in arguments_of(SwimOptions) & {*arguments}})
     robots = Robots(chosen_task(task, split, **arguments), options, n_robots, threads, split=split)
     if robots.task.tells_errors:

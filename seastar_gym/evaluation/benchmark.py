@@ -91,28 +91,37 @@ def require_ids(ids: Iterable[str]) -> None:
 
 PROBED = 4
 """Decisions whose observations and rewards are part of a contract."""
+NOTHING = 1e-9
+"""Size of a number of them below which it is rounding."""
+
+
+def _set(data: Any) -> Any:
+    """Plain data without what is off: None, False, 0 and nothing. Options that nobody uses may come and go."""
+    if isinstance(data, Mapping):
+        return {name: left for name, value in data.items() if (left := _set(value))}
+    return [_set(value) for value in data] if isinstance(data, list | tuple) else data
 
 
 @cache
 def contract(id: str) -> str:
     """Hash of what a result of an id depends on: task, robot, numerics and splits as they are said, and their numbers.
 
-    The numbers are the first observations and rewards of a test episode, to three decimals: the same on any machine.
+    The numbers are the first observations and rewards of a test episode, to six digits: the same on any machine.
     """
     batch = make(id, 1, "test", 1)
     inner: Any = batch.unwrapped
-    said = {
-        "id": id, "row": IDS[id]._replace(threshold=None)._asdict(), "task": to_dict(inner.task),
-        "scene": to_dict(inner.scene), "splits": SIZES, "episodes": EPISODES,
-    }  # fmt: skip
     seen = [batch.reset(options={"instance": 0})[0]]
     for action in range(1, PROBED + 1):
         observations, rewards, *_ = batch.step(np.full(1, action))
         seen += [observations, rewards]
     batch.close()
-    numbers = np.round(np.concatenate([np.ravel(one) for one in seen]).astype(float), 3) + 0.0
-    text = json.dumps(said, sort_keys=True, default=str)
-    return hashlib.sha256(text.encode() + numbers.tobytes()).hexdigest()[:16]
+    said = {
+        "id": id, "row": IDS[id]._replace(threshold=None)._asdict(), "task": to_dict(inner.task),
+        "scene": to_dict(inner.scene), "splits": SIZES, "episodes": EPISODES,
+    }  # fmt: skip
+    numbers = [f"{x:.5e}" if abs(x) > NOTHING else "0" for part in seen for x in np.ravel(part).tolist()]
+    text = json.dumps([_set(said), numbers], sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 class Cell(NamedTuple):
@@ -157,16 +166,21 @@ def track_of(policy: Policy) -> Track:
     return "symmetric" if getattr(policy, "symmetric", False) else "plain"
 
 
-def measured(id: str, agent: str, names: Sequence[str], first: int = 0, threads: int | None = None) -> list[Cell]:
+def measured(
+    id: str, agent: str, names: Sequence[str], first: int = 0, threads: int | None = None,
+    decisions: int | None = BUDGETS[0],
+) -> list[Cell]:  # fmt: skip
     """Cells of an agent: what each of its policies reaches.
 
     names: Names of policies as of `load_agent`, such as one file for each seed. ValueError for one that does not fit.
+    decisions: Length of their trainings, which says in which table they are.
     """
     env, cells = env_of(id, task=task_of(id), split="test", fidelity=FIDELITY), list[Cell]()
     for seed, name in enumerate(names):
         policy = load_agent(name, env)
         batch = make(id, EPISODES, "test", threads, actions=require_seen(policy, env))
-        cells.append(Cell(agent, track_of(policy), id, seed, contract(id), first, **swum(batch, policy, first)))
+        reached = swum(batch, policy, first)
+        cells.append(Cell(agent, track_of(policy), id, seed, contract(id), first, **reached, decisions=decisions))
     env.close()
     return cells
 
@@ -192,28 +206,38 @@ def score(cell: Cell) -> float:
 # Results that merge
 
 
+RESULTS = "benchmark.json"
+"""Name of the file of them in a folder."""
+
+
 def write(cells: Sequence[Cell], file: Path, **about: Any) -> None:
     """Write cells as JSON, which `read` reads and merges. about: What else the file says."""
     write_json(file, {**about, "cells": [cell._asdict() for cell in cells]})
 
 
-def read(files: Iterable[Path | str]) -> list[Cell]:
-    """Cells of all files, those of a later one instead of the same ones of an earlier one.
+def cells_in(file: Path | str) -> list[Cell]:
+    """Cells of a file. FileNotFoundError or ValueError, with one sentence, where it has none."""
+    data = read_json(file)
+    try:
+        cells = [Cell(**cell) for cell in data["cells"]]
+        if not all(np.array([cell.measure, cell.returns, cell.success], float).size for cell in cells):
+            raise ValueError("no episodes")
+    except (KeyError, TypeError, ValueError) as wrong:
+        raise ValueError(f"{file} is no file of the benchmark.") from wrong
+    return cells
 
-    ValueError: a file is none, or two are of different contracts.
-    """
-    parts = dict[str, list[Cell]]()
-    for file in files:
-        try:
-            parts[str(file)] = [Cell(**cell) for cell in read_json(file)["cells"]]
-        except (KeyError, TypeError) as wrong:
-            raise ValueError(f"{file} is no file of the benchmark.") from wrong
-    return merged(parts)
+
+def read(files: Iterable[Path | str]) -> list[Cell]:
+    """Cells of all files, see `merged`."""
+    return merged({str(file): cells_in(file) for file in files})
 
 
 def merged(parts: Mapping[str, Iterable[Cell]]) -> list[Cell]:
-    """Cells of several sources, by their names, as `read` merges files."""
-    found, of = dict[tuple[Any, ...], Cell](), dict[str, tuple[str, str]]()
+    """Cells of several sources, by their names.
+
+    ValueError: two are of different contracts, or have different results of one training.
+    """
+    found, of = dict[tuple[Any, ...], tuple[Cell, str]](), dict[str, tuple[str, str]]()
     for source, cells in parts.items():
         for cell in cells:
             hashed, whose = of.setdefault(cell.id, (cell.contract, source))
@@ -222,8 +246,26 @@ def merged(parts: Mapping[str, Iterable[Cell]]) -> list[Cell]:
                     f"{whose} and {source} are of different contracts of {cell.id}, whose task, observation, reward, "
                     "numerics or split changed in between: swim one of them again."
                 )
-            found[cell.agent, cell.track, cell.id, cell.seed, cell.first, cell.decisions] = cell
-    return list(found.values())
+            key = cell.agent, cell.track, cell.id, cell.seed, cell.first, cell.decisions
+            same, whose = found.setdefault(key, (cell, source))
+            if (same.measure, same.returns, same.success) != (cell.measure, cell.returns, cell.success):
+                raise ValueError(
+                    f"{whose} and {source} have different results of {cell.agent} in {cell.id}, seed {cell.seed}: name "
+                    "them apart with LABEL=FILES, or swim LABEL=A,B,C at once where they are seeds."
+                )
+    return [cell for cell, _ in found.values()]
+
+
+def require_current(cells: Iterable[Cell], source: str) -> None:
+    """ValueError, with one sentence, for cells of no id of the benchmark, or of another contract than it has here."""
+    of = {(cell.id, cell.contract) for cell in cells}
+    require_ids(id for id, _ in of)
+    for id, hashed in sorted(of):
+        if hashed != contract(id):
+            raise ValueError(
+                f"{source} and this version are of different contracts of {id}, whose task, observation, reward, "
+                "numerics or split changed in between: swim it again."
+            )
 
 
 # Tables
@@ -260,15 +302,23 @@ def rows_of(cells: Iterable[Cell]) -> list[Row]:
     return [Row(*key, by_id) for key, by_id in found.items()]
 
 
-def records(cells: Iterable[Cell]) -> list[dict[str, Any]]:
-    """A record of every agent, track and id, by the names of the CSV."""
+def groups(cells: Sequence[Cell]) -> list[tuple[Track, int, int | None, list[Row]]]:
+    """What is never put together: tracks, sets of episodes by their first, and lengths of training; and their rows."""
+    kinds = dict.fromkeys((cell.track, cell.first, cell.decisions) for cell in cells)
+    return [
+        (*kind, rows_of(cell for cell in cells if (cell.track, cell.first, cell.decisions) == kind)) for kind in kinds
+    ]
+
+
+def records(cells: Sequence[Cell]) -> list[dict[str, Any]]:
+    """A record of every agent, track, length of training, set of episodes and id, by the names of the CSV."""
     found = []
-    for row in rows_of(cells):
-        for id, own in row.cells.items():
+    for track, first, decisions, rows in groups(cells):
+        for row, id, own in ((each, id, own) for each in rows for id, own in each.cells.items()):
             mean, scores = row.measure(id), [score(cell) for cell in own]
             found.append({
-                "agent": row.agent, "track": row.track, "id": id, "seeds": len(own),
-                "measure": mean.mean, "measure_low": mean.low, "measure_high": mean.high,
+                "agent": row.agent, "track": track, "decisions": decisions, "first": first, "id": id,
+                "seeds": len(own), "measure": mean.mean, "measure_low": mean.low, "measure_high": mean.high,
                 "return": float(np.mean([cell.returns for cell in own])),
                 "success_rate": float(np.mean([cell.success for cell in own])),
                 "score": float(np.mean(scores)), "smallest_difference": smallest_difference(scores),
@@ -284,21 +334,35 @@ def _shown(estimate: Estimate) -> str:
     return f"{estimate.mean:.3g}" + ("" if np.isnan(estimate.low) else f" [{estimate.low:.3g}, {estimate.high:.3g}]")
 
 
+def _title(id: str) -> str:
+    """Title of the column of an id: its name, the unit of its measure, and whether less or more of it is better."""
+    measure = measure_of_task(task_of(id))
+    return f"{_short(id)}\n[{measure.unit}],\n{measure.better} is better"
+
+
+def _short(id: str) -> str:
+    return id.removeprefix("Seastar").removesuffix("-v0")
+
+
 def table_of(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
     """Titles and lines of the table of a track: means over seeds with intervals, and the number of seeds in brackets.
 
     The last columns: the interquartile mean of the scores, the smallest difference of their mean that ten seeds can
-    see, and the probability that a seed scores more than one of the first row.
+    see, and the probability that a seed scores more than one of the first row. Rows that lack an id that others have a
+    score of have none of the three.
     """
     ids = [id for id in ENTRIES if any(id in row.cells for row in rows)]
-    short = [id.removeprefix("Seastar").removesuffix("-v0") for id in ids]
-    titles, lines = ["agent", *short, "score", "seen by ten", "P(> first)"], list[list[str]]()
+    scored = [id for id in ids if id in scales()]
+    over = f"score over\n{', '.join(map(_short, scored))},\nmore is better" if scored else "score"
+    titles, lines = ["agent", *map(_title, ids), over, "seen by ten", "P(> first)"], list[list[str]]()
+    first = [rows[0].scores[id] for id in scored] if rows[0].scores.keys() == {*scored} else []
     for row in rows:
         shown = [f"{_shown(row.measure(id))} ({len(row.cells[id])})" if id in row.cells else "–" for id in ids]
-        common = [id for id in row.scores if id in rows[0].scores]
-        ours, theirs = ([each.scores[id] for id in common] for each in (row, rows[0]))
-        better = probability_of_improvement(ours, theirs) if common and row is not rows[0] else np.nan
-        last = [_shown(interquartile_mean(list(row.scores.values()))), f"{row.smallest:.2g}", f"{better:.2f}"]
+        last = ["–", "–", "–"]
+        if scored and row.scores.keys() == {*scored}:
+            ours = [row.scores[id] for id in scored]
+            better = probability_of_improvement(ours, first) if first and row is not rows[0] else np.nan
+            last = [_shown(interquartile_mean(ours)), f"{row.smallest:.2g}", f"{better:.2f}"]
         lines.append([row.agent, *shown, *(text.replace("nan", "–") for text in last)])
     return titles, lines
 
@@ -311,37 +375,40 @@ def as_text(titles: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
 def as_markdown(titles: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
     """Table in Markdown."""
     rule = ["---", *["---:"] * (len(titles) - 1)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in (titles, rule, *lines))
+    head, *body = [[cell.replace("\n", " ").replace("|", r"\|") for cell in line] for line in (titles, *lines)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in (head, rule, *body))
+
+
+LATEX = {each: rf"\{each}" for each in "&%$#_{}"} | {
+    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": "$<$", ">": "$>$",
+    "|": "$|$", "–": "--", "\n": " ",
+}  # fmt: skip
+"""What LaTeX writes for characters that it reads otherwise."""
 
 
 def as_latex(titles: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
     """Table in LaTeX, with the rules of the package booktabs."""
-    head, *body = (
-        " & ".join(cell.replace("_", r"\_").replace(">", "$>$").replace("–", "--") for cell in line) + r" \\"
-        for line in (titles, *lines)
-    )
+    escapes = str.maketrans(LATEX)
+    head, *body = (" & ".join(cell.translate(escapes) for cell in line) + r" \\" for line in (titles, *lines))
     parts = [rf"\begin{{tabular}}{{l{'r' * (len(titles) - 1)}}}", r"\toprule", head, r"\midrule", *body, r"\bottomrule"]
     return "\n".join([*parts, r"\end{tabular}"])
 
 
 def tables(cells: Sequence[Cell], form: Callable[..., str] = as_text) -> str:
     """Tables of cells: one of every track, and of every set of episodes and length of training."""
-    kinds = dict.fromkeys((cell.track, cell.first, cell.decisions) for cell in cells)
     marks = {as_markdown: ("", ":"), as_latex: ("% ", "")}
     before, after = marks.get(form, ("", ":"))
     parts = []
-    for track, first, decisions in kinds:
-        own = [cell for cell in cells if (cell.track, cell.first, cell.decisions) == (track, first, decisions)]
+    for track, first, decisions, rows in groups(cells):
         of = "" if decisions is None else f", {decisions:,} decisions"
         title = f"{before}Track {track}{of}, test episodes {first} to {first + EPISODES - 1}{after}"
-        parts.append(f"{title}\n\n{form(*table_of(rows_of(own)))}")
+        parts.append(f"{title}\n\n{form(*table_of(rows))}")
     return "\n\n".join(parts) + "\n"
 
 
 def write_all(cells: Sequence[Cell], folder: Path) -> None:
     """Write benchmark.json, which merges, and tables as benchmark.csv, .md and .tex into a folder."""
-    folder.mkdir(parents=True, exist_ok=True)
-    write(cells, folder / "benchmark.json")
+    write(cells, folder / RESULTS)
     write_csv(records(cells), folder / "benchmark.csv")
     for ending, form in {".md": as_markdown, ".tex": as_latex}.items():
         write_atomically(folder / f"benchmark{ending}", tables(cells, form))

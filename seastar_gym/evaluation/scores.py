@@ -60,6 +60,8 @@ class Scores(NamedTuple):
 def policies_of(agent: str) -> tuple[str, list[str]]:
     """Label of an agent, and the names of its policies: LABEL=A,B,C are several, such as trainings, in one row."""
     label, several, names = agent.partition("=")
+    if several and not (label.strip() and all(names.split(","))):
+        raise ValueError(f"{agent!r} lacks a label or a policy: write LABEL=A,B,C.")
     short = Path(agent).stem if len(Path(agent).parts) > 1 else agent
     return (label, names.split(",")) if several else (short, [agent])
 

@@ -5,7 +5,9 @@ import pytest
 
 from later import Later
 from refusals import assert_refused
-from seastar_gym.evaluation.benchmark import contract, read
+from seastar_gym.controllers.registry import load_agent
+from seastar_gym.evaluation.benchmark import FIDELITY, Cell, contract, make, read, swum, task_of, track_of, write
+from seastar_gym.evaluation.rollout import env_of, require_seen
 
 methods = Later("agents.methods")
 NAMES = ("PPO", "PPO, ours", "PPO, ours, frame stack", "RecurrentPPO", "DQN", "SAC")
@@ -29,11 +31,34 @@ def test_a_method_trains_a_cell(name, tmp_path, monkeypatch):
     assert len(cell.measure) == 2 and last["measure"] == pytest.approx(np.mean(cell.measure), abs=1e-3)
     assert file.with_suffix(".zip").stat().st_size > 10_000
     assert len(options.cells) == len(methods.METHODS[name].tracks) - 1
+    env = env_of(ID, task=task_of(ID), split="test", fidelity=FIDELITY)
+    policy = load_agent(str(file.with_suffix(".zip")), env)
+    swam = swum(make(ID, 2, "test", 1, actions=require_seen(policy, env)), policy)
+    assert track_of(policy) == track and swam["measure"] == cell.measure
 
 
 def test_what_is_no_method_or_id_is_refused():
-    with assert_refused("There is no method 'A2C': choose of PPO, "):
-        methods.BenchmarkOptions(("A2C",))
+    for unknown in ("A2C", "dqn"):
+        with assert_refused(f"There is no method '{unknown}': choose of PPO; PPO, ours; "):
+            methods.BenchmarkOptions((unknown,))
+    with assert_refused("RecurrentPPO has no track but plain"):
+        methods.BenchmarkOptions(("PPO", "RecurrentPPO"), tracks=("symmetric",))
+    with assert_refused("at least one method, track, id and seed"):
+        methods.BenchmarkOptions(seeds=())
     with assert_refused("SeastarSwim-v0 is no id of the benchmark"):
         methods.BenchmarkOptions(ids=("SeastarSwim-v0",))
     assert tuple(methods.METHODS) == NAMES
+
+
+def test_cells_that_are_damaged_are_trained_anew_and_those_of_another_contract_refused(tmp_path, capsys):
+    options = methods.BenchmarkOptions(("DQN",), tracks=("plain",), ids=(ID,), seeds=(0, 0, 1), out=tmp_path)
+    first, second = (cell[-1] for cell in options.cells)
+    for text in ("", '{"cells": ['):
+        first.parent.mkdir(parents=True, exist_ok=True)
+        first.write_text(text)
+        assert len(options.cells) == 2
+        assert f"{first.name} is no " in (told := capsys.readouterr().out) and "trained anew" in told
+    for seed, (file, known) in enumerate({first: contract(ID), second: "old"}.items()):
+        write([Cell("DQN", "plain", ID, seed, known, 0, [1.0], [1.0], [True])], file)
+    with assert_refused(f"{second} and this version are of different contracts of {ID}"):
+        assert options.cells

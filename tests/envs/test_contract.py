@@ -117,8 +117,12 @@ def test_the_arguments_are_those_of_the_constructors():
     assert arguments(one) == list(inspect.signature(one).parameters)
     both = {*inspect.signature(one).parameters, *inspect.signature(batch).parameters}
     assert {*arguments(one), *arguments(batch)} == both - {"arguments"}
-    with pytest.raises(TypeError, match=r"^SeastarSwimEnv has no argument 'paths'\.$"):
-        batch(2, paths="line")
+    for wrong, nearest in {"paths": "path", "num_env": "num_envs"}.items():
+        sentence = f"SeastarSwimVectorEnv has no argument '{wrong}': the nearest is '{nearest}'."
+        with pytest.raises(TypeError, match=f"^{re.escape(sentence)}$"):
+            batch(**{wrong: 2})
+    with pytest.raises(TypeError, match=r"^SeastarSwimVectorEnv has no argument 'n_robots'"):
+        batch(n_robots=2)
     assert all(f'"{name}"' in section("Arguments") for name in PATHS)
 
 

@@ -63,16 +63,86 @@ def test_a_score_is_0_for_the_greedy_rule_and_1_for_the_oracle_whichever_is_bett
     assert np.isnan(benchmark.score(cell("a", "SeastarFailBlind-v0", 0, 1.0)))
 
 
+def test_rows_that_lack_an_id_have_no_score_and_tables_say_over_which_ids_scores_are(scales):
+    cells = row("whole", [4.0] * 3) + row("whole", [1.0] * 3, STATION) + row("part", [8.0] * 3)
+    text = tables([*cells, *row("whole", [9.0] * 3, "SeastarFailBlind-v0")])
+    whole, part = (next(line for line in text.splitlines() if line.startswith(name)) for name in ("whole", "part"))
+    assert "PreyTimed, Station" in text and part.split()[-3:] == ["–"] * 3 and "0.583" in whole
+
+
 # Files
 
 
-def test_files_of_one_contract_merge_and_a_later_one_counts(tmp_path, scales):
+def test_files_of_one_contract_merge_unless_they_have_different_results_of_one_training(tmp_path, scales):
     write(row("mine", [1.0, 2.0]), tmp_path / "a.json")
-    write(row("mine", [5.0]) + row("yours", [3.0], track="symmetric"), tmp_path / "b.json")
+    write(row("mine", [1.0]) + row("yours", [3.0], track="symmetric"), tmp_path / "b.json")
     found = read([tmp_path / "a.json", tmp_path / "b.json"])
-    assert [np.mean(one.measure) for one in found] == pytest.approx([5.0, 2.0, 3.0])
+    assert [np.mean(one.measure) for one in found] == pytest.approx([1.0, 2.0, 3.0])
     plain, symmetric = tables(found).split("Track symmetric")
     assert "mine" in plain and "yours" not in plain and "yours" in symmetric
+    write(row("mine", [5.0]), tmp_path / "c.json")
+    with assert_refused("a.json", "c.json have different results of mine", "seed 0", "LABEL="):
+        read([tmp_path / "a.json", tmp_path / "c.json"])
+
+
+WRONG = ['{"runs": 3}', '{"cells": [', '{"cells": [{"agent": "mine"}]}', ""]
+WRONG.append(json.dumps({"cells": [cell("mine", PREY, 0, 1.0)._replace(measure=["x", "y"])._asdict()]}))
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_an_out_that_is_damaged_or_no_folder_is_refused_before_anything_swims(text, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(benchmark, "measured", None)
+    (tmp_path / "benchmark.json").write_text(text)
+    assert main(["evaluate", "--benchmark", "--agents", "greedy", "--out", str(tmp_path)]) == 2
+    assert "benchmark.json is no " in capsys.readouterr().err
+    assert (tmp_path / "benchmark.json").read_text() == text
+    with pytest.raises(FileExistsError):
+        main(["evaluate", "--benchmark", "--agents", "greedy", "--out", str(tmp_path / "benchmark.json")])
+
+
+def test_results_join_those_of_a_folder_and_files_are_shown_by_ids(tmp_path, scales, monkeypatch, capsys):
+    monkeypatch.setattr(benchmark, "contract", lambda id: "a")
+    monkeypatch.setattr(
+        benchmark, "measured",
+        lambda id, label, names, first, threads, decisions: [
+            cell(label, id, seed, 1.0)._replace(first=first, decisions=decisions) for seed, _ in enumerate(names)
+        ],
+    )  # fmt: skip
+    out, call = str(tmp_path), ["evaluate", "--benchmark", "--task", PREY, "--agents"]
+    for agent, more in {"mine=a,b": [], "yours": ["--decisions", "1000000"], "ours": ["--decisions", "200000"]}.items():
+        assert main([*call, agent, "--out", out, *more]) == 0
+    told = capsys.readouterr().out
+    assert "count as of 200,000 decisions" in told and "Track plain, 1,000,000 decisions" in told
+    found = read([tmp_path / "benchmark.json"])
+    assert [(one.agent, one.decisions) for one in found] == [
+        ("mine", 200_000), ("mine", 200_000), ("yours", 1_000_000), ("ours", 200_000),
+    ]  # fmt: skip
+    rows = [line.split(",")[:6] for line in (tmp_path / "benchmark.csv").read_text().splitlines()]
+    assert rows[0] == ["agent", "track", "decisions", "first", "id", "seeds"]
+    assert [each[2:4] for each in rows[1:]] == [["200000", "0"], ["200000", "0"], ["1000000", "0"]]
+    assert main(["evaluate", "--merge", str(tmp_path / "benchmark.json"), "--task", STATION]) == 2
+    assert "nothing to show" in capsys.readouterr().err
+
+
+REFUSED = {
+    "leave out --seeds": ["--seeds", "10"], "leave out --path": ["--path", "pentagon"],
+    "leave out --decision-period": ["--decision-period", "0.5"], "leave out --random-heading": ["--random-heading"],
+    "called greedy": ["--agents", "greedy", "greedy"], "lacks a label": ["--agents", "=a.zip"],
+    "--decisions": ["--decisions", "0"], "name them": ["--decisions", "10"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("sentence", REFUSED)
+def test_what_the_benchmark_would_not_heed_is_refused(sentence, capsys):
+    assert main(["evaluate", "--benchmark", *REFUSED[sentence]]) == 2
+    told = capsys.readouterr().err
+    assert sentence in told and told.count("\n") == 1
+
+
+def test_results_of_another_contract_than_that_of_this_version_are_refused(tmp_path, capsys):
+    write([cell("mine", PREY, 0, 1.0, contract="old")], tmp_path / "a.json")
+    assert main(["evaluate", "--merge", str(tmp_path / "a.json")]) == 2
+    assert f"a.json and this version are of different contracts of {PREY}" in capsys.readouterr().err
 
 
 def test_files_of_different_contracts_are_refused_in_a_sentence(tmp_path, capsys):
@@ -89,9 +159,12 @@ def test_files_of_different_contracts_are_refused_in_a_sentence(tmp_path, capsys
 def test_tables_are_written_in_every_form(tmp_path, scales):
     benchmark.write_all(row("ppo_lstm", [1.0, 2.0, 4.0]) + row("mine", [2.0, 3.0, 4.0], STATION), tmp_path)
     tex = (tmp_path / "benchmark.tex").read_text("utf-8")
+    odd = benchmark.as_latex(["a"], [["a & 1%$#_{}"]]), benchmark.as_markdown(["a"], [["a|b"]])
+    assert r"a \& 1\%\$\#\_\{\} \\" in odd[0] and r"| a\|b |" in odd[1]
+    assert "PreyTimed [1], more is better" in tex and "Station [mm], less is better" in tex
     assert r"\toprule" in tex and r"ppo\_lstm & 2.33 [1, 4] (3)" in tex and tex.count(r"\\") == 3
     assert "| ppo_lstm | 2.33 [1, 4] (3) |" in (tmp_path / "benchmark.md").read_text("utf-8")
-    assert (tmp_path / "benchmark.csv").read_text().splitlines()[1].startswith(f"ppo_lstm,plain,{PREY},3,")
+    assert (tmp_path / "benchmark.csv").read_text().splitlines()[1].startswith(f"ppo_lstm,plain,,0,{PREY},3,")
     assert len(json.loads((tmp_path / "benchmark.json").read_text())["cells"]) == 6
 
 
@@ -120,6 +193,11 @@ def test_a_contract_is_of_observations_rewards_and_numbers_of_the_task(monkeypat
             contract.cache_clear()
             assert contract(PREY) != known, name
     contract.cache_clear()
+    with monkeypatch.context() as patch:
+        patch.setattr(benchmark, "SIZES", {**benchmark.SIZES, "unused": None})
+        assert contract(PREY) == known
+    contract.cache_clear()
+    assert {one.contract for one in read([benchmark.REFERENCES]) if one.id == PREY} == {known}
 
 
 def test_a_price_of_time_is_charged_where_returns_would_not_see_it():

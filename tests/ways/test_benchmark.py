@@ -15,9 +15,10 @@ def test_a_row_is_trained_after_a_stop_evaluated_and_merged(story):
     first = files[0].read_bytes()
     story.types(f"{train} --seeds 0 1")
     assert "1 cells to train" in story.told and files[0].read_bytes() == first and files[1].is_file()
-    evaluate = command("docs/benchmark.md", "seastar evaluate --benchmark --agents").partition("--agents")[0]
+    evaluate = command("docs/benchmark.md", "seastar evaluate --benchmark", "--agents").partition("--agents")[0]
     zips = ",".join(str(file.with_suffix(".zip").relative_to(story.folder)) for file in files)
-    story.types(f"{evaluate} --task SeastarStation-v0 --agents mine={zips} --out runs/mine")
+    story.types(f"{evaluate} --agents mine={zips} --decisions 4096 --out runs/mine")
+    assert "4,096 decisions" in story.told
     mine = json.loads((story.folder / "runs/mine/benchmark.json").read_text())["cells"]
     trained = [json.loads(file.read_text())["cells"][0] for file in files]
     assert {one["track"] for one in mine} == {"symmetric"}

@@ -13,7 +13,7 @@ prizes.py     more prizes than can be reached, and the best choice of them
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, get_args
 
 import gymnasium as gym
 
@@ -81,6 +81,7 @@ def read_task(task: Task | Mapping[str, Any] | str) -> Task:
 
 def chosen_task(task: Task | Mapping[str, Any] | str | None, split: Split, **of_swim: Any) -> Task:
     """Task that is given, or the `AlongPath` of these arguments, all of which belong to that alone."""
+    require_choice("split", split, get_args(Split))
     if task is None:
         return HeldOutPaths(**of_swim) if split == "test" else AlongPath(**of_swim)
     found = read_task(task)
