@@ -92,7 +92,7 @@ class Processes(ThreadPoolExecutor):
         if workers is not None:
             require_count("workers", workers, 1, 4096)
         super().__init__(workers or processors())
-        self._own, self._running = threading.local(), set[int]()
+        self._own, self._running, self._pools = threading.local(), set[int](), set[ProcessPoolExecutor]()
 
     def submit(self, work: Any, /, *arguments: Any, **named: Any) -> Future[Any]:
         """Run a function in one of the processes."""
@@ -104,6 +104,7 @@ class Processes(ThreadPoolExecutor):
         try:
             if not hasattr(own, "pool"):
                 own.pool = ProcessPoolExecutor(1, get_context("spawn"), end_with_parent)
+                self._pools.add(own.pool)
                 own.process = own.pool.submit(os.getpid).result()
                 self._running.add(own.process)
             return own.pool.submit(work, *arguments, **named).result()
@@ -119,6 +120,8 @@ class Processes(ThreadPoolExecutor):
             with suppress(ProcessLookupError):
                 os.kill(process, signal.SIGTERM)
         super().shutdown(wait)
+        for pool in self._pools:  # or their own threads may end while Python does, which then tells of a closed pipe
+            pool.shutdown(wait)
 
 
 def end_with_parent() -> None:
