@@ -251,7 +251,7 @@ def merged(parts: Mapping[str, Iterable[Cell]]) -> list[Cell]:
             if (same.measure, same.returns, same.success) != (cell.measure, cell.returns, cell.success):
                 raise ValueError(
                     f"{whose} and {source} have different results of {cell.agent} in {cell.id}, seed {cell.seed}: name "
-                    "them apart with LABEL=FILES, or swim LABEL=A,B,C at once where they are seeds."
+                    "them apart by LABEL=FILES."
                 )
     return [cell for cell, _ in found.values()]
 
