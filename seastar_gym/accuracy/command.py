@@ -20,7 +20,7 @@ from seastar_gym.accuracy.certificate import MARGIN, Certificate
 from seastar_gym.accuracy.measure import SAMPLES, Progress, certify
 from seastar_gym.accuracy.resonance import told as told_of
 from seastar_gym.command import DEFAULT, answered, command_parser
-from seastar_gym.files import require_extra, save_figure, write_json
+from seastar_gym.files import require_extra, require_writable, save_figure, write_json
 from seastar_gym.scene.checks import require_error
 from seastar_gym.scene.scene import load_scene
 
@@ -68,13 +68,14 @@ def draw(certificate: Certificate, file: Path) -> None:
     plt.close(figure)
 
 
-def require_writable(option: str, file: Path | None) -> None:
-    """Make the folder of a file that an option names, if it does. ValueError where it is a folder itself."""
+def require_file(option: str, file: Path | None) -> None:
+    """Make the folder of a file that an option names, if it does. ValueError where it is a folder itself, OSError
+    where the disk refuses."""
     if file is None:
         return
     if file.is_dir():
         raise ValueError(f"{file} is a folder: give --{option} a file.")
-    file.parent.mkdir(parents=True, exist_ok=True)
+    require_writable(file.parent)
 
 
 @contextmanager
@@ -102,7 +103,7 @@ def certify_as_asked(options: argparse.Namespace) -> None:
     if options.chosen is not None and options.error is None:
         raise ValueError("--chosen writes the scene that --error chooses: give both.")
     for name in ("out", "chosen"):
-        require_writable(name, getattr(options, name))
+        require_file(name, getattr(options, name))
     if options.out.suffix == ".png":
         raise ValueError(f"{options.out} is where the picture goes: give --out a file such as certificate.json.")
     with progress_bar() as progress:

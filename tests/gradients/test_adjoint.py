@@ -22,9 +22,11 @@ from gradients.test_differentiate import (
     differences,
 )
 from refusals import assert_refused
-from seastar_gym import Simulator, Water
+from seastar_gym import Scene, Simulator, Water
 from seastar_gym.gradients import Motion, differentiate, gradient, record
 from seastar_gym.gradients.adjoint import QUANTITIES
+from simulator.test_conservation import rattled
+from strokes import ternary
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="lanes of a tape have compiled code alone")
 
@@ -192,3 +194,15 @@ def test_other_libraries_swim_farther_along_the_gradient(library):
         found = of_two(module.numpy.stack([module.numpy.zeros_like(COMMANDS), COMMANDS]))[1]
     expected = differentiate(SMALL, COMMANDS, ["commands"]).by["commands"].hub[-1, 0]
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-10 * np.abs(expected).max())
+
+
+def test_a_swim_in_which_a_robot_comes_to_rest_has_failed_where_slopes_are_asked_for():
+    """Nothing leads back through what was lost: edges that collapse at random velocities, see rods/guard.py."""
+    scene, commands = Scene.preset("reference"), ternary(1, 8, 1)[0][2:3]
+    state = rattled(Simulator(scene, 8), 50.0, seed=2).get_state().of_robots([2])
+    simulator = Simulator(scene)
+    simulator.set_state(state)
+    report, swum = simulator.stroke(commands), record(scene, commands, state)
+    assert report.status[0] == 0 < report.energy_cuts[0] and swum.status[0] == 1
+    slopes = swum.gradient({"positions": np.ones(swum.swim.positions.shape)}, ["commands"])
+    assert np.isnan(slopes["commands"]).all() and "failed in interval 1" in swum.sentence
