@@ -196,8 +196,10 @@ def test_an_environment_passes_gymnasiums_and_stable_baselines_checkers(name, no
     pytest.importorskip("stable_baselines3.common.env_checker").check_env(env, warn=True, skip_render_check=True)
 
 
-@pytest.mark.parametrize("mode", AutoresetMode)
-@pytest.mark.parametrize("name", TABLE)
+@pytest.mark.parametrize("name, mode", [
+    *((name, AutoresetMode.SAME_STEP) for name in TABLE), *((id, AutoresetMode.NEXT_STEP) for id in IDS),
+    *((name, AutoresetMode.DISABLED) for name in (SWIM, "SeastarPrey-v0", "reached", "both ends at once")),
+])  # fmt: skip
 def test_a_batch_has_the_bits_of_single_environments(name, mode):
     """Over ends of episodes, and where a robot cannot be solved: all results, their types, masks and pictures."""
     id, arguments = given(name, *OF_BOTH)
