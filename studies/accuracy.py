@@ -395,9 +395,14 @@ def row_of(fidelity: Fidelity) -> list[str]:
 
 
 def readme(_: object) -> str:
-    """Some presets."""
-    rows = [[f"`{name}`", *row_of(name)] for name in PURPOSES if name in ("fast", "balanced", "reference")]
-    return markdown(["fidelity", *ERRORS, "× real time"], rows)
+    """Some presets: what they are, and the largest of all errors."""
+    rows = []
+    for name in ("fast", "balanced", "reference"):
+        row = in_table(name)
+        error = max(max(in_table(name, each).errors.values()) for each in ("strokes", "wires"))
+        numerics = f"{row.nodes_per_limb} nodes per limb, {row.step / MILLI:g} ms"
+        rows.append([f"`{name}`", numerics, percent(error), f"{row.speed:,.0f}"])
+    return markdown(["fidelity", "mesh and step", "largest error", "× real time"], rows, (0, 1))
 
 
 def choosing(_: object) -> str:
