@@ -511,7 +511,8 @@ STUDY = Study(
     "accuracy", run, Options, file="accuracy/fresh.json",
     tables={
         "errors": readme, "choosing": choosing, "presets": presets, "periods": by_period,
-        "strokes": partial(by_class, names=("strokes",)), "timed": partial(by_class, names=("wires", "undamped"), fidelities=DETAILED),
+        "strokes": partial(by_class, names=("strokes",)),
+        "timed": partial(by_class, names=("wires", "undamped"), fidelities=DETAILED),
         "robots": robots_table, "fresh": fresh_summary,
     },
 )  # fmt: skip

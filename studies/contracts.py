@@ -45,7 +45,7 @@ def contracts() -> str:
 SHOWN = ("elastica", "frequencies", "drag", "waves", "published")
 """Files of comparisons in tests/golden/exact."""
 LEFT_OUT = re.compile(r"chapter|frequency [23]|the worst of|^distance")
-"""Comparisons that only the tests have: of the other discretisation, of higher modes, of loose tolerances, and distances."""
+"""Comparisons that only the tests have: the other discretisation, higher modes, loose tolerances, distances."""
 
 
 def exact() -> str:
