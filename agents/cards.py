@@ -78,7 +78,7 @@ def card(policy: LearnedPolicy, file: Path, sha256: str, swims: Mapping[str, Swi
     many, choices = about.distributions
     choice = f"one of {choices} commands" if many == 1 else f"one of {choices} commands for each limb"
     symmetric = "In a turned or mirrored world it swims the turned or mirrored way. " * about.symmetry
-    robot, licence, seen = CHAPTERS, "| licence | MIT, as the package |\n", "; docs/results.md has swims\n  with them"
+    robot, licence, seen = CHAPTERS, "| licence | MIT, as the package |\n", "; docs/control.md has swims\n  with them"
     if OWN in swims:
         robot, licence, seen = f"a robot of {scene.robot.n_limbs} limbs, which {file.stem}.json describes,", "", ""
     return f"""# Model card: {file.stem}

@@ -227,7 +227,7 @@ It was trained in simulation, and no real robot has swum by it.
 ## How it swims
 
 `python -m agents.tasks --cards-only` measures this, in {EPISODES} episodes of the split "test", where {measure.better}
-is better. Other agents stand in docs/tasks.md.
+is better. Other agents stand in docs/control.md.
 
 | fidelity | {measure.name} [{measure.unit}]: mean (95 %, over episodes) | success |
 |---|---:|---:|

@@ -312,6 +312,18 @@ def fresh_table(results: Mapping[str, Any], name: str) -> str:
     return markdown(["fidelity", *next(iter(results[name].values()))], rows)
 
 
+def fresh_summary(results: Mapping[str, Any]) -> str:
+    """Fresh swims beyond the promise, of all classes."""
+    rows = []
+    for fidelity in FRESH:
+        row = [f"`{fidelity}`"]
+        for name in TABLES:
+            out, n, most = zip(*results[name][fidelity].values(), strict=True)
+            row.append(f"{sum(out)} of {sum(n)}, {max(most):g}")
+        rows.append(row)
+    return markdown(["fidelity", "strokes", "decisions, limbs of silicone", "decisions, undamped limbs"], rows)
+
+
 # Own robots
 
 ROBOTS = {
@@ -360,6 +372,8 @@ PURPOSES: dict[Fidelity, str] = {
 ERRORS = ["random strokes", "repeated strokes", "random decisions", "held or repeated decisions"]
 SAID = (("wires", "silicone"), ("undamped", "none"))
 """Tables of decisions, and the damping of their limbs."""
+DETAILED: tuple[Fidelity, ...] = ("fast", "balanced", "accurate")
+"""Presets of which the page has the errors of decisions by class."""
 
 
 def in_table(fidelity: Fidelity, name: str = "strokes") -> Setting:
@@ -429,13 +443,13 @@ def presets(_: object) -> str:
     return markdown(head, rows)
 
 
-def by_class(_: object, names: Sequence[str]) -> str:
-    """Errors of all presets by class of commands, of strokes or of decisions."""
+def by_class(_: object, names: Sequence[str], fidelities: Iterable[Fidelity] = tuple(PURPOSES)) -> str:
+    """Errors of presets by class of commands, of strokes or of decisions."""
     classes = certificate_of(names[0]).settings[0].errors
     rows = [
         [f"`{fidelity}`", *([dict(SAID)[name]] if name in dict(SAID) else []),
          *(percent(known.errors[each], known.typical[each]).replace(" %", "") for each in classes)]
-        for name in names for fidelity in PURPOSES for known in [in_table(fidelity, name)]
+        for name in names for fidelity in fidelities for known in [in_table(fidelity, name)]
     ]  # fmt: skip
     damping = ["damping"] if names[0] in dict(SAID) else []
     return markdown(["fidelity", *damping, *(f"{each} [%]" for each in classes)], rows, range(1 + len(damping)))
@@ -502,7 +516,8 @@ STUDY = Study(
     "accuracy", run, Options, file="accuracy/fresh.json",
     tables={
         "errors": readme, "choosing": choosing, "presets": presets, "periods": by_period,
-        "strokes": partial(by_class, names=("strokes",)), "timed": partial(by_class, names=("wires", "undamped")),
-        "robots": robots_table, **{f"fresh {name}": partial(fresh_table, name=name) for name in TABLES},
+        "strokes": partial(by_class, names=("strokes",)),
+        "timed": partial(by_class, names=("wires", "undamped"), fidelities=DETAILED),
+        "robots": robots_table, "fresh": fresh_summary,
     },
 )  # fmt: skip

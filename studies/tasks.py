@@ -1,4 +1,4 @@
-"""Greedy rules of the tasks, on the held-out episodes of docs/tasks.md, whose column "greedy" is printed."""
+"""Greedy rules of the tasks, on the held-out episodes of docs/control.md, whose column "greedy" is printed."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -113,7 +113,7 @@ def held_out(id: str, n: int = HELD_OUT) -> float:
 
 @dataclass(frozen=True)
 class Options:
-    """Greedy rules of the tasks, on the held-out episodes of docs/tasks.md."""
+    """Greedy rules of the tasks, on the held-out episodes of docs/control.md."""
 
     tasks: tuple[str, ...] = tuple(TASKS)
     """Environments."""

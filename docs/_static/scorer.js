@@ -1,5 +1,5 @@
 /* The search of the guide: words in a title count, and pages that few ask for come last. */
-var LAST = /^(contributing|reference|numerics|equations|verification|extending)$/;
+var LAST = /^(contributing|reference|numerics|stability|equations|extending)$/;
 var ASKED = (new URLSearchParams(location.search).get("q") || "").toLowerCase().match(/\w{3,}/g) || [];
 var Scorer = {
   score: (result) =>

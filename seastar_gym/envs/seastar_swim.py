@@ -181,7 +181,7 @@ class SeastarSwimEnv(OneRobotEnv):
     <ids>
 
     `SeastarSwimHeading-v0` asks for headings, along the legs of the path. The threshold is `reward_threshold` of the
-    spec: about the mean return of the best rule in docs/tasks.md that is not told what is hidden; for `Station`, a
+    spec: about the mean return of the best rule in docs/control.md that is not told what is hidden; for `Station`, a
     little more. `Prizes` ends by itself a decision before its time limit.
 
     ## Tasks

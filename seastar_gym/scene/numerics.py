@@ -92,7 +92,7 @@ class Resolution(NamedTuple):
 
 DAMPING = 0.003
 """`Numerics.damping` of all fidelities but "chapter": the least that was tried with which energies of long swims do not
-grow (docs/numerics.md, "Long-run energy drift")."""
+grow (docs/stability.md, "Long-run energy drift")."""
 
 
 def _midpoint(step: float, newton_tolerance: float, damping: float = DAMPING) -> Numerics:

@@ -1,6 +1,6 @@
 """The simulator against exact solutions and published codes.
 
-Robot and fluid are the chapter's. `--update` writes the numbers that docs/verification.md shows.
+Robot and fluid are the chapter's. `--update` writes the numbers, some of which docs/validation.md shows.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Tasks in which there is more to gain than a greedy rule gains, by measurement; see docs/tasks.md.
+"""Tasks in which there is more to gain than a greedy rule gains, by measurement; see docs/control.md.
 
 A task is an object that says what is drawn, where the targets are and how a decision is scored, see
 `seastar_gym.envs.robots`; the environments of `SeastarSwim-v0` take it. Here they have names, and get ids.
