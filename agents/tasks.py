@@ -199,7 +199,7 @@ def card(id: str, policy: LearnedPolicy, file: Path) -> str:
         told = ' Its training\'s reward measured the way around all discs, `ObstTrap(potential="geodesic")`.'
     if policy.training.get("learner") == IMITATION:
         told = (
-            " It imitates the bundled policy of waypoints, which sees the true state.\n`docs/plant.md` says what "
+            " It imitates the bundled policy of waypoints, which sees the true state.\n`docs/transfer.md` says what "
             "delays and softer limbs cost it, and what other seeds make of it."
         )
     past = f" and the most telling numbers of the last {about.past}" if about.past else ""
