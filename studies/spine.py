@@ -69,7 +69,7 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     axes.set_ylim(-ROWS + 0.5, 0.6)
     axes.axis("off")
     axes.set_title(f"A decision passes {len(files)} files of {sum(each[2] for each in files):,} lines", fontsize=9)
-    save_figure(figure, file, dpi=160)
+    save_figure(figure, file, dpi=110)
 
 
 STUDY = Study("spine", run, file="spine/spine.json", pictures={"spine.png": draw})
