@@ -17,6 +17,8 @@ DOCS = Path(__file__).resolve().parents[1]
 MARKER = re.compile(r"^<!-- site: (\w+) ?(.*?) -->$", re.MULTILINE)
 OF_CODE = re.compile(r"\[(`?)([\w-]+)\1\]\((?:\.\./)?seastar_gym/[\w/]+\.py\)")
 """Links to code under the name of an id or a class."""
+OUTSIDE = re.compile(r"\]\((\.\./[\w./]+\.md)\)")
+"""Links to Markdown outside of the site, which are files to it."""
 
 
 def more_pages() -> str:
@@ -63,7 +65,8 @@ def to_page(link: re.Match[str]) -> str:
 def generate(app: Sphinx, page: str, source: list[str]) -> None:
     """Replace the markers of a page."""
     source[0] = MARKER.sub(lambda marker: GENERATORS[marker[1]](*marker[2].split()), source[0])
-    source[0] = OF_CODE.sub(to_page, source[0]) if "/" not in page else source[0]
+    if "/" not in page:
+        source[0] = OUTSIDE.sub(r"](path:\1)", OF_CODE.sub(to_page, source[0]))
 
 
 def pages_with_markers(app: Sphinx, *known: object) -> list[str]:

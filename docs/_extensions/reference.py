@@ -89,7 +89,7 @@ def defined(module: str, name: str) -> tuple[str, Definition | None]:
 def described(node: Definition, module: str) -> str:
     """Heading, and a directive that describes a class with its public methods, or a function; then its source."""
     kind = "class" if isinstance(node, ast.ClassDef) else "function"
-    parts = [listed(markdown(ast.get_docstring(node) or ""), arguments_of(node))]
+    parts = [listed(markdown(without_sections(ast.get_docstring(node) or "")), arguments_of(node))]
     if isinstance(node, ast.ClassDef):
         parts += [member(each) for each in node.body if isinstance(each, ast.FunctionDef) and is_told(each)]
         parts += attributes(node)
@@ -97,6 +97,14 @@ def described(node: Definition, module: str) -> str:
     source = f"Source: [{file}](../../{file}), line {node.lineno}."
     text = directive(f"py:{kind}", f"{module}.{node.name}{signature(node)}", parts, 6)
     return "\n\n".join([f"### {node.name}", text, source])
+
+
+def without_sections(text: str) -> str:
+    """Docstring of a task, with its arguments alone of the sections that the pages of its ids have."""
+    intro, *others = re.split(r"^## ", text, flags=re.MULTILINE)
+    said = [part.partition("\n")[2] for part in others if part.startswith("Arguments")]
+    pages = "Episodes, observation, reward and `info` are on the pages of [its ids](../environments.md#ids)."
+    return "\n".join([intro, pages, "", *said]) if said else text
 
 
 def is_told(method: ast.FunctionDef) -> bool:
