@@ -148,8 +148,9 @@ def arguments(id: str, env: Any, own: str) -> str:
 def baselines(id: str, env: Any) -> str:
     """What is kept of agents: references of the benchmark, and the card of the bundled policy."""
     parts = [references(id, measure_of_task(env.task)), card(id)]
-    others = next(name for name in ("tasks", "benchmark", "results") if (DOCS / f"{name}.md").is_file())
-    return "\n\n".join([*filter(None, parts), f"More agents: [{others}](../{others}.md)."])
+    pages = ("tasks", "benchmark") if IDS[id].task else ("results", "control", "controllers")
+    others = next((f"More agents: [{name}](../{name}.md)." for name in pages if (DOCS / f"{name}.md").is_file()), "")
+    return "\n\n".join(filter(None, [*parts, others]))
 
 
 def references(id: str, measure: Any) -> str:
