@@ -62,7 +62,7 @@ def page(id: str) -> str:
         "Baselines": baselines(id, env),
         "Version History": f"- {id.rpartition('-')[2]}: first release",
     }
-    parts = [f"# {id}", pictures(id), facts(id, env)]
+    parts = [f"# {id}", film(id), facts(id, env)]
     return "\n\n".join([*parts, *(f"## {title}\n\n{text.strip()}" for title, text in told.items())]) + "\n"
 
 
@@ -79,10 +79,12 @@ def linked(text: str) -> str:
     return PAGE.sub(lambda said: f"[{said[1]}](../{said[1]}.md)" if said[1] in there else said[0], text)
 
 
-def pictures(id: str) -> str:
-    """The film of an id, or its picture."""
-    file = next(f"ids/{id}{ending}" for ending in (".gif", ".png") if (DOCS / "ids" / f"{id}{ending}").is_file())
-    return f"![{IDS[id].goal}](../{file})"
+def film(id: str) -> str:
+    """The film of an id, and who swims."""
+    policy = bundled_for(id)
+    agent = f"the bundled policy `{policy.stem}`" if policy else "the gait `pentagon`"
+    told = f"Limbs are numbered. Swum by {agent}, ten times as fast as the robot (`python -m studies.ids`)."
+    return f"![{IDS[id].goal}](../ids/{id}.gif)\n\n{told}"
 
 
 def facts(id: str, env: Any) -> str:

@@ -42,11 +42,11 @@ class Id(NamedTuple):
 
 
 IDS: dict[str, Id] = {
-    "SeastarSwim-v0": Id("waypoints, by strokes", None, "limbs", 1.0, 400.0),
-    "SeastarSwimContinuous-v0": Id("waypoints, by weaker and stronger strokes", None, "continuous", 1.0, 400.0),
-    "SeastarSwimTimed-v0": Id("waypoints; wires are heated while others cool", None, "pairs", 0.5, 200.0),
-    "SeastarSwimTimedModerate-v0": Id("the same, decided more often", None, "pairs", 0.2, 200.0),
-    "SeastarSwimTimedHard-v0": Id("the same, decided at every heating pulse", None, "pairs", 0.1, 200.0),
+    "SeastarSwim-v0": Id("waypoints, a stroke a second", None, "limbs", 1.0, 400.0),
+    "SeastarSwimContinuous-v0": Id("waypoints, by strokes of any strength", None, "continuous", 1.0, 400.0),
+    "SeastarSwimTimed-v0": Id("waypoints, two decisions a second", None, "pairs", 0.5, 200.0),
+    "SeastarSwimTimedModerate-v0": Id("waypoints, five decisions a second", None, "pairs", 0.2, 200.0),
+    "SeastarSwimTimedHard-v0": Id("waypoints, ten decisions a second", None, "pairs", 0.1, 200.0),
     "SeastarSwimHeading-v0": Id(
         "waypoints, with limb 1 pointing along the legs of the path", None, "pairs", 0.5, 300.0,
         more={"headings": {"version": 1, "kind": "HeadingTargets"}},
