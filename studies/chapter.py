@@ -301,8 +301,8 @@ def draw_robot(axes: Axes, swim: Swim, time: float) -> None:
         line = nodes[[0, *range(1 + limb * (n - 1), 1 + (limb + 1) * (n - 1))]]
         colour, width, level = (ACTUATED, 3.2, 4.0) if active[limb] else (LIMB, 1.8, 3.0)
         axes.plot(*line.T, color=colour, linewidth=width, solid_capstyle="round", zorder=level)
-        place = line[-1] + NUMBERS * (line[-1] - line[-2]) / np.hypot(*(line[-1] - line[-2]))
-        axes.text(*place, f"{limb + 1}", color=INK, fontsize=8, ha="center", va="center", zorder=6.0)
+        x, y = line[-1] + NUMBERS * (line[-1] - line[-2]) / np.hypot(*(line[-1] - line[-2]))
+        axes.text(x, y, f"{limb + 1}", color=INK, fontsize=8, ha="center", va="center", zorder=6.0)
     axes.plot(*nodes[0], marker="o", markersize=4.5, color=INK, zorder=5.0)
 
 
