@@ -18,6 +18,7 @@ myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 4
 
 toc_object_entries_show_parents = "hide"
+maximum_signature_line_length = 80  # of longer ones, every argument has a line
 
 html_theme = "furo"
 html_title = f"seastar-gym {release}"

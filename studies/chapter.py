@@ -289,14 +289,20 @@ CHAPTER_PATH: dict[str, Any] = {"color": ORANGE, "linewidth": 1.1, "zorder": 3.6
 PAIR_COLOURS = ("#0072b2", "#009e73", "#cc3d7a", "#8c6d1f")
 
 
+NUMBERS = 8.0
+"""Distance of a limb's number from its tip [mm]."""
+
+
 def draw_robot(axes: Axes, swim: Swim, time: float) -> None:
-    """Draw the robot at a time [s] on axes in mm, with actuated limbs bold and blue."""
+    """Draw the robot at a time [s] on axes in mm, limbs numbered, with actuated ones bold and blue."""
     n = swim.scene.robot.nodes_per_limb
     nodes, active = MM * swim.positions[swim.at(time), 0], swim.actuated(time)
     for limb in range(swim.scene.robot.n_limbs):
         line = nodes[[0, *range(1 + limb * (n - 1), 1 + (limb + 1) * (n - 1))]]
         colour, width, level = (ACTUATED, 3.2, 4.0) if active[limb] else (LIMB, 1.8, 3.0)
         axes.plot(*line.T, color=colour, linewidth=width, solid_capstyle="round", zorder=level)
+        x, y = line[-1] + NUMBERS * (line[-1] - line[-2]) / np.hypot(*(line[-1] - line[-2]))
+        axes.text(x, y, f"{limb + 1}", color=INK, fontsize=8, ha="center", va="center", zorder=6.0)
     axes.plot(*nodes[0], marker="o", markersize=4.5, color=INK, zorder=5.0)
 
 

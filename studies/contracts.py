@@ -1,45 +1,35 @@
 """Blocks of pages that no study makes: ids, contracts of environments, and numbers that tests keep."""
 
-import importlib
 import inspect
 import json
 import re
+from functools import partial
 from typing import Any
 
 import gymnasium as gym
 
-from seastar_gym import TASKS
+from seastar_gym.envs import IDS
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from studies.frame import DOCS, Study
 from studies.pages import markdown
 
 
 def environments() -> str:
-    """Table of all ids: what `gym.make` gives by default. Tasks have a link to what their docstring says."""
-    head, rows = ["id", "contract", "actions", "numbers seen", "decision [s]", "limit [decisions]", "threshold"], []
-    for spec in specs():
-        env: Any = gym.make(spec.id, disable_env_checker=True).unwrapped
-        of = type(env.task if spec.id in TASKS else env)
-        place = f"../{of.__module__.replace('.', '/')}.py" if spec.id in TASKS else f"#{of.__name__.lower()}"
-        numbers = env.observation_space.shape[0], env.decision_period, spec.max_episode_steps, spec.reward_threshold
-        shown = ("-" if number is None else f"{number:g}" for number in numbers)
-        rows.append([f"`{spec.id}`", f"[{of.__name__}]({place})", f"`{env.action_space}`", *shown])
+    """Table of all ids: pictures, what `gym.make` gives by default, and links to docstrings."""
+    head, rows = ["id", "asks for", "actions", "numbers seen", "decision [s]"], []
+    for id, row in IDS.items():
+        env: Any = gym.make(id, disable_env_checker=True).unwrapped
+        place = type(env if row.task is None else env.task).__module__.replace(".", "/")
+        numbers = env.observation_space.shape[0], row.decision_period
+        link = f"[`{id}`](../{place}.py)<br>![{id}](ids/{id}.png)"
+        rows.append([link, row.goal, f"`{env.action_space}`", *(f"{number:g}" for number in numbers)])
     return markdown(head, rows, (0, 1, 2))
 
 
-def specs() -> list[Any]:
-    """What is registered of the package, in its order."""
-    return [spec for spec in gym.registry.values() if str(spec.entry_point).startswith("seastar_gym.")]
-
-
-def contracts() -> str:
-    """Docstring of every class of environments, with its headings one level deeper and its arguments as a list."""
-    points = dict.fromkeys(point for spec in specs() for point in (spec.entry_point, spec.vector_entry_point) if point)
-    sections = []
-    for module, name in (str(point).split(":") for point in points):
-        said = inspect.getdoc(getattr(importlib.import_module(module), name)) or ""
-        listed = re.sub(r"^(\w+(?:, \w+)*): ", r"- **\1**: ", said, flags=re.MULTILINE)
-        sections.append(f"## {name}\n\n{re.sub('^#', '##', listed, flags=re.MULTILINE)}")
-    return "\n\n".join(sections)
+def contract(title: str) -> str:
+    """First table of a section of the docstring of `SeastarSwimEnv`."""
+    section = str(inspect.getdoc(SeastarSwimEnv)).partition(f"\n## {title}\n")[2].partition("\n## ")[0]
+    return "|" + section.partition("\n|")[2].partition("\n\n")[0]
 
 
 SHOWN = ("elastica", "frequencies", "drag", "waves", "published")
@@ -56,5 +46,8 @@ def exact() -> str:
     return markdown(["quantity", "reference", "ours", "difference"], kept)
 
 
-TABLES = {"contracts": contracts, "environments": environments, "exact": exact}
+TABLES = {
+    "environments": environments, "exact": exact,
+    **{f"contract {title}": partial(contract, title) for title in ("Action space", "Observation space", "Reward")},
+}  # fmt: skip
 STUDY = Study("contracts", tables={name: lambda _, of=of: of() for name, of in TABLES.items()})  # type: ignore[misc]

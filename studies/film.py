@@ -16,29 +16,30 @@ from seastar_gym.evaluation.films import Picture, shrunk, write_gif
 from seastar_gym.evaluation.rollout import Info, rollout
 from studies.frame import Results, Study
 
-BETWEEN = 0.4
-"""Simulated time between two frames [s]."""
-FPS = 20
+LOOKS, BETWEEN = 0.2, 1.2
+"""Simulated time between two looks, and between two frames [s]: strokes of 1 s are seen at other phases in turn."""
+FPS = 7
 """Frames per second of the film: eight times as fast as the robot."""
-REST = 20
+REST = 7
 """Frames for which the film rests on its end."""
 
 
 def frames(policy: Policy, per_decision: int, most: int | None = None, **arguments: Any) -> list[Picture]:
     """Pictures of a swim round the pentagon every BETWEEN seconds, `most` of them at most, and that of its end.
 
-    per_decision: Number of parts of BETWEEN/2 in a decision.
+    per_decision: Number of looks in a decision.
     """
+    each = round(BETWEEN / LOOKS)
     env = SeastarSwimEnv(render_mode="rgb_array_list", frames_per_stroke=per_decision, **arguments)
     drawn = list[Picture]()
 
     def look(info: Info) -> bool:
         drawn.extend(map(shrunk, env.render() or []))
-        return most is not None and len(drawn) > 2 * most
+        return most is not None and len(drawn) > each * most
 
     rollout(env, policy, seeds=0, on_step=look)
     env.close()
-    return [*drawn[2::2], drawn[-1]][:most]  # the first picture is of the robot at rest
+    return [*drawn[each::each], drawn[-1]][:most]  # the first picture is of the robot at rest
 
 
 def side_by_side(left: list[Picture], right: list[Picture]) -> list[Picture]:
@@ -53,7 +54,7 @@ def run(results: Results) -> None:
     # As `seastar swim` shows it, and at the same fidelity as the other.
     period = policy.decision_period
     learned = frames(policy, 1, actions=policy.actions, fidelity="balanced", decision_period=period)
-    chapter = frames(gait, round(2 / BETWEEN), len(learned), actions=gait.actions, fidelity="balanced")
+    chapter = frames(gait, round(1.0 / LOOKS), len(learned), actions=gait.actions, fidelity="balanced")
     film = side_by_side(chapter, learned)
     write_gif(film + [film[-1]] * REST, results.out, FPS)
     print(f"Written: {results.out}, {len(film)} frames of {BETWEEN} s.")

@@ -1,9 +1,9 @@
 """Pictures and costs of scenes that differ from the default; writes `gallery.json`.
 
-A picture shows the robot at rest (grey), at the end of heating (blue) and its hub's path, and below the robot the cross
-sections at root and tip of limbs that are no plain discs. The cost is the processor
-time of a stroke of random commands relative to that of the default scene. Scenes take turns, stroke by stroke, so that
-other work of the machine affects all of them alike, and the median over strokes counts.
+A picture shows the robot at rest (grey, limbs numbered), at the end of heating (blue) and its hub's path, and below the
+robot the cross sections at root and tip of limbs that are no plain discs. The cost is the processor time of a stroke of
+random commands relative to that of the default scene. Scenes take turns, stroke by stroke, so that other work of the
+machine affects all of them alike, and the median over strokes counts.
 """
 
 import time
@@ -28,6 +28,8 @@ ROBOTS, ROUNDS, STROKES = 64, 9, 5
 """Robots and rounds of the measured cost, and strokes in a picture."""
 REST, HEATED, PATH = "#c8c8c8", "#2b6cb0", "#c53030"
 SECTION, LARGER, SECTIONS = "#4a5568", 4.0, -84.0
+NUMBERS = 7e-3
+"""Distance of a limb's number from its tip at rest [m]."""
 TURN, CORNERS = np.linspace(0.0, 2.0 * np.pi, 60), np.array([[-1.0, 1.0, 1.0, -1.0], [-1.0, -1.0, 1.0, 1.0]])
 """Colour of cross sections, how much larger than the robot they are drawn, and how high [mm]; outlines."""
 
@@ -137,6 +139,9 @@ def draw(exhibit: Exhibit, file: Path) -> None:
         for limb, shape in zip(limbs, robot.limb_shapes(), strict=True):
             reach = [cut.reach for cut in shape.cuts(robot.density, share)]
             axes.fill(*1e3 * outline(np.concatenate([nodes[:1], limb]), np.array(reach)).T, color=colour, linewidth=0.5)
+    for limb, tip in enumerate(shapes[0][1:].reshape(robot.n_limbs, -1, 2)[:, -1], start=1):
+        place = tip * (1.0 + NUMBERS / np.hypot(*tip))
+        axes.text(*1e3 * place, f"{limb}", color=INK, fontsize=7, ha="center", va="center")
     axes.plot(*1e3 * np.array(hub).T, color=PATH, linewidth=1.2)
     draw_sections(axes, robot.limb_shapes()[0].section)
     axes.plot([-120.0, -70.0], [-116.0, -116.0], color=INK, linewidth=1.5)

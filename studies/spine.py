@@ -42,7 +42,7 @@ sys.setprofile(None)
 print(json.dumps([[file, name, len((package / file).read_text().splitlines())] for file, name in passed.items()]))
 """
 COLOURS = ("#2b6cb0", "#c05621", "#2f855a", "#6b46c1", "#b7791f", "#c53030", "#4a5568", "#0987a0")
-ROWS = 12
+ROWS = 24
 
 
 def run(results: Results) -> None:
@@ -69,7 +69,7 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     axes.set_ylim(-ROWS + 0.5, 0.6)
     axes.axis("off")
     axes.set_title(f"A decision passes {len(files)} files of {sum(each[2] for each in files):,} lines", fontsize=9)
-    save_figure(figure, file, dpi=160)
+    save_figure(figure, file, dpi=118)
 
 
 STUDY = Study("spine", run, file="spine/spine.json", pictures={"spine.png": draw})

@@ -3,9 +3,12 @@
 import ast
 import doctest
 import importlib
+import inspect
 import json
 import re
 import sys
+from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 from types import ModuleType
 
@@ -13,6 +16,7 @@ import gymnasium as gym
 import pytest
 
 import seastar_gym
+from documented import documented
 from seastar_gym import Numerics, Scene
 from seastar_gym.accuracy import measure
 from seastar_gym.accuracy import measure as endurance
@@ -151,3 +155,74 @@ def test_pages_and_files_that_code_and_pages_name_are_there():
     code = re.findall(r"`((?:seastar_gym|tests|rods)/[\w/]+\.py)`", extending)
     assert len(code) > 8
     assert [name for name in code if not any((base / name).is_file() for base in (ROOT, ROOT / "seastar_gym"))] == []
+
+
+TABLE = re.compile(r"^\|.*\n(?:\|.*(?:\n|\Z))+", re.MULTILINE)
+NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?")
+
+
+def rows(table: str) -> set[tuple[float, ...]]:
+    """Numbers of the rows of a table that have two or more, whatever stands around them."""
+    lines = (LINK.sub("", line) for line in table.splitlines()[2:])
+    numbers = (tuple(map(float, NUMBER.findall(line))) for line in lines)
+    return {found for found in numbers if len(found) > 1}
+
+
+def repeated(texts: dict[str, str]) -> Iterator[tuple[str, str, tuple[float, ...]]]:
+    """Pages whose tables have two rows in common, and one of these."""
+    tables = [(name, rows(table)) for name, text in texts.items() for table in TABLE.findall(text)]
+    for (page, one), (other, another) in combinations(tables, 2):
+        if page != other and len(one & another) > 1:
+            yield page, other, min(one & another)
+
+
+def test_no_table_stands_on_two_pages():
+    """It is kept where it belongs, and others link to it. README shows some rows of the guide."""
+    texts = {page.name: FENCED.sub("", page.read_text(encoding="utf-8")) for page in PAGES[1:]}
+    assert sum(len(TABLE.findall(text)) for text in texts.values()) > 50
+    assert [*repeated(texts)] == []
+
+
+HEAD = "| n | [m] | [s] |\n|---|---:|---:|\n"
+
+
+@pytest.mark.parametrize(
+    "copy", ["| `a` | 1.50 | 3 |\n| [b](c1.md) | **2** | -4 s |", "| 1.5 | 3 | x |\n| 2.0, -4 | y |"]
+)
+def test_a_table_that_is_copied_is_found(copy):
+    kept = f"# One\n\n{HEAD}| a | 1.5 | 3 |\n| b | 2 | -4 |\n| c | 3 | 5 |\n"
+    found = [*repeated({"one.md": kept, "two.md": f"{HEAD}{copy}\n| d | 7 | 8 |\n"})]
+    assert found == [("one.md", "two.md", (1.5, 3.0))]
+    assert [*repeated({"one.md": kept, "two.md": f"{HEAD}| a | 1.5 | 3 |\n| b | 2 | 4 |\n"})] == []
+
+
+# Pages that are made when the site is built
+
+SECTIONS = ["Description", "Action Space", "Observation Space", "Rewards", "Starting State", "Episode End", "Info",
+            "Arguments", "Baselines", "Version History"]  # fmt: skip
+"""As Gymnasium's pages of environments have them."""
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """Generated pages in Markdown, by their files."""
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "_extensions"))
+    pages = {name: importlib.import_module(name).pages() for name in ("environments", "reference")}
+    return {
+        ROOT / "docs" / place / f"{name}.md": text for place, found in pages.items() for name, text in found.items()
+    }
+
+
+def test_every_id_and_every_documented_name_has_its_place_on_a_page(made):
+    for id in seastar_gym.IDS:
+        text = made[ROOT / "docs" / "environments" / f"{id}.md"]
+        assert re.findall(r"^## (.+)$", text, re.MULTILINE) == SECTIONS
+        assert all(part.strip() for part in re.split(r"^## .+$", text, flags=re.MULTILINE))
+    named = [name for text in made.values() for name in re.findall(r"^### (\w+)$", text, re.MULTILINE)]
+    in_package = {name for name, module in documented().items() if module.startswith("seastar_gym")}
+    exported = {name for name in dir(seastar_gym) if inspect.isclass(getattr(seastar_gym, name))}
+    assert in_package | exported <= {*named} and len(named) == len({*named})
+    lost = {name: target for page, text in made.items() for target, _ in LINK.findall(text)
+            if (name := page.name) and target and (file := (page.parent / target).resolve()) not in made
+            and not file.is_file()}  # fmt: skip
+    assert lost == {}

@@ -2,32 +2,66 @@
 
 import ast
 import re
+from collections.abc import Collection
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+NAMED = re.compile(r"^<!-- site: names (\S+) (.*) -->$", re.MULTILINE)
+LONGEST = 48
+"""Most characters of a default that is shown."""
 Definition = ast.ClassDef | ast.FunctionDef
 FIELD = re.compile(r"^([*\w]+(?:, [*\w]+)*): (?=\S)", re.MULTILINE)
 EXAMPLE = re.compile(r"^(>>> .*(?:\n.+)*)", re.MULTILINE)
 HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 
 
-def public(package: str) -> str:
-    """Reference of the names that a package exports, in its order."""
-    return "\n\n".join(
-        described(node, package, 6) for _, node in (defined(package, name) for name in exported(package)) if node
-    )
+def rooms() -> dict[str, dict[str, list[str]]]:
+    """Documented names by their rooms, the folders of the package, and by their modules.
+
+    They are what the package exports, and what docs/reference.md names.
+    """
+    found: dict[str, dict[str, list[str]]] = {}
+    exports = [(defined("seastar_gym", name), name) for name in exported("seastar_gym")]
+    named = NAMED.findall((DOCS / "reference.md").read_text(encoding="utf-8"))
+    pairs = [(module, name) for (module, node), name in exports if node]
+    pairs += [(module, name) for module, words in named for name in words.split()]
+    for module, name in sorted(pairs):
+        found.setdefault(module.split(".")[1], {}).setdefault(module, []).append(name)
+    return found
 
 
-def names(module: str, *named: str) -> str:
-    """Docstring of a module, and reference of some of its names."""
-    told = [described(node, module, 6) for _, node in (defined(module, name) for name in named) if node]
-    return "\n\n".join([markdown(ast.get_docstring(parsed(module)) or ""), *told])
+def pages() -> dict[str, str]:
+    """Pages of all rooms in Markdown, by the names of the rooms."""
+    return {room: page(room, modules) for room, modules in rooms().items()}
+
+
+def page(room: str, modules: dict[str, list[str]]) -> str:
+    """Page of a room: what its package says, then its names, module by module."""
+    parts = [f"# seastar_gym.{room}", (ast.get_docstring(parsed(f"seastar_gym.{room}")) or "").partition("\n\n")[0]]
+    for module, names in modules.items():
+        found = [defined(module, name) for name in names]
+        parts += [f"## {module}", *(described(node, place) for place, node in found if node)]
+    return "\n\n".join(parts) + "\n"
+
+
+def table() -> str:
+    """Table of all rooms and their names, with links."""
+    rows = ["| room | names |", "|---|---|"]
+    for room, modules in rooms().items():
+        names = sorted((name for found in modules.values() for name in found), key=str.lower)
+        links = ", ".join(f"[{name}](reference/{room}.md#{name.lower()})" for name in names)
+        rows.append(f"| [{room}](reference/{room}.md) | {links} |")
+    return "\n".join(rows)
+
+
+def file_of(module: str) -> Path:
+    place = ROOT.joinpath(*module.split("."))
+    return place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
 
 
 def parsed(module: str) -> ast.Module:
-    place = ROOT.joinpath(*module.split("."))
-    file = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
-    return ast.parse(file.read_text(encoding="utf-8"))
+    return ast.parse(file_of(module).read_text(encoding="utf-8"))
 
 
 def exported(package: str) -> list[str]:
@@ -52,28 +86,38 @@ def defined(module: str, name: str) -> tuple[str, Definition | None]:
     return module, None
 
 
-def described(node: Definition, module: str, fence: int) -> str:
-    """Directive that describes a class with its public methods, or a function, folded under its name."""
+def described(node: Definition, module: str) -> str:
+    """Heading, and a directive that describes a class with its public methods, or a function; then its source."""
     kind = "class" if isinstance(node, ast.ClassDef) else "function"
-    folded = '<details class="name"><summary>{}</summary>\n\n{}\n\n</details>'.format
-    parts = [markdown(ast.get_docstring(node) or "")]
+    parts = [listed(markdown(without_sections(ast.get_docstring(node) or "")), arguments_of(node))]
     if isinstance(node, ast.ClassDef):
-        parts += [member(each, fence - 1) for each in node.body if isinstance(each, ast.FunctionDef) and is_told(each)]
+        parts += [member(each) for each in node.body if isinstance(each, ast.FunctionDef) and is_told(each)]
         parts += attributes(node)
-    return folded(node.name, directive(f"py:{kind}", f"{module}.{node.name}{signature(node)}", parts, fence))
+    file = file_of(module).relative_to(ROOT)
+    source = f"Source: [{file}](../../{file}), line {node.lineno}."
+    text = directive(f"py:{kind}", f"{module}.{node.name}{signature(node)}", parts, 6)
+    return "\n\n".join([f"### {node.name}", text, source])
+
+
+def without_sections(text: str) -> str:
+    """Docstring of a task, with its arguments alone of the sections that the pages of its ids have."""
+    intro, *others = re.split(r"^## ", text, flags=re.MULTILINE)
+    said = [part.partition("\n")[2] for part in others if part.startswith("Arguments")]
+    pages = "Episodes, observation, reward and `info` are on the pages of [its ids](../environments.md#ids)."
+    return "\n".join([intro, pages, "", *said]) if said else text
 
 
 def is_told(method: ast.FunctionDef) -> bool:
     return not method.name.startswith("_") and ast.get_docstring(method) is not None
 
 
-def member(node: ast.FunctionDef, fence: int) -> str:
+def member(node: ast.FunctionDef) -> str:
     decorators = [ast.unparse(each) for each in node.decorator_list]
-    text = [markdown(ast.get_docstring(node) or "")]
+    text = [listed(markdown(ast.get_docstring(node) or ""), arguments_of(node))]
     if any("property" in each for each in decorators):
-        return directive("py:property", node.name, text, fence)
+        return directive("py:property", node.name, text, 5)
     arguments = of_function(node, bound="staticmethod" not in decorators)
-    return directive("py:method", f"{node.name}{arguments}", text, fence)
+    return directive("py:method", f"{node.name}{arguments}", text, 5)
 
 
 def attributes(node: ast.ClassDef) -> list[str]:
@@ -113,11 +157,26 @@ def of_function(node: ast.FunctionDef, bound: bool) -> str:
         args=[ast.arg(each.arg) for each in arguments.args][1 if bound else 0 :],
         vararg=arguments.vararg and ast.arg(arguments.vararg.arg),
         kwonlyargs=[ast.arg(each.arg) for each in arguments.kwonlyargs],
-        kw_defaults=arguments.kw_defaults,
+        kw_defaults=[value and abridged(value) for value in arguments.kw_defaults],
         kwarg=arguments.kwarg and ast.arg(arguments.kwarg.arg),
-        defaults=arguments.defaults,
+        defaults=[abridged(value) for value in arguments.defaults],
     )
     return f"({ast.unparse(plain)})"
+
+
+def arguments_of(node: Definition) -> list[str]:
+    """Names of a function's arguments, of a class's constructor, or of its fields."""
+    if isinstance(node, ast.ClassDef):
+        made = [each for each in node.body if isinstance(each, ast.FunctionDef) and each.name == "__init__"]
+        fields = [each.target for each in node.body if isinstance(each, ast.AnnAssign)]
+        return arguments_of(made[0]) if made else [field.id for field in fields if isinstance(field, ast.Name)]
+    given = node.args
+    return [each.arg for each in (*given.posonlyargs, *given.args, *given.kwonlyargs) if each.arg != "self"]
+
+
+def abridged(value: ast.expr) -> ast.expr:
+    """A default, or dots for one that is long."""
+    return value if len(ast.unparse(value)) <= LONGEST else ast.Constant(...)
 
 
 def of_fields(node: ast.ClassDef) -> str:
@@ -136,7 +195,7 @@ def of_fields(node: ast.ClassDef) -> str:
 def default(value: ast.expr) -> str:
     """A field's default; of a `field(...)`, what its factory makes."""
     if not (isinstance(value, ast.Call) and ast.unparse(value.func) == "field"):
-        return ast.unparse(value)
+        return ast.unparse(abridged(value))
     chosen = {word.arg: word.value for word in value.keywords}
     if "default" in chosen:
         return ast.unparse(chosen["default"])
@@ -147,8 +206,34 @@ def default(value: ast.expr) -> str:
 
 
 def markdown(text: str) -> str:
-    """Docstring with its arguments as a list, its headings as words, and its examples as code."""
+    """Docstring with its headings as words, its examples as code, and rows of tables in one line each."""
     pieces = EXAMPLE.split(text)
-    pieces[::2] = [HEADING.sub(r"**\1**", FIELD.sub(r"- **\1**: ", words)) for words in pieces[::2]]
+    pieces[::2] = [one_line_each(HEADING.sub(r"**\1**", words)) for words in pieces[::2]]
     pieces[1::2] = [f"```pycon\n{example}\n```" for example in pieces[1::2]]
     return "".join(pieces)
+
+
+def one_line_each(text: str) -> str:
+    """Text in which a row of a table with a single cell goes on in that cell of the row above."""
+    lines: list[str] = []
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")] if line.startswith("|") else []
+        if len(cells) > 2 and sum(map(bool, cells)) == 1 and lines:
+            above = [cell.strip() for cell in lines[-1].strip("|").split("|")]
+            lines[-1] = f"| {' | '.join(f'{a} {b}'.strip() for a, b in zip(above, cells, strict=True))} |"
+        else:
+            lines.append(line)
+    return "\n".join(lines)
+
+
+def listed(text: str, arguments: Collection[str] = ()) -> str:
+    """Text with its arguments as a list.
+
+    A line `name: ..` begins one unless the line before goes on in it, and so does the name of one of the arguments
+    after a full stop.
+    """
+    lines = text.splitlines()
+    ends = [True, *(not line or line.startswith(("#", "**")) or line.endswith((".", ":")) for line in lines)]
+    told = "\n".join(FIELD.sub(r"- **\1**: ", line) if end else line for line, end in zip(lines, ends, strict=False))
+    names = "|".join(map(re.escape, arguments))
+    return re.sub(rf"(?<=\.)\s+((?:{names})(?:, (?:{names}))*): ", r"\n- **\1**: ", told) if names else told

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import Policy, as_floating, can_be_decided_by, memory_of, starts
 from seastar_gym.controllers.description import Description, read_facts
+from seastar_gym.envs import IDS, STROKE
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.sight import FOR_CAMERA, Sight, told
 from seastar_gym.envs.symmetry import FrameStack
@@ -283,6 +284,13 @@ def bundled_file(decision_period: float | None, bundled: Path = BUNDLED, task: s
     if task is not None and (file := of_task(task, decision_period)).is_file():
         return file
     return bundled if decision_period is None else bundled.with_stem(f"timed-{decision_period:g}s")
+
+
+def bundled_for(id: str) -> Path | None:
+    """File of the bundled policy that was trained for a registered id; None where there is none."""
+    row = IDS[id]
+    file = bundled_file(None if row.decision_period == STROKE else row.decision_period, task=row.task)
+    return file if file.is_file() and row.actions != "continuous" and not row.more else None
 
 
 def by_name() -> dict[str, Path]:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 class Id(NamedTuple):
     """What a registered environment is made of."""
 
+    goal: str
+    """What it asks for, in a few words."""
     task: str | None
     """Name of the task; None for waypoints."""
     actions: "Actions"
@@ -40,25 +42,26 @@ class Id(NamedTuple):
 
 
 IDS: dict[str, Id] = {
-    "SeastarSwim-v0": Id(None, "limbs", 1.0, 400.0),
-    "SeastarSwimContinuous-v0": Id(None, "continuous", 1.0, 400.0),
-    "SeastarSwimTimed-v0": Id(None, "pairs", 0.5, 200.0),
-    "SeastarSwimTimedModerate-v0": Id(None, "pairs", 0.2, 200.0),
-    "SeastarSwimTimedHard-v0": Id(None, "pairs", 0.1, 200.0),
+    "SeastarSwim-v0": Id("waypoints, a stroke a second", None, "limbs", 1.0, 400.0),
+    "SeastarSwimContinuous-v0": Id("waypoints, by strokes of any strength", None, "continuous", 1.0, 400.0),
+    "SeastarSwimTimed-v0": Id("waypoints, two decisions a second", None, "pairs", 0.5, 200.0),
+    "SeastarSwimTimedModerate-v0": Id("waypoints, five decisions a second", None, "pairs", 0.2, 200.0),
+    "SeastarSwimTimedHard-v0": Id("waypoints, ten decisions a second", None, "pairs", 0.1, 200.0),
     "SeastarSwimHeading-v0": Id(
-        None, "pairs", 0.5, 300.0, more={"headings": {"version": 1, "kind": "HeadingTargets"}}
+        "waypoints, with limb 1 pointing along the legs of the path", None, "pairs", 0.5, 300.0,
+        more={"headings": {"version": 1, "kind": "HeadingTargets"}},
     ),
-    "SeastarMiswired-v0": Id("miswired", "joint", 1.0, 400.0, 150.0),
-    "SeastarMiswiredTimed-v0": Id("miswired", "joint", 0.5, 400.0, 145.0),
-    "SeastarPrey-v0": Id("prey", "pairs", 1.0, 200.0, 80.0),
-    "SeastarPreyTimed-v0": Id("fast-prey", "pairs", 0.5, 200.0, 130.0),
-    "SeastarStation-v0": Id("station", "joint", 1.0, 120.0, -20.0),
-    "SeastarFailBlind-v0": Id("fail-blind", "joint", 1.0, 500.0, 150.0),
-    "SeastarObstTrap-v0": Id("obst-trap", "pairs", 1.0, 300.0, 95.0),
-    "SeastarObstTrapTimed-v0": Id("obst-trap", "pairs", 0.5, 200.0, 94.0),
-    "SeastarPrizes-v0": Id("prizes", "pairs", 1.0, 201.0, 80.0),
-    "SeastarPrizesTimed-v0": Id("fast-prizes", "pairs", 0.5, 115.5, 76.0),
-    "SeastarSwimSimToReal-v0": Id("sim-to-real", "pairs", 0.2, 300.0, 145.0),
+    "SeastarMiswired-v0": Id("waypoints; wires may be swapped", "miswired", "joint", 1.0, 400.0, 150.0),
+    "SeastarMiswiredTimed-v0": Id("waypoints; wires may be swapped", "miswired", "joint", 0.5, 400.0, 145.0),
+    "SeastarPrey-v0": Id("catch faster prey on a closed course", "prey", "pairs", 1.0, 200.0, 80.0),
+    "SeastarPreyTimed-v0": Id("catch faster prey on a closed course", "fast-prey", "pairs", 0.5, 200.0, 130.0),
+    "SeastarStation-v0": Id("keep a place in a current", "station", "joint", 1.0, 120.0, -20.0),
+    "SeastarFailBlind-v0": Id("waypoints with two dead limbs", "fail-blind", "joint", 1.0, 500.0, 150.0),
+    "SeastarObstTrap-v0": Id("a goal behind a horseshoe of discs", "obst-trap", "pairs", 1.0, 300.0, 95.0),
+    "SeastarObstTrapTimed-v0": Id("a goal behind a horseshoe of discs", "obst-trap", "pairs", 0.5, 200.0, 94.0),
+    "SeastarPrizes-v0": Id("more prizes than can be reached", "prizes", "pairs", 1.0, 201.0, 80.0),
+    "SeastarPrizesTimed-v0": Id("more prizes than can be reached", "fast-prizes", "pairs", 0.5, 115.5, 76.0),
+    "SeastarSwimSimToReal-v0": Id("waypoints, seen by a late camera", "sim-to-real", "pairs", 0.2, 300.0, 145.0),
 }  # fmt: skip
 """All environments of the package."""
 TASKS = {id: row for id, row in IDS.items() if row.task is not None}

@@ -253,7 +253,7 @@ class Renderer:
         self._number_waypoints(frame.waypoint_index)
         self._paint_robot(frame)
         self._mark_limb_1(frame)
-        self._name_heated_limbs(frame)
+        self._name_limbs(frame)
         self._write_header(frame)
         self._write_footer(", ".join(filter(None, (self._flow_in(frame.current).words, frame.scenery.note))))
         self._canvas.finish()
@@ -406,14 +406,15 @@ class Renderer:
             colour = STATE_COLOURS[max(_state(index, waypoint_index) for index in label.indices)]
             self._canvas.write(text, place, mixed(colour, INK, 0.6), (0.5, 0.5))
 
-    def _name_heated_limbs(self, frame: Frame) -> None:
+    def _name_limbs(self, frame: Frame) -> None:
+        """Numbers of the limbs beyond their tips, as commands name them, with the sign of those that are heated."""
         last_edges = frame.positions[self._limb_nodes[:, -1]] - frame.positions[self._limb_nodes[:, -2]]
         angles = np.arctan2(last_edges[:, 1], last_edges[:, 0])
         outward = np.column_stack([np.cos(angles), -np.sin(angles)])
         places = self.camera.to_pixels(frame.positions[self._limb_nodes[:, -1]]) + 1.1 * self._text_height * outward
-        for limb in np.flatnonzero(frame.command):
-            command = frame.command[limb]
-            self._canvas.write(f"{limb + 1}{_sign(command)}", places[limb], _limb_colour(command), (0.5, 0.5))
+        for limb, (command, place) in enumerate(zip(frame.command, places, strict=True), start=1):
+            name = f"{limb}{_sign(command) if command else ''}"
+            self._canvas.write(name, place, _limb_colour(command), (0.5, 0.5))
 
     def _write_header(self, frame: Frame) -> None:
         width, _ = self.size

@@ -343,7 +343,7 @@ class SeastarSwimEnv(OneRobotEnv):
 
     ## Episode end
     `terminated`: the last waypoint is reached, or the solver failed, which has never been seen within a scene's limits;
-    the observation then shows the last valid state. `truncated`: the time limit of `gym.make`, see the table of ids.
+    the observation then shows the last valid state. `truncated`: the time limit of the id is over.
 
     ## Arguments
     path: Name of a path - "pentagon", "square", "triangle", "line", "figure-eight", "random", or one that

@@ -116,8 +116,9 @@ def contract(id: str) -> str:
         observations, rewards, *_ = batch.step(np.full(1, action))
         seen += [observations, rewards]
     batch.close()
+    row = IDS[id]._replace(threshold=None)._asdict()
     said = {
-        "id": id, "row": IDS[id]._replace(threshold=None)._asdict(), "task": to_dict(inner.task),
+        "id": id, "row": {name: value for name, value in row.items() if name != "goal"}, "task": to_dict(inner.task),
         "scene": to_dict(inner.scene), "splits": SIZES, "episodes": EPISODES,
     }  # fmt: skip
     numbers = [f"{x:.5e}" if abs(x) > NOTHING else "0" for part in seen for x in np.ravel(part).tolist()]

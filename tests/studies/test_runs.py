@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene, Seastar
+from seastar_gym import TASKS, Numerics, Scene, Seastar
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.scene.actuators.sma_limb import FREQUENCIES, MEASURED
 from studies import benchmark, extremes, fit, gallery, gpu, mutants, robustness, swim_page, tasks
@@ -33,6 +33,9 @@ SHORTEST = {
                             "STROKES": 1, "ROUNDS": 1, "ROBOTS": 1},
     }),
     "gpu --device scalar --compared 'observations, pairs'": ({"gpu.json"}, {}),
+    "ids": ({"SeastarPrey-v0.png", "SeastarPrey-v0.gif"}, {
+        "studies.ids": {"IDS": {"SeastarPrey-v0": TASKS["SeastarPrey-v0"]}, "SECONDS": 2, "SHOWN": 1},
+    }),
     "robustness": ({"robustness.json"}, {
         "studies.robustness": {"N_PATHS": 1, "SEEDS": range(1), "OF_SEEDS": ("soft",),
                                "PERIODS": {robustness.CAMERA: 0.2},

@@ -36,9 +36,12 @@ class Miswired(Waypoints):
     controller that remembers what followed from which command knows all wires after a few decisions; one observation
     tells of the limbs at most that were heated last.
 
-    ## Episode
-    A random path of five legs of 0.1 to 0.2 m, as `path="random"` of `SeastarSwim-v0`, from a random heading. It ends
-    when the last waypoint is reached. Every draw can be solved: a robot that knows its wires swims as any other.
+    ## Starting state
+    The robot rests with a random heading at the start of a random path of five legs of 0.1 to 0.2 m, as `path="random"`
+    of `SeastarSwim-v0`. Every draw can be solved: a robot that knows its wires swims as any other.
+
+    ## Episode end
+    `terminated`: the last waypoint is reached.
 
     ## Observation
     That of `SeastarSwim-v0`, with the command of the last decision among the numbers of every limb, after those of its
@@ -131,9 +134,12 @@ class FailBlind(Waypoints):
     command is one of dead limbs, a controller that remembers nothing stays for ever. One that compares what happened
     with what it meant knows the dead limbs after a few decisions, and swims with the others.
 
-    ## Episode
-    A random path of five legs of 0.1 to 0.2 m, as `path="random"` of `SeastarSwim-v0`, from a random heading. It ends
-    when the last waypoint is reached. Every draw can be solved: three live limbs swim any way.
+    ## Starting state
+    The robot rests with a random heading at the start of a random path of five legs of 0.1 to 0.2 m, as `path="random"`
+    of `SeastarSwim-v0`. Every draw can be solved: three live limbs swim any way.
+
+    ## Episode end
+    `terminated`: the last waypoint is reached.
 
     ## Observation
     No stations, no velocity of the hub and no wires, which would tell. Odometry instead, and the waypoints:
@@ -230,9 +236,9 @@ class SimToReal(Waypoints):
     modulus, the drag coefficient and the strength of every limb. A controller that remembers its commands and what
     followed from them can tell fast robots from slow ones, and foresee where the robot is by now.
 
-    ## Episode
-    A random path of five legs of 0.1 to 0.2 m, as `path="random"` of `SeastarSwim-v0`, from a random heading. It ends
-    when the last waypoint is reached.
+    ## Starting state
+    The robot rests with a random heading at the start of a random path of five legs of 0.1 to 0.2 m, as `path="random"`
+    of `SeastarSwim-v0`.
 
     | drawn                     | range                          |
     |---------------------------|--------------------------------|
@@ -242,6 +248,9 @@ class SimToReal(Waypoints):
     | strength of every limb    | 0.8 to 1                       |
 
     The camera has 10 ms of jitter, loses 5 % of its pictures, and errs by 1 mm and 0.01 rad (standard deviations).
+
+    ## Episode end
+    `terminated`: the last waypoint is reached.
 
     ## Observation
     | index  | meaning                                                                    | unit      | range |

@@ -161,14 +161,18 @@ class ObstTrap(Waypoints):
     that remembers the discs it has seen, and plans its way around them, finds out. Where the horseshoe lies and opens,
     and whether there is one, is drawn: knowing the draws is no help.
 
-    ## Episode
-    The goal lies at a distance in `distance`. In four episodes of five, eight discs of one radius overlap in a
-    horseshoe: anywhere between start and goal, up to 50 mm aside, open to any side but that of the goal. Half of the
-    horseshoes have a hole, where two discs are missing, anywhere but at their ends. Discs that are missing there, all
-    eight where there is no horseshoe, and `scattered` discs more lie elsewhere. None is near the start or the goal. The
-    robot has a random heading. The hub must stay out of discs, limbs may pass over them. The episode ends when the goal
-    is reached, or when a decision ends with the hub within a disc, which is no success. Only fields that can be solved
-    are drawn: there is a way that keeps 15 mm clear of all discs and is no longer than `longest_way`.
+    The hub must stay out of discs, limbs may pass over them.
+
+    ## Starting state
+    The robot rests with a random heading. The goal lies at a distance in `distance`. In four episodes of five, eight
+    discs of one radius overlap in a horseshoe: anywhere between start and goal, up to 50 mm aside, open to any side but
+    that of the goal. Half of the horseshoes have a hole, where two discs are missing, anywhere but at their ends. Discs
+    that are missing there, all eight where there is no horseshoe, and `scattered` discs more lie elsewhere. None is
+    near the start or the goal. Only fields that can be solved are drawn: there is a way that keeps 15 mm clear of all
+    discs and is no longer than `longest_way`.
+
+    ## Episode end
+    `terminated`: the goal is reached, or a decision ends with the hub within a disc, which is no success.
 
     ## Observation
     That of `SeastarSwim-v0`, with the goal in the places of the current and of the next waypoint, and the six discs

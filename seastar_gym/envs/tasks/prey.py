@@ -138,15 +138,19 @@ class Prey(Task):
     A robot that swims to where the prey is trails behind it for ever. One that remembers the course, or foresees it,
     swims to where the prey will be.
 
-    ## Episode
-    The prey swims on a closed course, a circle whose radius is in `radius`, and on it a
-    second one of up to `epicycle` of that radius, twice as often round. Its root mean square speed is in `speed`. The
-    course passes near the robot, and does not begin there. The prey is caught where a decision ends within
-    `catch_radius` of it, and the next one begins on a course of its own around the robot. The task never ends by
-    itself. Every course can be solved: a point that swims straight at `robot_speed`, which the robot exceeds, could
-    meet the prey within 100 s.
+    The prey swims on a closed course, a circle whose radius is in `radius`, and on it a second one of up to `epicycle`
+    of that radius, twice as often round. Its root mean square speed is in `speed`. The prey is caught where a decision
+    ends within `catch_radius` of it, and the next one begins on a course of its own around the robot.
 
-    In time, the robot swims faster, and so do the prey of `"fast-prey"`: 10.5 to 13.5 mm/s, and 7 mm/s for the robot.
+    The robot of `SeastarPreyTimed-v0` swims faster, and so do its prey, `"fast-prey"`: 10.5 to 13.5 mm/s, and 7 mm/s
+    for `robot_speed`.
+
+    ## Starting state
+    The robot rests with a random heading. The course passes near it, and does not begin there. Every course can be
+    solved: a point that swims straight at `robot_speed`, which the robot exceeds, could meet the prey within 100 s.
+
+    ## Episode end
+    The task never ends by itself.
 
     ## Observation
     That of `SeastarSwim-v0`, with the prey in the place of the current waypoint, and with the place where it would be

@@ -120,11 +120,15 @@ class Prizes(Task):
     Nothing is hidden. A controller that always swims to the prize of most worth per metre gets much less than one that
     chooses a round.
 
-    ## Episode
-    Ten prizes worth 1, 1, 2 or 4 lie anywhere in a square of `side` around the robot, which has a random heading. A
-    prize is taken where a decision ends with the hub within `radius` of it. The episode ends, as `terminated`, when all
-    are taken or `seconds` have passed: the time that is left is observed. Only draws are kept in which the best round
-    brings a point that swims at `robot_speed` at least 1 + `gain` times as much as the greedy one.
+    A prize is taken where a decision ends with the hub within `radius` of it.
+
+    ## Starting state
+    The robot rests with a random heading. Ten prizes worth 1, 1, 2 or 4 lie anywhere in a square of `side` around it.
+    Only draws are kept in which the best round brings a point that swims at `robot_speed` at least 1 + `gain` times as
+    much as the greedy one.
+
+    ## Episode end
+    `terminated`: all prizes are taken, or `seconds` have passed; the time that is left is observed.
 
     ## Observation
     That of `SeastarSwim-v0`, with the nearest and the second nearest prize in the places of the current and of the next

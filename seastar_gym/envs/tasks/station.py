@@ -44,10 +44,13 @@ class Station(Task):
     rest, a line through the hub's velocity over ground tells the current with R2 = 0.97. What the task tests is to
     place the hub to fractions of a millimetre while the water flows, as one that thinks two decisions ahead does.
 
-    ## Episode
+    ## Starting state
     The robot rests over ground, with its hub at the origin and a random heading, and the station lies at a distance in
-    `distance`. The current has a speed of `current`, in any direction. The task never ends by itself. All
-    draws can be solved: the robot swims in any direction faster than the water.
+    `distance`. The current has a speed of `current`, in any direction. All draws can be solved: the robot swims in any
+    direction faster than the water.
+
+    ## Episode end
+    The task never ends by itself.
 
     ## Observation
     That of `SeastarSwim-v0`, with the station in the places of the current and of the next waypoint, and with the
