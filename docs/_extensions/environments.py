@@ -175,7 +175,7 @@ def card(id: str) -> str:
         return ""
     told = re.split(r"^## ", file.with_suffix(".md").read_text("utf-8"), flags=re.MULTILINE)
     (swims,) = (text.partition("\n")[2].strip() for text in told if text.startswith("How it swims"))
-    return f"The bundled policy `{file.stem}`. {linked(swims.replace(' Other agents stand in docs/tasks.md.', ''))}"
+    return f"The bundled policy `{file.stem}`. {linked(swims.replace(' Other agents stand in docs/control.md.', ''))}"
 
 
 def contract(kind: type) -> str:
