@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image, ImageDraw, ImageFont
 
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import bundled_file, load
@@ -20,6 +21,8 @@ LOOKS, BETWEEN = 0.2, 1.2
 """Simulated time between two looks, and between two frames [s]: strokes of 1 s are seen at other phases in turn."""
 FPS = 7
 """Frames per second of the film: eight times as fast as the robot."""
+NAME_AT, NAME_SIZE = 0.1, 16.0
+"""Place of a name, as a share of the height, and its size [px]."""
 REST = 7
 """Frames for which the film rests on its end."""
 
@@ -47,6 +50,14 @@ def side_by_side(left: list[Picture], right: list[Picture]) -> list[Picture]:
     return [np.concatenate(both, axis=1) for both in zip(left, right, strict=False)]
 
 
+def named(picture: Picture, name: str) -> Picture:
+    """The picture with a name at its top."""
+    image = Image.fromarray(picture)
+    place = (image.width // 2, NAME_AT * image.height)
+    ImageDraw.Draw(image).text(place, name, (40, 48, 60), ImageFont.load_default(NAME_SIZE), anchor="mm")
+    return np.asarray(image)
+
+
 def run(results: Results) -> None:
     """Draw and write the film."""
     policy = load(bundled_file(0.2))
@@ -55,7 +66,10 @@ def run(results: Results) -> None:
     period = policy.decision_period
     learned = frames(policy, 1, actions=policy.actions, fidelity="balanced", decision_period=period)
     chapter = frames(gait, round(1.0 / LOOKS), len(learned), actions=gait.actions, fidelity="balanced")
-    film = side_by_side(chapter, learned)
+    film = side_by_side(
+        [named(picture, "scripted gait, every second") for picture in chapter],
+        [named(picture, "PPO policy, every 0.2 s") for picture in learned],
+    )
     write_gif(film + [film[-1]] * REST, results.out, FPS)
     print(f"Written: {results.out}, {len(film)} frames of {BETWEEN} s.")
 

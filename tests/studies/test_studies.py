@@ -139,10 +139,10 @@ def test_errors_on_pages_are_those_that_info_tells():
 
     Promised is the largest with a margin. README has the largest of all.
     """
-    for page, names in {"README.md": ["fast", "balanced", "reference"], "accuracy.md": get_args(Fidelity)}.items():
+    for page, presets in {"README.md": ["fast", "balanced", "reference"], "accuracy.md": get_args(Fidelity)}.items():
         lines = [line for block in BLOCK.finditer(TEXTS[page]) for line in block[3].splitlines()]
         rows = {found[1]: line for line in lines if (found := re.search(r"`(?:fidelity=\")?(\w+)\"?`", line))}
-        assert set(rows) == set(names)
+        assert set(rows) == set(presets)
         for name, row in rows.items():
             errors, speed = [], 0.0
             for period in (1.0, 0.2):
