@@ -93,7 +93,7 @@ def reward_terms(
         "reward_progress": weights.progress * progress,
         "reward_waypoint": np.asarray(weights.waypoint * waypoints_reached, np.float64),
         "reward_effort": -weights.effort * pulses,
-        "reward_time": np.broadcast_to(0.0 - weights.time * seconds, np.shape(progress)).copy(),
+        "reward_time": np.zeros(len(progress)) - weights.time * seconds,
         **({} if turned is None else {"reward_heading": weights.heading * turned}),
     }
 
@@ -107,4 +107,4 @@ def pulses_of(heating_time: NDArray[np.float64], commands: NDArray[np.float64]) 
     """
     whole = (heating_time / PULSE).round(12)  # sums of tenths of a second are whole pulses again
     unknown = np.isnan(heating_time)
-    return np.where(unknown, np.abs(commands).sum(axis=1), whole) if np.count_nonzero(unknown) else np.asarray(whole)
+    return np.where(unknown, np.abs(commands).sum(axis=1), whole) if np.count_nonzero(unknown) else whole

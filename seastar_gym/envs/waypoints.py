@@ -74,6 +74,7 @@ class Waypoints(Task):
         """Swim to the first waypoint."""
         now = robots.episode
         robots.waypoint_index[begun] = 0
+        now.prices = Weights(*now.weights.T)
         self.know_legs(robots)
         now.way_to_go[begun] = self.measure_way_to_go(robots, robots.simulator.hub_position())[begun]
         now.way_at_reset[begun] = now.way_to_go[begun]
@@ -130,8 +131,7 @@ class Waypoints(Task):
             turn_before, now.turn_to_go = now.turn_to_go, self._left_to_turn(robots, heading)
             turned = turn_before - now.turn_to_go
         success = robots.waypoint_index == now.n_waypoints
-        seconds, weights = robots.decision_period, Weights(*now.weights.T)
-        terms = reward_terms(weights, before - now.way_to_go, reached, pulses, seconds, turned)
+        terms = reward_terms(now.prices, before - now.way_to_go, reached, pulses, robots.decision_period, turned)
         return Score(terms, success, success)
 
     def _pass_waypoints(self, robots: Robots, hub: Floats, heading: Floats | None) -> NDArray[np.int64]:
