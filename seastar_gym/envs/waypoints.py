@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.headings import HeadingTargets, wrapped
 from seastar_gym.envs.layout import HEADINGS, Entry
-from seastar_gym.envs.paths import FARTHEST, WAYPOINT_RADIUS, cross_track_error, make_path, shortest_way
+from seastar_gym.envs.paths import FARTHEST, WAYPOINT_RADIUS, make_path
 from seastar_gym.envs.rewards import RewardWeights, Weights, reward_terms
 from seastar_gym.envs.robots import Flags, Floats, Robots, Score, Task
+from seastar_gym.envs.routes import length_of_routes, measured_routes
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_float, require_flag, require_kind, require_number, shown
 from seastar_gym.scene.serial import read
@@ -102,7 +103,12 @@ class Waypoints(Task):
         A route through the centre of the current waypoint would pay for corners that need not be swum.
         """
         now = robots.episode
-        return shortest_way(hub, now.legs.current, now.legs.following, now.aim) + now.legs.beyond
+        return length_of_routes(self._measured(robots, hub), now.aim) + now.legs.beyond
+
+    def _measured(self, robots: Robots, hub: Floats) -> Floats:
+        """What `measure_routes` finds at hub positions [m], shape (n_robots, 2)."""
+        now = robots.episode
+        return measured_routes(np.ascontiguousarray(hub), *now.legs[:3], now.aim)
 
     def targets(self, robots: Robots) -> Floats:
         """The current waypoint and the next."""
@@ -160,11 +166,11 @@ class Waypoints(Task):
 
     def info(self, robots: Robots, hub: Floats) -> dict[str, NDArray[Any]]:
         """Where robots are on their paths, and their headings where some are asked for."""
-        now, k = robots.episode, robots.waypoint_index
+        now, k, measured = robots.episode, robots.waypoint_index, self._measured(robots, hub)
         found = {
             "waypoint_index": k.copy(),
-            "distance": length(now.legs.current - hub),
-            "cross_track_error": cross_track_error(hub, now.legs.start, now.legs.current),
+            "distance": measured[6],
+            "cross_track_error": measured[7],
             "energy_per_metre": _per_metre(robots.energy, now.way_at_reset - now.way_to_go),
         }
         if self.headings is not None:

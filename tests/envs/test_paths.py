@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from refusals import assert_refused
 from seastar_gym import Attachment, Body, Seastar
 from seastar_gym.envs import paths
-from seastar_gym.envs.paths import FEW, PATHS, cross_track_error, make_path, path_length, register_path, shortest_way
+from seastar_gym.envs.paths import PATHS, cross_track_error, make_path, path_length, register_path, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import (
     at_stations,
@@ -92,7 +92,7 @@ def test_cross_track_error_is_the_least_distance_over_the_segment_whichever_way_
 
 def test_one_point_and_few_are_measured_to_the_bits_of_many():
     rng = np.random.default_rng(0)
-    begin, waypoint, after = rng.normal(scale=0.2, size=(3, 40 * FEW, 2))
+    begin, waypoint, after = rng.normal(scale=0.2, size=(3, 320, 2))
     after[::3], begin[::4] = waypoint[::3], 2.0 * waypoint[::4] - after[::4]  # straight ways, and mirrored ones
     begin[::7] = after[::7]
     for measure in (cross_track_error, partial(shortest_way, radius=0.02)):
