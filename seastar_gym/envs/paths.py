@@ -193,7 +193,7 @@ def _measured(*points_and_radius: ArrayLike) -> tuple[tuple[int, ...], Floats, F
     shape = points[0].shape[:-1]
     rows = [np.ascontiguousarray(point).reshape(-1, 2) for point in points]
     radii = (np.zeros(shape) + radius).reshape(-1)
-    return shape, measured_routes(*rows, radii), radii
+    return shape, measured_routes(rows[0], rows[1], rows[2], rows[3], radii), radii
 
 
 def _checked_waypoints(path: ArrayLike) -> NDArray[np.float64]:

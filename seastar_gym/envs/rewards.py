@@ -105,6 +105,6 @@ def pulses_of(heating_time: NDArray[np.float64], commands: NDArray[np.float64]) 
         does not say it: a command then counts as its share of a pulse.
     commands: Shape (n_robots, n_limbs).
     """
-    whole = (heating_time / PULSE).round(12)  # sums of tenths of a second are whole pulses again
-    unknown = np.isnan(heating_time)
+    whole = np.rint(heating_time / PULSE * 1e12) / 1e12  # sums of tenths of a second are whole pulses again
+    unknown = np.isnan(whole)
     return np.where(unknown, np.abs(commands).sum(axis=1), whole) if np.count_nonzero(unknown) else whole

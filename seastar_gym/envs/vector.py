@@ -255,13 +255,14 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
             self.closed = False
         with self._to_the_end():
             outcome = self._swim(commands, look, parts)
-            self._elapsed += 1
+            np.add(self._elapsed, 1, out=self._elapsed)
             reward, terminated, truncated = outcome.reward, outcome.terminated, self._elapsed >= self._limits
             if some_begin:
                 terminated, truncated = terminated & ~begun, truncated & ~begun
                 reward = np.where(begun, 0.0, reward)
                 self._begin_episodes(begun)
-            self.needs_reset, final = terminated | truncated, Info()
+            np.logical_or(terminated, truncated, out=self.needs_reset)
+            final = Info()
             observations = self._observe()
             if self.autoreset_mode is AutoresetMode.SAME_STEP and np.count_nonzero(self.needs_reset):
                 begun = self.needs_reset.copy()

@@ -107,8 +107,8 @@ class Waypoints(Task):
 
     def _measured(self, robots: Robots, hub: Floats) -> Floats:
         """What `measure_routes` finds at hub positions [m], shape (n_robots, 2)."""
-        now = robots.episode
-        return measured_routes(np.ascontiguousarray(hub), *now.legs[:3], now.aim)
+        legs, aim = robots.episode.legs, robots.episode.aim
+        return measured_routes(np.ascontiguousarray(hub), legs.start, legs.current, legs.following, aim)
 
     def targets(self, robots: Robots) -> Floats:
         """The current waypoint and the next."""

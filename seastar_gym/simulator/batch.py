@@ -300,15 +300,15 @@ class Batch:
         if self._held_rows.size:
             self._held = self.q[:, self._held_rows]
             self.v[:, self._held_rows] = 0.0
-        self.report[:] = 0.0
+        self.report.fill(0.0)
         self.report[:, SMALLEST_HUB_T] = np.inf
-        self.effort[:] = 0.0
+        self.effort.fill(0.0)
 
     def advance(self, begin: int, end: int) -> None:
         """Advance all robots from the time step `begin` of the interval to `end`."""
         times = self.times[begin : end + 1]
         if begin == 0:
-            self.a[:] = 0.0  # an interval depends on the state at its beginning only
+            self.a.fill(0.0)  # an interval depends on the state at its beginning only
 
         def swim(thread: int, part: slice) -> None:
             work, actuation = self.memory[thread]

@@ -128,16 +128,17 @@ def make_report(
     status, rows: As `Batch.end` returns them. told: What is measured if asked, by name, shape (n_robots,) each.
     power: Electric power of a heated wire [W].
     """
-    newton_iterations, _, *counts = rows[:COVERED].astype(np.int64)
+    newton, _, regularised, backtracks, steps, halvings, cuts = rows[:COVERED].astype(np.int64)
     covered, smallest_hub_t, overlap = rows[COVERED:]
-    angle = 2.0 * np.arctan(smallest_hub_t)
+    angle = np.arctan(smallest_hub_t)
+    angle += angle
     if hub_hinge == "turning":
         angle += np.pi
-    unknown = np.full((len(MEASURED_IF_ASKED), len(status)), np.nan)
-    error, work, moment, growth = map(told.get, MEASURED_IF_ASKED, unknown)
+    unknown = np.full(len(status), np.nan)
+    error, work, moment, growth = (told.get(name, unknown) for name in MEASURED_IF_ASKED)
     return StrokeReport(
-        status, newton_iterations, *counts, covered, angle, overlap, error, heating_time, power * heating_time, work,
-        moment, growth,
+        status, newton, regularised, backtracks, steps, halvings, cuts, covered, angle, overlap, error, heating_time,
+        power * heating_time, work, moment, growth,
     )  # fmt: skip
 
 
