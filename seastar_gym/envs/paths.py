@@ -15,19 +15,18 @@ A path of one's own needs no name: environments take arrays of waypoints. With a
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.envs.routes import length_of_routes, measured_routes
 from seastar_gym.files import read_numbers
 from seastar_gym.scene.checks import require_callable, require_few, require_kind, require_unmasked, shown
 
 Floats: TypeAlias = NDArray[np.float64]
-Point: TypeAlias = Sequence[float]
 Waypoints: TypeAlias = Floats
 MakePath: TypeAlias = Callable[[np.random.Generator], Waypoints]
 
@@ -52,14 +51,6 @@ MOST_WAYPOINTS = 100_000
 """Most waypoints of a path."""
 FARTHEST = 1e6
 """Largest coordinate of a waypoint [m], and largest radius: beyond it a stroke's progress is lost in rounding."""
-
-TOUCH_BISECTIONS = 12
-"""Bisections of the arc on which a route touches a waypoint's circle: its length errs by less than 1e-6 radii."""
-
-FEW = 8
-"""Largest number of points that are measured one by one: plain numbers then take less time than arrays."""
-DECIDED = 1e-12
-"""Relative size of a slope from which on its sign is the same, whichever library computes the functions in it."""
 
 RANDOM_WAYPOINTS = 5
 RANDOM_LEG = (0.1, 0.2)
@@ -165,18 +156,8 @@ def cross_track_error(position: ArrayLike, start: ArrayLike, end: ArrayLike) -> 
     >>> float(cross_track_error([0.1, 0.03], [0.0, 0.0], [0.2, 0.0]))
     0.03
     """
-    position, start, end = (np.asarray(point, dtype=np.float64) for point in (position, start, end))
-    if _are_few(position, start, end):
-        return _of_each(_cross_track_of_one, position, start, end)
-    # Written out by component: the same bits for one robot and for a batch of them.
-    leg_x, leg_y = end[..., 0] - start[..., 0], end[..., 1] - start[..., 1]
-    away_x, away_y = position[..., 0] - start[..., 0], position[..., 1] - start[..., 1]
-    leg_squared = leg_x * leg_x + leg_y * leg_y
-    along = away_x * leg_x + away_y * leg_y
-    fraction = np.divide(along, leg_squared, out=np.zeros(np.shape(along)), where=leg_squared > 0.0)
-    fraction = np.clip(fraction, 0.0, 1.0)
-    distance: NDArray[np.float64] = np.hypot(away_x - fraction * leg_x, away_y - fraction * leg_y)
-    return distance
+    shape, measured, _ = _measured(position, start, end, end, np.inf)
+    return measured[7].reshape(shape)
 
 
 def path_length(start: ArrayLike, waypoints: ArrayLike) -> NDArray[np.float64]:
@@ -200,80 +181,19 @@ def shortest_way(position: ArrayLike, waypoint: ArrayLike, after: ArrayLike, rad
     is straight where a straight line comes near enough, and so wherever `after` equals waypoint. Otherwise it touches
     the circle where it is reflected, at an angle between those of position and `after` that is found by bisection.
     """
-    radius = np.asarray(radius, dtype=np.float64)
-    p, w, n = (np.asarray(point, dtype=np.float64) for point in (position, waypoint, after))
-    if _are_few(p, w, n):
-        return _of_each(_way_of_one, np.broadcast_to(radius, len(p)), p, w, n)
-    p_x, p_y, n_x, n_y = p[..., 0] - w[..., 0], p[..., 1] - w[..., 1], n[..., 0] - w[..., 0], n[..., 1] - w[..., 1]
-    begin = np.arctan2(p_y, p_x)
-    arc = np.remainder(np.arctan2(n_y, n_x) - begin + np.pi, 2.0 * np.pi) - np.pi
-    lower, upper = np.zeros(np.shape(arc)), np.ones(np.shape(arc))
-    for _ in range(TOUCH_BISECTIONS):
-        middle = 0.5 * (lower + upper)
-        angle = begin + middle * arc
-        c, s = np.cos(angle), np.sin(angle)
-        to_p, to_n = np.hypot(p_x - radius * c, p_y - radius * s), np.hypot(n_x - radius * c, n_y - radius * s)
-        # Along the arc, |p - touch| grows by what |n - touch| has to lose.
-        too_far = (p_x * s - p_y * c) * to_n * np.sign(arc) + (n_x * s - n_y * c) * to_p * np.sign(arc) > 0.0
-        lower, upper = np.where(too_far, lower, middle), np.where(too_far, middle, upper)
-    straight: NDArray[np.float64] = np.hypot(n_x - p_x, n_y - p_y)
-    is_near = cross_track_error(w, p, n) <= radius
-    return np.where(is_near, straight, to_p + to_n)
+    shape, measured, radii = _measured(position, waypoint, waypoint, after, radius)
+    return length_of_routes(measured, radii).reshape(shape)
 
 
-def _are_few(*points: Floats) -> bool:
-    """Whether all points have one shape (n, 2) and are so few that arrays take longer than plain numbers."""
-    shape = points[0].shape
-    return len(shape) == 2 and shape[0] <= FEW and all(each.shape == shape for each in points)
-
-
-def _of_each(measure: Callable[..., float], *points: Floats) -> Floats:
-    """A measure of points of shape (n, 2), or numbers (n,), one after the other; shape (n,)."""
-    return np.array(list(map(measure, *(each.tolist() for each in points))), np.float64)
-
-
-def _cross_track_of_one(position: Point, start: Point, end: Point) -> float:
-    """`cross_track_error` in plain numbers, to the same bits."""
-    (x, y), (start_x, start_y), (end_x, end_y) = position, start, end
-    leg_x, leg_y, away_x, away_y = end_x - start_x, end_y - start_y, x - start_x, y - start_y
-    leg_squared = leg_x * leg_x + leg_y * leg_y
-    fraction = (away_x * leg_x + away_y * leg_y) / leg_squared if leg_squared > 0.0 else 0.0
-    fraction = min(max(fraction, 0.0), 1.0)
-    return float(np.hypot(away_x - fraction * leg_x, away_y - fraction * leg_y))
-
-
-def _way_of_one(radius: float, position: Point, waypoint: Point, after: Point) -> float:
-    """`shortest_way` in plain numbers, to the same bits: where the last one depends on the library, it is numpy's."""
-    (x, y), (w_x, w_y), (after_x, after_y) = position, waypoint, after
-    p_x, p_y, n_x, n_y = x - w_x, y - w_y, after_x - w_x, after_y - w_y
-    if _cross_track_of_one(waypoint, position, after) <= radius:
-        return float(np.hypot(n_x - p_x, n_y - p_y))
-    begin = float(np.arctan2(p_y, p_x))
-    arc = float(np.remainder(np.arctan2(n_y, n_x) - begin + np.pi, 2.0 * np.pi)) - np.pi
-    angle = begin + _touch_of_one(p_x, p_y, n_x, n_y, begin, arc, radius) * arc
-    c, s = float(np.cos(angle)), float(np.sin(angle))
-    return float(np.hypot(p_x - radius * c, p_y - radius * s) + np.hypot(n_x - radius * c, n_y - radius * s))
-
-
-def _touch_of_one(p_x: float, p_y: float, n_x: float, n_y: float, begin: float, arc: float, radius: float) -> float:
-    """Share of the arc at which a route from p to n touches a circle about the origin."""
-
-    def slope(angle: float, cos: Any, sin: Any, hypot: Any) -> float:
-        c, s = cos(angle), sin(angle)
-        to_p, to_n = hypot(p_x - radius * c, p_y - radius * s), hypot(n_x - radius * c, n_y - radius * s)
-        grows: float = ((p_x * s - p_y * c) * to_n + (n_x * s - n_y * c) * to_p) * sign
-        return grows
-
-    undecided = DECIDED * (math.hypot(p_x, p_y) + radius) * (math.hypot(n_x, n_y) + radius)
-    sign, middle, half = math.copysign(1.0, arc), 0.5, 0.25
-    for _ in range(TOUCH_BISECTIONS - 1):
-        angle = begin + middle * arc
-        grows = slope(angle, math.cos, math.sin, math.hypot)
-        if not abs(grows) > undecided:
-            grows = slope(angle, np.cos, np.sin, np.hypot)
-        middle += -half if grows > 0.0 else half
-        half *= 0.5
-    return middle
+def _measured(*points_and_radius: ArrayLike) -> tuple[tuple[int, ...], Floats, Floats]:
+    """The shape (...) of four points (..., 2) and a radius, what `measured_routes` finds of them, and all radii."""
+    *points, radius = (np.asarray(each, dtype=np.float64) for each in points_and_radius)
+    if any(each.shape != points[0].shape for each in points):
+        points = list(np.broadcast_arrays(*points))
+    shape = points[0].shape[:-1]
+    rows = [np.ascontiguousarray(point).reshape(-1, 2) for point in points]
+    radii = (np.zeros(shape) + radius).reshape(-1)
+    return shape, measured_routes(rows[0], rows[1], rows[2], rows[3], radii), radii
 
 
 def _checked_waypoints(path: ArrayLike) -> NDArray[np.float64]:

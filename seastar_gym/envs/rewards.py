@@ -93,7 +93,7 @@ def reward_terms(
         "reward_progress": weights.progress * progress,
         "reward_waypoint": np.asarray(weights.waypoint * waypoints_reached, np.float64),
         "reward_effort": -weights.effort * pulses,
-        "reward_time": np.broadcast_to(0.0 - weights.time * seconds, np.shape(progress)).copy(),
+        "reward_time": np.zeros(len(progress)) - weights.time * seconds,
         **({} if turned is None else {"reward_heading": weights.heading * turned}),
     }
 
@@ -105,6 +105,6 @@ def pulses_of(heating_time: NDArray[np.float64], commands: NDArray[np.float64]) 
         does not say it: a command then counts as its share of a pulse.
     commands: Shape (n_robots, n_limbs).
     """
-    whole = (heating_time / PULSE).round(12)  # sums of tenths of a second are whole pulses again
-    unknown = np.isnan(heating_time)
-    return np.where(unknown, np.abs(commands).sum(axis=1), whole) if np.count_nonzero(unknown) else np.asarray(whole)
+    whole = np.rint(heating_time / PULSE * 1e12) / 1e12  # sums of tenths of a second are whole pulses again
+    unknown = np.isnan(whole)
+    return np.where(unknown, np.abs(commands).sum(axis=1), whole) if np.count_nonzero(unknown) else whole

@@ -517,11 +517,11 @@ class Robots:
         return {
             **self.facts(hub),
             "is_success": score.success,
-            "limbs_heated": (followed != 0.0).sum(axis=1),
+            "limbs_heated": np.add.reduce(followed != 0.0, axis=1),
             "heating_time": report.heating_time,
             "energy": report.energy,
             **({"work": report.work, "peak_moment": report.peak_moment} if self._effort else {}),
-            **({"masked_limbs": (followed != commands).sum(axis=1)} if self.can_be_masked else {}),
+            **({"masked_limbs": np.add.reduce(followed != commands, axis=1)} if self.can_be_masked else {}),
             "newton_iterations": report.newton_iterations,
             "solver_status": report.status,
             "smallest_opening_angle": report.smallest_opening_angle,

@@ -247,20 +247,24 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
         look: Called with the time since the decision [s] after every part, when pictures are asked for.
         """
         begun = self.needs_reset.copy()  # NEXT_STEP: these begin anew instead of swimming
-        commands = to_commands(self.actions, self.simulator.scene.robot.n_limbs, actions, self.num_envs)
-        commands[begun] = 0.0
-        self.closed = False
+        some_begin = np.count_nonzero(begun) > 0
+        commands = to_commands(self.actions, self._robots.scene.robot.n_limbs, actions, self.num_envs)
+        if some_begin:
+            commands[begun] = 0.0
+        if self.closed:
+            self.closed = False
         with self._to_the_end():
             outcome = self._swim(commands, look, parts)
-            self._elapsed += 1
+            np.add(self._elapsed, 1, out=self._elapsed)
             reward, terminated, truncated = outcome.reward, outcome.terminated, self._elapsed >= self._limits
-            if begun.any():
+            if some_begin:
                 terminated, truncated = terminated & ~begun, truncated & ~begun
                 reward = np.where(begun, 0.0, reward)
                 self._begin_episodes(begun)
-            self.needs_reset, final = terminated | truncated, Info()
+            np.logical_or(terminated, truncated, out=self.needs_reset)
+            final = Info()
             observations = self._observe()
-            if self.autoreset_mode is AutoresetMode.SAME_STEP and self.needs_reset.any():
+            if self.autoreset_mode is AutoresetMode.SAME_STEP and np.count_nonzero(self.needs_reset):
                 begun = self.needs_reset.copy()
                 final = _final(observations, outcome.info, begun)
                 self._begin_episodes(begun)

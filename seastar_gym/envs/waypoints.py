@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.headings import HeadingTargets, wrapped
 from seastar_gym.envs.layout import HEADINGS, Entry
-from seastar_gym.envs.paths import FARTHEST, WAYPOINT_RADIUS, cross_track_error, make_path, shortest_way
+from seastar_gym.envs.paths import FARTHEST, WAYPOINT_RADIUS, make_path
 from seastar_gym.envs.rewards import RewardWeights, Weights, reward_terms
 from seastar_gym.envs.robots import Flags, Floats, Robots, Score, Task
+from seastar_gym.envs.routes import length_of_routes, measured_routes
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_float, require_flag, require_kind, require_number, shown
 from seastar_gym.scene.serial import read
@@ -74,6 +75,7 @@ class Waypoints(Task):
         """Swim to the first waypoint."""
         now = robots.episode
         robots.waypoint_index[begun] = 0
+        now.prices = Weights(*now.weights.T)
         self.know_legs(robots)
         now.way_to_go[begun] = self.measure_way_to_go(robots, robots.simulator.hub_position())[begun]
         now.way_at_reset[begun] = now.way_to_go[begun]
@@ -101,7 +103,12 @@ class Waypoints(Task):
         A route through the centre of the current waypoint would pay for corners that need not be swum.
         """
         now = robots.episode
-        return shortest_way(hub, now.legs.current, now.legs.following, now.aim) + now.legs.beyond
+        return length_of_routes(self._measured(robots, hub), now.aim) + now.legs.beyond
+
+    def _measured(self, robots: Robots, hub: Floats) -> Floats:
+        """What `measure_routes` finds at hub positions [m], shape (n_robots, 2)."""
+        legs, aim = robots.episode.legs, robots.episode.aim
+        return measured_routes(np.ascontiguousarray(hub), legs.start, legs.current, legs.following, aim)
 
     def targets(self, robots: Robots) -> Floats:
         """The current waypoint and the next."""
@@ -130,8 +137,7 @@ class Waypoints(Task):
             turn_before, now.turn_to_go = now.turn_to_go, self._left_to_turn(robots, heading)
             turned = turn_before - now.turn_to_go
         success = robots.waypoint_index == now.n_waypoints
-        seconds, weights = robots.decision_period, Weights(*now.weights.T)
-        terms = reward_terms(weights, before - now.way_to_go, reached, pulses, seconds, turned)
+        terms = reward_terms(now.prices, before - now.way_to_go, reached, pulses, robots.decision_period, turned)
         return Score(terms, success, success)
 
     def _pass_waypoints(self, robots: Robots, hub: Floats, heading: Floats | None) -> NDArray[np.int64]:
@@ -160,11 +166,11 @@ class Waypoints(Task):
 
     def info(self, robots: Robots, hub: Floats) -> dict[str, NDArray[Any]]:
         """Where robots are on their paths, and their headings where some are asked for."""
-        now, k = robots.episode, robots.waypoint_index
+        now, k, measured = robots.episode, robots.waypoint_index, self._measured(robots, hub)
         found = {
             "waypoint_index": k.copy(),
-            "distance": length(now.legs.current - hub),
-            "cross_track_error": cross_track_error(hub, now.legs.start, now.legs.current),
+            "distance": measured[6],
+            "cross_track_error": measured[7],
             "energy_per_metre": _per_metre(robots.energy, now.way_at_reset - now.way_to_go),
         }
         if self.headings is not None:

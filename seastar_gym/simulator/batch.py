@@ -300,15 +300,15 @@ class Batch:
         if self._held_rows.size:
             self._held = self.q[:, self._held_rows]
             self.v[:, self._held_rows] = 0.0
-        self.report[:] = 0.0
+        self.report.fill(0.0)
         self.report[:, SMALLEST_HUB_T] = np.inf
-        self.effort[:] = 0.0
+        self.effort.fill(0.0)
 
     def advance(self, begin: int, end: int) -> None:
         """Advance all robots from the time step `begin` of the interval to `end`."""
         times = self.times[begin : end + 1]
         if begin == 0:
-            self.a[:] = 0.0  # an interval depends on the state at its beginning only
+            self.a.fill(0.0)  # an interval depends on the state at its beginning only
 
         def swim(thread: int, part: slice) -> None:
             work, actuation = self.memory[thread]
@@ -345,13 +345,13 @@ class Batch:
 
     def covered(self) -> Floats:
         """Time covered since the interval began [s], shape (n_robots,)."""
-        return self.read(self.report)[:, REPORT_ROWS.index("covered")]
+        return self.read(self.report)[:, COVERED]
 
-    def end(self) -> dict[str, NDArray[Any]]:
-        """End an interval: release held nodes, put lost robots at rest. Returns the report's rows, (n_robots,) each.
+    def end(self) -> tuple[NDArray[np.int64], Floats, dict[str, Floats]]:
+        """End an interval: release held nodes, put lost robots at rest.
 
-        With them are the status, and work and peak_moment of the actuators if somebody asks for them. Counts and status
-        are whole numbers.
+        Returns the status, shape (n_robots,), the report's rows, (len(REPORT_ROWS), n_robots), and work and peak_moment
+        of the actuators by name if somebody asks for them.
         """
         if self._held_rows.size:
             self.q[:, self._held_rows] = self._held
@@ -359,13 +359,9 @@ class Batch:
         if np.count_nonzero(self.status):
             self._put_lost_robots_at_rest()
         self.last_hub = self.hub_position()
-        report = self.read(self.report).T
-        rows: dict[str, NDArray[Any]] = dict(zip(REPORT_ROWS, report, strict=True))
-        rows |= zip(REPORT_ROWS, report[:COVERED].astype(np.int64), strict=False)
-        rows["status"] = self.read(self.status)[:, 0].astype(np.int64)
-        if self.effort.size:
-            rows["work"], rows["peak_moment"] = self.read(self.effort).T[[WORK, PEAK_MOMENT]]
-        return rows
+        effort = self.read(self.effort).T if self.effort.size else None
+        told = {} if effort is None else {"work": effort[WORK], "peak_moment": effort[PEAK_MOMENT]}
+        return self.read(self.status)[:, 0].astype(np.int64), self.read(self.report).T, told
 
     def _put_lost_robots_at_rest(self) -> None:
         """Put failed robots whose state is not finite at rest where their hub was last."""

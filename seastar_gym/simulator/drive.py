@@ -151,16 +151,17 @@ class Drive:
         """
         given, phase = (self.commands, self.phase) if commands is None else (commands, 0.0)
         steps = self._interval(phase, duration, commands is not None)
-        times, turned, after = steps.times, steps.curve, self.state
+        times, turned, before = steps.times, steps.curve, self.state
+        after = before
         if self._has_memory:
-            turned, after = self._actuator.respond(times, given, self.state)
+            turned, after = self._actuator.respond(times, given, before)
         if commands is not None and self.phase > 0.0:
             self._refuse_jump(self.strengths * turned[0] if self._has_memory else self._none)
         if self._has_memory:
             self._turned = after, turned[-1]
         self.steps, self.commands, self.phase = steps, given, phase
-        self._given, self._before, self._after = given, self.state, after
-        self.heating_time = self._actuator.seconds_heated(times, given, self.state).sum(axis=1)
+        self._given, self._before, self._after = given, before, after
+        self.heating_time = np.add.reduce(self._actuator.seconds_heated(times, given, before), axis=1)
         return times, self.strengths if self._has_memory else given * self.strengths, turned
 
     def _refuse_jump(self, then: Floats) -> None:

@@ -39,7 +39,8 @@ class StrokeLock:
         intact: Whether to refuse it after a change that was interrupted, too.
         """
         with self._lock:
-            self._refuse_others()
+            if self._holder is not None:
+                self._refuse_others()
             if intact and self.broken:
                 raise RuntimeError(BROKEN_OFF)
             self._holder, self._thread = object(), _this_thread()
@@ -47,8 +48,6 @@ class StrokeLock:
 
     def _refuse_others(self) -> None:
         """RuntimeError if another thread holds the lock. Threads of a parent process do not run in a fork."""
-        if self._holder is None:
-            return
         if self._thread is None:
             raise RuntimeError(PAUSED)
         if self._thread[0] == os.getpid() and self._thread != _this_thread():

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.rods.step import COVERED
 from seastar_gym.scene.scene import LARGEST_OVERLAP
 
 Floats = NDArray[np.float64]
@@ -114,23 +115,31 @@ def report_of_pieces(pieces: Sequence[StrokeReport]) -> StrokeReport:
     return StrokeReport(*map(whole, StrokeReport._fields))
 
 
-def make_report(rows: Mapping[str, NDArray[Any]], hub_hinge: str, heating_time: Floats, power: float) -> StrokeReport:
-    """Report of an interval from the kernels' numbers, shape (n_robots,) each.
+def make_report(
+    status: NDArray[np.int64],
+    rows: Floats,
+    told: Mapping[str, Floats],
+    hub_hinge: str,
+    heating_time: Floats,
+    power: float,
+) -> StrokeReport:
+    """Report of an interval from the kernels' numbers.
 
+    status, rows: As `Batch.end` returns them. told: What is measured if asked, by name, shape (n_robots,) each.
     power: Electric power of a heated wire [W].
-    rows: Numbers by name, as `Batch.end` returns them, and what the simulator watches.
     """
-    angle = 2.0 * np.arctan(rows["smallest_hub_t"])
+    newton, _, regularised, backtracks, steps, halvings, cuts = rows[:COVERED].astype(np.int64)
+    covered, smallest_hub_t, overlap = rows[COVERED:]
+    angle = np.arctan(smallest_hub_t)
+    angle += angle
     if hub_hinge == "turning":
         angle += np.pi
-    fields: dict[str, NDArray[Any]] = {
-        **dict(zip(MEASURED_IF_ASKED, np.full((len(MEASURED_IF_ASKED), len(angle)), np.nan), strict=True)),
-        **rows,
-        "smallest_opening_angle": angle,
-        "heating_time": heating_time,
-        "energy": power * heating_time,
-    }
-    return StrokeReport._make(map(fields.__getitem__, StrokeReport._fields))
+    unknown = np.full(len(status), np.nan)
+    error, work, moment, growth = (told.get(name, unknown) for name in MEASURED_IF_ASKED)
+    return StrokeReport(
+        status, newton, regularised, backtracks, steps, halvings, cuts, covered, angle, overlap, error, heating_time,
+        power * heating_time, work, moment, growth,
+    )  # fmt: skip
 
 
 def warn_of_overlap(overlaps: Floats) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
-from copy import copy
 from itertools import pairwise
 from types import ModuleType
 from typing import Any, TypeVar
@@ -21,6 +20,7 @@ from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.model import Coefficients
 from seastar_gym.processors import processors
 from seastar_gym.rods.bundles import Work
+from seastar_gym.rods.step import COVERED
 from seastar_gym.rods.terms.hub import Actuation
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_array, as_finite, as_floats, require_choice, require_count, require_flag, shown
@@ -459,10 +459,10 @@ class Simulator:
             self._known_duration = float(duration)
         checked = None if commands is None else checked_commands(commands, self.scene, self._drive.strengths)
         interval = self._lock.acquire(intact=True)
-        rows, clock, drive = self._batch.save(), self._clock, self._drive  # kernels write into rows, nobody into others
+        rows, clock = self._batch.save(), self._clock  # kernels write into rows, nobody into others
+        drive = vars(self._drive).copy()
         watches = [(watch, watch.save()) for watch in self._watches.values()]
         try:
-            self._drive = copy(drive)
             self._batch.begin(*self._drive.begin(float(duration), checked))
             self._clock = clock.begun(float(duration))
             for watch, _ in watches:
@@ -473,21 +473,24 @@ class Simulator:
             with held_back():  # another Ctrl-C waits for the end
                 if self._lock.resume(interval):  # unless robots were put into another state since
                     self._batch.restore(rows)
-                    self._clock, self._drive = clock, drive
+                    self._clock = clock
+                    vars(self._drive).update(drive)
                     for watch, saved in watches:
                         watch.restore(saved)
                     self._lock.release()
             raise
 
     def _end_interval(self) -> StrokeReport:
-        rows = self._batch.end()
-        failed = rows["status"] > 0
-        self._clock = self._clock.ended(failed, rows["covered"])
+        status, rows, told = self._batch.end()
+        failed = status > 0
+        self._clock = self._clock.ended(failed, rows[COVERED])
         self._drive.advance(len(self._batch.times) - 1)
         for field, watch in self._watches.items():
             watch.end(self, failed)
-            rows[field] = watch.told
-        if self._may_warn_of_overlap and rows["largest_overlap"].max() > LARGEST_OVERLAP:
+            told[field] = watch.told
+        drive = self._drive
+        report = make_report(status, rows, told, self.scene.robot.hub_hinge, drive.heating_time, drive.heating_power)
+        if self._may_warn_of_overlap and report.largest_overlap.max() > LARGEST_OVERLAP:
             self._may_warn_of_overlap = False
-            warn_of_overlap(rows["largest_overlap"])
-        return make_report(rows, self.scene.robot.hub_hinge, self._drive.heating_time, self._drive.heating_power)
+            warn_of_overlap(report.largest_overlap)
+        return report

@@ -74,7 +74,7 @@ class Clock(NamedTuple):
         """Clock after the interval, or after the time covered [s] for robots that failed; shapes (n_robots,)."""
         if np.count_nonzero(failed):
             return self._replace(intervals=self.intervals + ~failed, within=np.where(failed, covered, 0.0))
-        return self._replace(intervals=self.intervals + 1, within=np.zeros(len(failed)))
+        return Clock(self.start, self.lost, self.intervals + 1, np.zeros(len(failed)), self.duration)
 
 
 def best_fit_heading(positions: Floats, rest: Floats) -> Floats:

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from refusals import assert_refused
 from seastar_gym import Attachment, Body, Seastar
 from seastar_gym.envs import paths
-from seastar_gym.envs.paths import FEW, PATHS, cross_track_error, make_path, path_length, register_path, shortest_way
+from seastar_gym.envs.paths import PATHS, cross_track_error, make_path, path_length, register_path, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import (
     at_stations,
@@ -92,7 +92,7 @@ def test_cross_track_error_is_the_least_distance_over_the_segment_whichever_way_
 
 def test_one_point_and_few_are_measured_to_the_bits_of_many():
     rng = np.random.default_rng(0)
-    begin, waypoint, after = rng.normal(scale=0.2, size=(3, 40 * FEW, 2))
+    begin, waypoint, after = rng.normal(scale=0.2, size=(3, 320, 2))
     after[::3], begin[::4] = waypoint[::3], 2.0 * waypoint[::4] - after[::4]  # straight ways, and mirrored ones
     begin[::7] = after[::7]
     for measure in (cross_track_error, partial(shortest_way, radius=0.02)):
@@ -119,6 +119,36 @@ def test_the_shortest_way_is_the_shortest_of_those_by_any_point_of_the_circle():
     np.testing.assert_allclose(ways[near], straight[near], rtol=1e-14)
     np.testing.assert_allclose(ways[~near], by_touch[~near], atol=2e-6)
     assert (ways >= straight * (1.0 - 1e-14)).all()
+
+
+def bisected(begin, waypoint, after, radius):
+    """The shortest way as numpy bisects it: the arc between both ends, halved twelve times."""
+    (p_x, p_y), (n_x, n_y) = (begin - waypoint).T.copy(), (after - waypoint).T.copy()
+    start = np.arctan2(p_y, p_x)
+    arc = np.remainder(np.arctan2(n_y, n_x) - start + np.pi, 2.0 * np.pi) - np.pi
+    share, half = np.full(len(arc), 0.5), 0.5
+    while True:
+        c, s = np.cos(start + share * arc), np.sin(start + share * arc)
+        to_p, to_n = np.hypot(p_x - radius * c, p_y - radius * s), np.hypot(n_x - radius * c, n_y - radius * s)
+        half *= 0.5
+        if half < 2.0**-12:
+            return to_p + to_n
+        slope = (p_x * s - p_y * c) * to_n * np.sign(arc) + (n_x * s - n_y * c) * to_p * np.sign(arc)
+        share = share - half * np.where(slope > 0.0, 1.0, -1.0)
+
+
+@pytest.mark.parametrize("near", [0.3, 1e-3, 1e-9, 0.0])
+def test_compiled_routes_are_numpys_to_the_last_bit(near):
+    """Also where both ends lie almost, or just, in one direction or in opposite ones, and only rounding decides."""
+    rng = np.random.default_rng(0)
+    begin, waypoint = rng.normal(scale=0.2, size=(2, 2000, 2))
+    scale = rng.uniform(0.5, 2.0, size=(2000, 1)) * rng.choice([-1.0, 1.0], size=(2000, 1))
+    after = waypoint + scale * (begin - waypoint) + near * rng.normal(size=(2000, 2))
+    after[::5] = waypoint[::5] + (begin - waypoint)[::5, ::-1]  # as far away
+    for radius in (0.007, 0.0):
+        bends = cross_track_error(waypoint, begin, after) > radius
+        ways = shortest_way(begin, waypoint, after, radius)[bends]
+        assert ways.tobytes() == bisected(begin[bends], waypoint[bends], after[bends], radius).tobytes() and bends.any()
 
 
 # Paths of one's own

@@ -112,12 +112,17 @@ class SmaWires(WirePair):
     def _contraction(self, since: Floats, before: Floats, left: Floats) -> Floats:
         """Contraction of wires after times `since` [s], from the one `before`, if they are heated for `left` [s]."""
         with np.errstate(over="ignore"):  # ramps that are steeper than any float are jumps
-            rising = np.minimum(before + since / self.heating_time, 1.0)
+            early = since[: max(1, np.count_nonzero(since <= np.maximum.reduce(left, axis=None)))]
+            rising = before + early / self.heating_time
+            np.minimum(rising, 1.0, out=rising)
             if len(since) == 1:  # the beginning, where no wire has cooled yet
                 return rising
             most = np.minimum(before + left / self.heating_time, 1.0)
-            falling = np.maximum((left + most * self.cooling_time - since) / self.cooling_time, 0.0)
-        return np.where(since <= left, rising, falling)
+            found = left + most * self.cooling_time - since
+            found /= self.cooling_time
+            np.maximum(found, 0.0, out=found)
+        np.copyto(found[: len(early)], rising, where=early <= left)
+        return found
 
     def observe(self, state: Floats) -> Floats:
         """Contractions of the two wires, shape (..., 2)."""
