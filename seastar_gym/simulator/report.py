@@ -134,8 +134,8 @@ def make_report(
     angle += angle
     if hub_hinge == "turning":
         angle += np.pi
-    unknown = np.full(len(status), np.nan)
-    error, work, moment, growth = (told.get(name, unknown) for name in MEASURED_IF_ASKED)
+    unknown = np.full((len(MEASURED_IF_ASKED), len(status)), np.nan)
+    error, work, moment, growth = map(told.get, MEASURED_IF_ASKED, unknown)
     return StrokeReport(
         status, newton, regularised, backtracks, steps, halvings, cuts, covered, angle, overlap, error, heating_time,
         power * heating_time, work, moment, growth,

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
+from copy import copy
 from itertools import pairwise
 from types import ModuleType
 from typing import Any, TypeVar
@@ -459,10 +460,10 @@ class Simulator:
             self._known_duration = float(duration)
         checked = None if commands is None else checked_commands(commands, self.scene, self._drive.strengths)
         interval = self._lock.acquire(intact=True)
-        rows, clock = self._batch.save(), self._clock  # kernels write into rows, nobody into others
-        drive = vars(self._drive).copy()
+        rows, clock, drive = self._batch.save(), self._clock, self._drive  # kernels write into rows, nobody into others
         watches = [(watch, watch.save()) for watch in self._watches.values()]
         try:
+            self._drive = copy(drive)
             self._batch.begin(*self._drive.begin(float(duration), checked))
             self._clock = clock.begun(float(duration))
             for watch, _ in watches:
@@ -473,8 +474,7 @@ class Simulator:
             with held_back():  # another Ctrl-C waits for the end
                 if self._lock.resume(interval):  # unless robots were put into another state since
                     self._batch.restore(rows)
-                    self._clock = clock
-                    vars(self._drive).update(drive)
+                    self._clock, self._drive = clock, drive
                     for watch, saved in watches:
                         watch.restore(saved)
                     self._lock.release()
