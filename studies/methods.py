@@ -159,7 +159,7 @@ def draw_curves(found: Any, file: Path) -> None:
 
     from seastar_gym.files import save_figure
 
-    figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.5), sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.5), sharey=True, layout="constrained")
     for row in (row for *_, rows in benchmark.groups(cells_of(found)) for row in rows):
         curves = [(id, cell.curve) for id, own in row.cells.items() for cell in own if id in benchmark.scales()]
         if not curves:
@@ -172,10 +172,10 @@ def draw_curves(found: Any, file: Path) -> None:
                 [np.mean([point[name] for point in at]) for name in ("decisions", "seconds")] + [np.mean(scores)]
             )
         decisions, seconds, scores = np.transpose(points)
-        for axis, x in zip(axes, (decisions, seconds), strict=True):
-            axis.plot(x, scores, label=f"{row.agent}, {row.track}")
-    axes[0].set(xlabel="decisions", ylabel="mean score")
-    axes[1].set(xlabel="processor time of a training [s]", xscale="log")
+        for axis, x in zip(axes, (decisions / 1000.0, seconds), strict=True):
+            axis.plot(x, scores, marker="o", label=f"{row.agent}, {row.track}")
+    axes[0].set(xlabel="decisions [1000]", ylabel="mean score over ids and seeds")
+    axes[1].set(xlabel="processor time of a training [s]")
     axes[0].legend(fontsize="small")
     save_figure(figure, file)
     plt.close(figure)
