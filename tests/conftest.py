@@ -18,8 +18,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # Before anything imports matplotlib, here or in a subprocess: the tests have no display.
 os.environ["MPLBACKEND"] = "Agg"
 
-# Tests share the processors, and threads of torch that wait for each other take them: a training takes seven times as
-# long. Here and in subprocesses.
+# Tests share the processors, and threads of torch that wait for each other take them: a training beside other work took
+# seven times the processor time. Here and in subprocesses.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 # A first example may wait for the compiler, and continuous integration shall fail for the change, not for the draw.

@@ -150,9 +150,7 @@ def arguments(id: str, env: Any, own: str) -> str:
 def baselines(id: str, env: Any) -> str:
     """What is kept of agents: references of the benchmark, and the card of the bundled policy."""
     parts = [references(id, measure_of_task(env.task)), card(id)]
-    pages = ("tasks", "benchmark") if IDS[id].task else ("results", "control", "controllers")
-    others = next((f"More agents: [{name}](../{name}.md)." for name in pages if (DOCS / f"{name}.md").is_file()), "")
-    return "\n\n".join(filter(None, [*parts, others]))
+    return "\n\n".join(filter(None, [*parts, "More agents: [control](../control.md)."]))
 
 
 def references(id: str, measure: Any) -> str:
