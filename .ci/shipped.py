@@ -12,10 +12,10 @@ with tempfile.TemporaryDirectory() as folder:
     os.environ["NUMBA_CACHE_DIR"] = folder
     import gymnasium as gym
 
-    import seastar_gym  # noqa: F401
+    from seastar_gym.lanes.registers import N_LANES
 
     for id in sys.argv[1:] or sorted(each for each in gym.registry if each.startswith("Seastar")):
-        for env in (gym.make(id), gym.make_vec(id, 2, vectorization_mode="vector_entry_point")):
+        for env in (gym.make(id), gym.make_vec(id, N_LANES, vectorization_mode="vector_entry_point")):
             env.reset(seed=0)
             env.step(env.action_space.sample())
             env.close()

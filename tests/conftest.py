@@ -22,6 +22,9 @@ os.environ["MPLBACKEND"] = "Agg"
 # seven times the processor time. Here and in subprocesses.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+# What the tests compile, and so their time, does not depend on the processor; test_bits.py swims on other widths.
+os.environ.setdefault("SEASTAR_LANES", "4")
+
 # A first example may wait for the compiler, and continuous integration shall fail for the change, not for the draw.
 settings.register_profile("seastar", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("seastar")

@@ -70,7 +70,7 @@ def main(level: str, folder: str, *ids: str) -> None:
     dispatch.KnownCode.call = lambda _, kind, entry, *args: keep(level, entry, *args)  # type: ignore[method-assign]
     compiling.EntryPoint.__call__ = lambda entry, *args: keep(level, entry, *args)
     for id in ids or sorted(each for each in gym.registry if each.startswith("Seastar")):
-        for env in (gym.make(id), gym.make_vec(id, 2, vectorization_mode="vector_entry_point")):
+        for env in (gym.make(id), gym.make_vec(id, N_LANES, vectorization_mode="vector_entry_point")):
             robots: Any = env.unwrapped
             with contextlib.suppress(Exception):  # nothing has run, so that anything may be wrong
                 robots.reset(seed=0)
