@@ -98,11 +98,11 @@ def require_fit(
     limbs = getattr(policy, "n_limbs", None)
     if limbs is not None and limbs != scene.robot.n_limbs:
         raise ValueError(f"The policy is for a robot of {limbs} limbs, the environment's has {scene.robot.n_limbs}.")
-    ours = getattr(policy, "decision_period", None)
+    sees: Any = getattr(policy, "observation_space", None)
+    ours = getattr(policy, "decision_period", getattr(sees, "decision_period", None))
     theirs = scene.actuator.period if decision_period is None else decision_period
     if ours is not None and not math.isclose(ours, theirs):
         raise ValueError(f"The policy decides every {ours:g} s, the environment every {theirs:g} s: make them equal.")
-    sees: Any = getattr(policy, "observation_space", None)
     if sees is not None and sees.shape != (n_seen,):
         shown_by = "" if sight is None else f", by {told(sight)}"
         raise ValueError(

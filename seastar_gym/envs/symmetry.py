@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, Self, get_args
 
 import gymnasium as gym
 import numpy as np
@@ -44,7 +44,7 @@ from seastar_gym.envs.group import (
     transform_commands,
     turns,
 )
-from seastar_gym.envs.layout import Layout
+from seastar_gym.envs.layout import Layout, ObservationBox
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.scene import Scene, checks
 from seastar_gym.scene.actuators.base import Actuator, Mirror, complete, is_actuator
@@ -397,17 +397,14 @@ def observed_mirror(env: Any) -> Mirror:
     return mirror + tuple((len(mirror) + index, sign) for index, sign in env.added_mirror)
 
 
-class ReducedBox(gym.spaces.Box):
-    """Space of reduced observations: a Box, equal to that of observations as they are, that says that they are reduced.
-
-    Files of models have the space that was learned in, and so say it, too.
-    """
+class ReducedBox(ObservationBox):
+    """Space of reduced observations, equal to that of observations as they are: it says that they are reduced."""
 
     @classmethod
-    def of(cls, space: Any) -> ReducedBox:
+    def of(cls, space: Any) -> Self:
         """The space of observations of a space, reduced; ValueError for observations that are no arrays."""
         require_kind("The space of observations", space, gym.spaces.Box, "a Box: put other wrappers around this one")
-        return cls(space.low, space.high, space.shape, space.dtype)
+        return super().of(space)
 
 
 class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):

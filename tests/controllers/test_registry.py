@@ -7,6 +7,7 @@ import pickle
 import subprocess
 import sys
 import zipfile
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,7 +18,7 @@ from gymnasium.spaces import Box, Discrete
 import seastar_gym
 from later import Later
 from refusals import assert_refused
-from seastar_gym import Numerics, Scene, Seastar
+from seastar_gym import Numerics, Scene, Seastar, SmaWires
 from seastar_gym.controllers import registry as third_party
 from seastar_gym.controllers.contract import actions_of, observed, require_fit, require_policy, starts
 from seastar_gym.controllers.description import Description
@@ -33,6 +34,7 @@ from seastar_gym.controllers.registry import (
 )
 from seastar_gym.controllers.search import GreedyPolicy, Planner
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.symmetry import SymmetryReduction
 from seastar_gym.evaluation.swim import swim, swim_many
 
 stable_baselines3 = Later("stable_baselines3")
@@ -216,6 +218,23 @@ def test_a_zip_that_is_no_model_is_refused_in_a_sentence_and_ours_is_not_unpickl
         assert not third_party.is_model(file)
         with pytest.raises(error, match=r"model\.zip.*\.$"):
             load(file)
+
+
+@pytest.mark.parametrize("wrap", [lambda env: env, SymmetryReduction], ids=["plain", "reduced"])
+def test_a_model_says_how_often_it_decides(wrap, tmp_path):
+    """Its observations have the same shape at any period."""
+
+    def wires(period):
+        return SeastarSwimEnv(scene=Scene(actuator=SmaWires(), numerics=FAST.numerics), decision_period=period)
+
+    learned = stable_baselines3.A2C("MlpPolicy", wrap(wires(0.5)), policy_kwargs={"net_arch": [8]}, device="cpu")
+    learned.save(tmp_path / "model.zip")
+    for period, fits in (
+        (0.5, nullcontext()),
+        (0.2, assert_refused("decides every 0.5 s, the environment every 0.2 s")),
+    ):
+        with fits:
+            swim("mine", load_agent(str(tmp_path / "model.zip"), wires(period)), wires(period), max_strokes=1)
 
 
 def test_a_damaged_model_is_refused_in_a_sentence(tmp_path):
