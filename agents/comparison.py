@@ -21,7 +21,7 @@ from seastar_gym.controllers.registry import load_agents
 from seastar_gym.envs.commands import MOST_LIMBS
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.report import Remarks
-from seastar_gym.processors import processors
+from seastar_gym.process import processors
 from seastar_gym.scene import Scene
 
 

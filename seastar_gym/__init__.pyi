@@ -44,9 +44,6 @@ from . import (
     scene as scene,
 )
 from . import (
-    schemes as schemes,
-)
-from . import (
     simulator as simulator,
 )
 from . import (
@@ -73,6 +70,7 @@ from .envs.tasks.obst_trap import ObstTrap as ObstTrap
 from .envs.tasks.prey import Prey as Prey
 from .envs.tasks.prizes import Prizes as Prizes
 from .envs.tasks.station import Station as Station
+from .model import register_scheme as register_scheme
 from .scene import AlongLimb as AlongLimb
 from .scene import Attachment as Attachment
 from .scene import Body as Body
@@ -100,7 +98,6 @@ from .scene import Water as Water
 from .scene import relaxation_time as relaxation_time
 from .scene.serial import register_part as register_part
 from .scene.serial import register_term as register_term
-from .schemes import register_scheme as register_scheme
 from .simulator import Simulator as Simulator
 from .simulator import SolverStatus as SolverStatus
 from .simulator import State as State

@@ -2,7 +2,7 @@
 
 Limbs are divided into edges and nodes (`make_mesh`), every term makes its coefficients of that mesh, one line each, and
 `Coefficients` joins those of a batch: one set for all lane groups, or one for each where robots have numbers of their
-own. Bodies and currents are made likewise.
+own. Bodies and currents are made likewise, and a scheme of time steps is found by its name.
 """
 
 import math
@@ -12,7 +12,7 @@ from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.lanes.plain import Lanes
 from seastar_gym.lanes.registers import N_LANES
@@ -24,6 +24,7 @@ from seastar_gym.rods.contact import forces as contact
 from seastar_gym.rods.contact.forces import Rim
 from seastar_gym.rods.newton import Limits
 from seastar_gym.rods.star import Mesh, Sections, mean
+from seastar_gym.rods.step import OWN_SCHEMES, SCHEMES, Scheme, scheme_of, tableau
 from seastar_gym.rods.terms import (
     added_mass,
     along,
@@ -40,8 +41,9 @@ from seastar_gym.rods.terms import (
 )
 from seastar_gym.rods.terms.current import GRID, LINEAR, VORTEX, Current, current_velocity
 from seastar_gym.rods.terms.gravity import heaviness
-from seastar_gym.scene import Scene
+from seastar_gym.scene import Scene, numerics
 from seastar_gym.scene.body import GIVEN_DRAG, Body, Outline
+from seastar_gym.scene.checks import shown
 from seastar_gym.scene.limb import AlongLimb, LimbShape, Stiffening
 from seastar_gym.scene.number import chosen, frame_of, of_robot, profile_at
 from seastar_gym.scene.numerics import MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP
@@ -295,14 +297,9 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
     C_d, C_t, C_a = water.drag_coefficient, water.tangential_drag_coefficient, water.added_mass_coefficient
     mesh = make_mesh(limbs, robot.nodes_per_limb, robot.density)
     continuum = robot.discretisation == "continuum"
-    C_along = C_d if C_t is None else C_t
-    at_nodes, in_middle = drag.coefficients(mesh, water.density, C_along), None
-    across, across_middle = drag.cross_coefficients(mesh, water.density, C_d, C_t), None
-    if continuum:
-        at_nodes, in_middle = drag.simpson_coefficients(mesh, water.density, C_along)
-        across, across_middle = drag.simpson_cross_coefficients(mesh, water.density, C_d, C_t)
+    drags = drag.coefficients(mesh, water.density, C_d, C_t, simpson=continuum)
     stretched = stretching.coefficients(mesh)
-    mass = inertia.coefficients(mesh, robot.density)
+    masses = inertia.coefficients(mesh, robot.density, consistent=continuum)
     weight = gravity.coefficients(mesh, robot.density, water.density, scene.gravity)
     loads = load.total(load.coefficients(mesh, scene.loads), weight)
     on_body, rim = None, None
@@ -311,11 +308,12 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         if touch is not None:
             rim = body_rim(robot)
             on_body = on_body.with_corners(rim)
-        mass, at_nodes = on_body.mass(mass), on_body.drag(mesh, at_nodes)
+        masses = masses._replace(node=on_body.mass(masses.node))
+        drags = drags._replace(node=on_body.drag(mesh, drags.node))
         loads = on_body.loads(loads)
-    inertia.hold(mass, scene.held_nodes)
+    inertia.hold(masses.node, scene.held_nodes)
     terms = own.coefficients([chosen(term, itemgetter(index)) for term in scene.terms], mesh)
-    all_scales = scales.coefficients(mesh, stretched, robot.density, water.density, C_d, mass, scene.held_nodes)
+    all_scales = scales.coefficients(mesh, stretched, robot.density, water.density, C_d, masses.node, scene.held_nodes)
     n_free = len(mesh.dl) + robot.has_body
     return Rods(
         n_limbs=mesh.n_limbs,
@@ -323,7 +321,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         n_edges=len(mesh.l),
         n_nodes=len(mesh.dl),
         n_free=n_free,
-        n_places=len(at_nodes),
+        n_places=len(drags.node),
         n_points=n_free if on_body is None else n_free + on_body.coefficients.n_arms,
         stretching=stretched,
         bending=with_joints(
@@ -332,14 +330,9 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         hub=hub.coefficients(hub_angles, turning=robot.hub_hinge == "turning"),
         clamp=clamp.coefficients(mesh, [limb.direction for limb in limbs]) if continuum else None,
         along=limb_actuation(scene, index, mesh.natural_turn),
-        mass=mass,
-        edge_mass=inertia.edge_coefficients(mesh, robot.density) if continuum else None,
-        drag=at_nodes,
-        middle_drag=in_middle,
-        cross_drag=across,
-        middle_cross_drag=across_middle,
-        added_mass=added_mass.coefficients(mesh, water.density, C_a),
-        edge_added_mass=added_mass.edge_coefficients(mesh, water.density, C_a) if continuum else None,
+        inertia=masses,
+        drag=drags,
+        added_mass=added_mass.coefficients(mesh, water.density, C_a, consistent=continuum),
         damping=damping.coefficients(robot.relaxation_time),
         current=None if water.current is None else current_rows(water.current),
         load=loads,
@@ -479,3 +472,36 @@ class Coefficients:
     def rest_shapes(self) -> Floats:
         """Node positions at rest [m], shape (n_nodes, 2) if no number differs, else (n_robots, n_nodes, 2)."""
         return self.nodes(0) if self.are_shared else np.array([self.nodes(robot) for robot in range(self.n_robots)])
+
+
+# Schemes
+
+
+def register_scheme(name: str, A: ArrayLike, b: ArrayLike) -> None:
+    """Register a diagonally implicit Runge-Kutta scheme of your own, for `Numerics(scheme=name)`.
+
+    A: Shape (n, n), zero above the diagonal, positive on it. b: Shape (n,), adding up to 1. Where b is the last row of
+    A, the last stage is the step's result. Stages that would have to be solved together, or one that is explicit, and
+    tableaux that are not A-stable, raise a ValueError in one sentence, as does a name that another tableau has.
+    """
+    if not isinstance(name, str) or not (name and name.isprintable()):
+        raise ValueError(f"A scheme's name must be a text, not {shown(name)}.")
+    own = tableau(A, b)
+    known = {**SCHEMES, **OWN_SCHEMES}.get(name, own)
+    if not (np.array_equal(known.a, own.a) and np.array_equal(known.b, own.b)):
+        raise ValueError(f"There is a scheme {name!r} with other numbers already: give this one another name.")
+    if name not in SCHEMES:
+        OWN_SCHEMES[name] = own
+    if name not in numerics.SCHEME_NAMES:
+        numerics.SCHEME_NAMES.append(name)
+
+
+def scheme_for(scene: Scene) -> Scheme:
+    """Scheme of a scene. ValueError where its terms cannot follow an own scheme."""
+    found = scheme_of(scene.numerics.scheme, scene.numerics.damping)
+    if found.n_stages > 1 and not found.stiffly_accurate and (scene.contact is not None or scene.robot.has_body):
+        raise ValueError(
+            f"The scheme {scene.numerics.scheme!r} does not end with its last stage, as contact and bodies need it of "
+            "several stages: use one whose b is the last row of A."
+        )
+    return found

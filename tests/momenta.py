@@ -13,12 +13,12 @@ def momenta(rods: Rods, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.nd
     The linear one is that of lumped masses. With consistent masses, limbs that turn have edges whose differences in
     velocity count less, see inertia.py.
     """
-    spin = cross(q, v) @ rods.mass
-    if rods.edge_mass is not None:
-        tails = np.arange(len(rods.edge_mass))
+    spin = cross(q, v) @ rods.inertia.node
+    if rods.inertia.edge is not None:
+        tails = np.arange(len(rods.inertia.edge))
         tails[:: rods.edges_per_limb] = 0
-        spin -= cross(q[:, 1:] - q[:, tails], v[:, 1:] - v[:, tails]) @ rods.edge_mass
-    return np.einsum("n,rnd->rd", rods.mass, v), spin
+        spin -= cross(q[:, 1:] - q[:, tails], v[:, 1:] - v[:, tails]) @ rods.inertia.edge
+    return np.einsum("n,rnd->rd", rods.inertia.node, v), spin
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -28,7 +28,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def bodied_momenta(simulator: Simulator) -> tuple[np.ndarray, float]:
     """Momentum [kg m/s] and angular momentum about the origin [kg m^2/s] of a robot with a body."""
     rods, q, v = simulator.coefficients.rods(0), simulator.positions[0], simulator.velocities[0]
-    mass, omega, n = rods.mass[: len(q)], simulator.spin()[0], rods.edges_per_limb
+    mass, omega, n = rods.inertia.node[: len(q)], simulator.spin()[0], rods.edges_per_limb
     S_x, S_y = turned(rods.body.moment, simulator.orientation()[0])
     turning = omega * np.array([-S_y, S_x])
     roots = q[0] + root_places(simulator.scene.robot, simulator.orientation())[0]
@@ -37,7 +37,7 @@ def bodied_momenta(simulator: Simulator) -> tuple[np.ndarray, float]:
     tails_q = np.concatenate([np.vstack([roots[k], q[1 + k * n : (k + 1) * n]]) for k in range(rods.n_limbs)])
     tails_v = np.concatenate([np.vstack([moving_roots[k], v[1 + k * n : (k + 1) * n]]) for k in range(rods.n_limbs)])
     spin = cross(q, v) @ mass + rods.body.inertia[0] * omega + cross(q[0], turning) + S_x * v[0, 1] - S_y * v[0, 0]
-    return mass @ v + turning, spin - cross(q[1:] - tails_q, v[1:] - tails_v) @ rods.edge_mass
+    return mass @ v + turning, spin - cross(q[1:] - tails_q, v[1:] - tails_v) @ rods.inertia.edge
 
 
 def turned(moment: np.ndarray, angle: np.ndarray | float) -> np.ndarray:

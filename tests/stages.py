@@ -161,7 +161,7 @@ def begun_on_body(rods: Rods, directions: np.ndarray, stage: SimpleNamespace, ah
     freeze_fluid(rods, work)
     freeze_strains(rods, work, q_hat)
     natural = directions + stage.delta_psi
-    work.hub_direction[:] = np.stack([np.cos(natural), np.sin(natural)], axis=1).reshape(-1, 1)
+    work.clamp.direction[:] = np.stack([np.cos(natural), np.sin(natural)], axis=1).reshape(-1, 1)
     work.q[:] = unknown_rows(rods, stage.u)
     place_roots(rods, work.q)
     return work, begun

@@ -46,7 +46,7 @@ from seastar_gym.accuracy.commands import (
 from seastar_gym.accuracy.resonance import resonances
 from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.model import velocities_at
-from seastar_gym.processors import processors
+from seastar_gym.process import processors
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.actuators.base import complete
 from seastar_gym.scene.checks import require_count, require_period, require_seed, shown

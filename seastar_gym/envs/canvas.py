@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.interrupts import held_back
+from seastar_gym.process import held_back
 
 if TYPE_CHECKING:
     import pygame

@@ -32,14 +32,13 @@ from seastar_gym.gradients.unknowns import OF_START, Rotations, Start, Unknown, 
 from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.lanes.rows import aligned_rows, side_by_side
 from seastar_gym.lanes.tape import ENTRY, ROW
-from seastar_gym.model import make_limits, make_rods
+from seastar_gym.model import make_limits, make_rods, scheme_for
 from seastar_gym.rods.bundles import make_work
 from seastar_gym.rods.interval import advance
 from seastar_gym.rods.step import REPORT_ROWS, SCHEMES, WORK
 from seastar_gym.rods.terms.hub import Actuation
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_floats, require_callable, shown
-from seastar_gym.schemes import scheme_for
 from seastar_gym.simulator.state import State
 
 Floats = NDArray[np.float64]

@@ -18,14 +18,13 @@ from seastar_gym.gradients.unknowns import Rotations, Start, slopes_of_start, st
 from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.lanes.rows import aligned_rows, side_by_side
 from seastar_gym.lanes.tape import FACTOR, PLACE, ROW
-from seastar_gym.model import make_limits, make_rods
+from seastar_gym.model import make_limits, make_rods, scheme_for
 from seastar_gym.rods.bundles import Work, make_work
 from seastar_gym.rods.step import MOMENTS, REPORT_ROWS, SCHEMES, SMALLEST_HUB_T, WORK
 from seastar_gym.rods.terms.hub import Actuation
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_finite, require_kind, require_texts
 from seastar_gym.scene.numerics import require_duration
-from seastar_gym.schemes import scheme_for
 from seastar_gym.simulator.drive import checked_commands
 from seastar_gym.simulator.report import SolverStatus
 from seastar_gym.simulator.state import State

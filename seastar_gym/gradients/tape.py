@@ -129,7 +129,7 @@ def leave_right_hand_sides_of_hub(rods, work, D_hub, r_hub):
     """In place of solve_hub: right-hand sides of it and of root nodes go to work.step."""
     store_pair(work.step, 0, r_hub)
     for limb in range(rods.n_limbs):
-        store_pair(work.step, 2 * (limb * rods.edges_per_limb + 1), load_pair(work.ring, 2 * limb))
+        store_pair(work.step, 2 * (limb * rods.edges_per_limb + 1), load_pair(work.system.ring, 2 * limb))
     if rods.body is not None:
         store_pair(work.step, 2 * rods.n_nodes, (load(work.body.system, 3), splat(0.0)))
     return splat(0.0), splat(0.0)
@@ -138,7 +138,7 @@ def leave_right_hand_sides_of_hub(rods, work, D_hub, r_hub):
 @kernel
 def leave_right_hand_side_of_root(work, limb, D, H, r):
     """In place of store_root: nothing but the right-hand side."""
-    store_pair(work.ring, 2 * limb, r)
+    store_pair(work.system.ring, 2 * limb, r)
 
 
 TAPED = Form("taped", recorded, instead={

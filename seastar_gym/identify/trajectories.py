@@ -18,7 +18,7 @@ from seastar_gym.identify.measurement import (
     require_command_times,
     with_parameters,
 )
-from seastar_gym.processors import processors
+from seastar_gym.process import processors
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import (
     as_finite,

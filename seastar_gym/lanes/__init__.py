@@ -6,7 +6,7 @@ is done with them, and a processor adds eight numbers as fast as one: hence lane
 has the same bits in any company.
 """
 
-from seastar_gym.interrupts import held_back
+from seastar_gym.process import held_back
 
 with held_back():  # numba, and what it is taught, are there as a whole or not at all
     from seastar_gym.lanes import compile as compile

@@ -32,9 +32,9 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 
-from seastar_gym.interrupts import held_back, let_through
 from seastar_gym.lanes.pipeline import EntryCompiler, KernelCompiler, compiler_of
 from seastar_gym.lanes.registers import N_LANES, PLAIN, Form
+from seastar_gym.process import held_back, let_through
 
 PACKAGE = Path(__file__).resolve().parent.parent
 DIGEST_SIZE = hashlib.sha256().digest_size  # bytes

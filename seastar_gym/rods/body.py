@@ -255,7 +255,7 @@ def tail_solution(rods, work, limb, hub):
     """Solution of the node where a limb starts, from that of the hub (x, y) and that of the angle, if there is one."""
     if rods.body is None:
         return hub
-    turn = load(work.root_solution, 2 * rods.n_limbs + 2)
+    turn = load(work.system.root_solution, 2 * rods.n_limbs + 2)
     x, y = load(work.body.arm, 2 * limb), load(work.body.arm, 2 * limb + 1)
     return subtract_product(hub[0], turn, y), add_product(hub[1], turn, x)
 

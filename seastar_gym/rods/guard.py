@@ -167,7 +167,7 @@ def add_roots(rods, work, scheme, k, stage, fx, fy, xx, xy, yy):
 @kernel
 def add_middles(rods, work, stage, fx, fy, xx, xy, yy):
     """Add the drag in the middle of edges to the residual and slope of a move of the whole robot."""
-    if rods.middle_drag is None:
+    if rods.drag.middle is None:
         return fx, fy, xx, xy, yy
     for e in range(rods.n_edges):
         tail, head = tail_motion(rods, work, stage, e), node_motion(work, stage, e + 1)
@@ -180,10 +180,10 @@ def add_middles(rods, work, stage, fx, fy, xx, xy, yy):
 @kernel
 def subtract_edge_turn(rods, q, v, spin, turn):
     """(angular momentum, moment of inertia) less those of edges' differences; unchanged for lumped masses (None)."""
-    if rods.edge_mass is None:
+    if rods.inertia.edge is None:
         return spin, turn
     for e in range(rods.n_edges):
-        tail, mu = tail_node(rods, e), load(rods.edge_mass, e)
+        tail, mu = tail_node(rods, e), load(rods.inertia.edge, e)
         rx, ry = edge_vector(q, tail, e + 1)
         vx, vy = edge_vector(v, tail, e + 1)
         spin = subtract_product(spin, mu, rx * vy - ry * vx)
@@ -197,10 +197,10 @@ def subtract_edge_fluid_turn(rods, work, q, v, spin, turn):
 
     Unchanged without consistent added mass (None).
     """
-    if rods.edge_added_mass is None:
+    if rods.added_mass is None or rods.added_mass.edge is None:
         return spin, turn
     for e in range(rods.n_edges):
-        tail, mu = tail_node(rods, e), load(rods.edge_added_mass, e)
+        tail, mu = tail_node(rods, e), load(rods.added_mass.edge, e)
         nx, ny = load(work.normals, 2 * e), load(work.normals, 2 * e + 1)
         rx, ry = edge_vector(q, tail, e + 1)
         vx, vy = edge_vector(v, tail, e + 1)
@@ -213,7 +213,7 @@ def subtract_edge_fluid_turn(rods, work, q, v, spin, turn):
 @kernel
 def momentum_of(rods, work, node, vx, vy):
     """Momentum of a node at the velocity (vx, vy) [kg m/s], with that of the fluid it carries along."""
-    m = load(rods.mass, node)
+    m = load(rods.inertia.node, node)
     if rods.added_mass is None:
         return m * vx, m * vy
     px, py = fluid_momentum(work, node, vx, vy)
@@ -230,7 +230,7 @@ def rigid_motion(rods, work, q, v, frame):
     zero, one = splat(0.0), splat(1.0)
     mass, x, y = zero, zero, zero
     for node in range(rods.n_nodes):
-        m = load(rods.mass, node)
+        m = load(rods.inertia.node, node)
         mass += m
         x, y = add_product(x, m, load(q, 2 * node)), add_product(y, m, load(q, 2 * node + 1))
     x, y = add_mass_moment(rods, q, (x, y))
@@ -310,7 +310,7 @@ def frame_velocity(rods, q, v):
     if rods.scales.held:
         return v_x, v_y
     for node in range(rods.n_nodes):
-        m = load(rods.mass, node)
+        m = load(rods.inertia.node, node)
         mass += m
         v_x, v_y = add_product(v_x, m, load(v, 2 * node)), add_product(v_y, m, load(v, 2 * node + 1))
     v_x, v_y = add_turning_momentum(rods, q, v, (v_x, v_y))
@@ -369,11 +369,11 @@ def moved_hub_energy(rods, work, actuation, start, end):
         return add_moved_energy(rods, work, actuation, start, end, moved)
     set_natural_hub_angles(rods, work, actuation, start)
     for limb in range(rods.n_limbs):
-        store(work.hub_moment, limb, load(work.hub_EI_kappa_bar, limb))
+        store(work.hub.moment, limb, load(work.hub.EI_kappa_bar, limb))
     set_natural_hub_angles(rods, work, actuation, end)
     energy = splat(0.0)
     for limb in range(rods.n_limbs):
-        moved = load(work.hub_EI_kappa_bar, limb) - load(work.hub_moment, limb)
+        moved = load(work.hub.EI_kappa_bar, limb) - load(work.hub.moment, limb)
         dl_over_EI = load(rods.bending.dl_over_EI, limb * rods.edges_per_limb)
         energy = add_product(energy, 0.5 * dl_over_EI * moved, moved)
     return energy
@@ -412,7 +412,7 @@ def may_gain(rods, work, stage, phi, robots):
         return robots
     gain = phi - elastic_energy(rods, work, stage.q_hat)
     for node in range(rods.n_nodes):
-        m = load(rods.mass, node)
+        m = load(rods.inertia.node, node)
         for row in range(2 * node, 2 * node + 2):
             v_0 = load(stage.v_hat, row)
             change = (load(work.q, row) - load(stage.q_hat, row)) * stage.inverse_gamma - v_0
@@ -426,10 +426,10 @@ def may_gain(rods, work, stage, phi, robots):
 @kernel
 def subtract_edge_gain(rods, work, stage, gain):
     """Gain less v_0 mu (v_1 - v_0) of the differences along the edges [J]; unchanged for lumped masses (None)."""
-    if rods.edge_mass is None:
+    if rods.inertia.edge is None:
         return gain
     for e in range(rods.n_edges):
-        tail, mu = tail_node(rods, e), load(rods.edge_mass, e)
+        tail, mu = tail_node(rods, e), load(rods.inertia.edge, e)
         of_tail, of_head = node_motion(work, stage, tail), node_motion(work, stage, e + 1)
         v_x, v_y = edge_vector(stage.v_hat, tail, e + 1)
         gain = subtract_product(gain, mu * v_x, of_head.dx - of_tail.dx)

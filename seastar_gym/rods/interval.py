@@ -130,9 +130,9 @@ def shape_of_limb(shape, n_turning, k, limb):
 @kernel
 def begin_effort(rods, work, actuation, q, effort):
     """Fill the rows of the moments at the beginning of an interval."""
-    fill_moments(rods, work, actuation, q, work.hub_moment)
+    fill_moments(rods, work, actuation, q, work.hub.moment)
     for limb in range(rods.n_limbs):
-        store(effort, MOMENTS + limb, load(work.hub_moment, limb))
+        store(effort, MOMENTS + limb, load(work.hub.moment, limb))
 
 
 @kernel
@@ -146,9 +146,9 @@ def end_effort(rods, work, actuation, q, robots, effort):
         start, end = load(actuation.delta_psi_start, limb), load(actuation.delta_psi_end, limb)
         store(actuation.delta_psi_start, limb, end)
         store(actuation.delta_psi_end, limb, end - start)
-    fill_moments(rods, work, actuation, q, work.hub_moment)
+    fill_moments(rods, work, actuation, q, work.hub.moment)
     for limb in range(rods.n_limbs):
-        before, after = load(effort, MOMENTS + limb), load(work.hub_moment, limb)
+        before, after = load(effort, MOMENTS + limb), load(work.hub.moment, limb)
         done = add_product(done, 0.5 * (before + after), load(actuation.delta_psi_end, limb))
         largest = larger(largest, larger(absolute(before), absolute(after)))
         store(effort, MOMENTS + limb, after)

@@ -19,10 +19,13 @@ dummy where there is none. A root node couples with a turn by -C grad theta, the
 turn with itself by the sum of C.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from seastar_gym.lanes.compile import kernel
-from seastar_gym.lanes.registers import add_product, load, select, splat, store, subtract_product
+from seastar_gym.lanes.registers import N_LANES, add_product, load, select, splat, store, subtract_product
+from seastar_gym.lanes.rows import aligned_rows
 from seastar_gym.rods.body import tail_solution
 from seastar_gym.rods.star import load_root_edge
 from seastar_gym.rods.terms.clamp import CLAMP_ROWS, ELASTIC, VISCOUS
@@ -30,6 +33,29 @@ from seastar_gym.rods.terms.clamp import CLAMP_ROWS, ELASTIC, VISCOUS
 NODE_ROWS = 11  # l, x and y for four columns each, z
 ROOT_ROWS = 15  # l, x and y for six columns each, z
 RING_ROWS = 9  # D, H and r of a root node
+
+
+class System(NamedTuple):
+    """The linear system of a Newton step.
+
+    factors, root_factors: What elimination leaves of nodes, and of root nodes and hub. ring: Blocks of root nodes.
+    root_solution: Solution of root nodes and hub.
+    pivots, root_pivots: For solutions of other right-hand sides; None where nobody asks.
+    """
+
+    factors: np.ndarray
+    ring: np.ndarray
+    root_factors: np.ndarray
+    root_solution: np.ndarray
+    pivots: np.ndarray | None
+    root_pivots: np.ndarray | None
+
+
+def memory(n_nodes: int, n_limbs: int, again: bool) -> System:
+    """Zeroed memory; again: Whether the system is solved for other right-hand sides, too."""
+    counts = (NODE_ROWS * n_nodes, RING_ROWS * n_limbs, ROOT_ROWS * n_limbs, 2 * (n_limbs + 2))
+    pivots = [aligned_rows(count, N_LANES) if again else None for count in (2 * n_nodes, 2 * (n_limbs + 1))]
+    return System(*(aligned_rows(count, N_LANES) for count in counts), *pivots)
 
 
 @kernel
@@ -100,19 +126,19 @@ def eliminate_node(work, node, D, B, C, r, D_1, B_1, D_2, r_1, r_2):
     xa, xb, xc, xd = B[0] * inverse_x, B[1] * inverse_x, C[0] * inverse_x, C[1] * inverse_x
     ya, yb, yc, yd = wa * inverse_y, wb * inverse_y, wc * inverse_y, wd * inverse_y
     zx, zy = r[0] * inverse_x, wr * inverse_y
-    keep_pivots(work.pivots, node, inverse_x, inverse_y)
+    keep_pivots(work.system.pivots, node, inverse_x, inverse_y)
     row = NODE_ROWS * node
-    store(work.factors, row, lower)
-    store(work.factors, row + 1, xa)
-    store(work.factors, row + 2, xb)
-    store(work.factors, row + 3, xc)
-    store(work.factors, row + 4, xd)
-    store(work.factors, row + 5, ya)
-    store(work.factors, row + 6, yb)
-    store(work.factors, row + 7, yc)
-    store(work.factors, row + 8, yd)
-    store(work.factors, row + 9, zx)
-    store(work.factors, row + 10, zy)
+    store(work.system.factors, row, lower)
+    store(work.system.factors, row + 1, xa)
+    store(work.system.factors, row + 2, xb)
+    store(work.system.factors, row + 3, xc)
+    store(work.system.factors, row + 4, xd)
+    store(work.system.factors, row + 5, ya)
+    store(work.system.factors, row + 6, yb)
+    store(work.system.factors, row + 7, yc)
+    store(work.system.factors, row + 8, yd)
+    store(work.system.factors, row + 9, zx)
+    store(work.system.factors, row + 10, zy)
     return (
         less_symmetric(D_1, xa, ya, B[0], wa, xb, yb, B[1], wb),
         less_coupling(B_1, xa, ya, xb, yb, C[0], wc, C[1], wd),
@@ -128,15 +154,15 @@ def eliminate_node(work, node, D, B, C, r, D_1, B_1, D_2, r_1, r_2):
 def substitute_node(work, node, bx, by, ax, ay):
     """Solution (x, y) of a node from those of its next node (bx, by) and its second next (ax, ay)."""
     row = NODE_ROWS * node
-    y = subtract_product(load(work.factors, row + 10), load(work.factors, row + 7), ax)
-    x = subtract_product(load(work.factors, row + 9), load(work.factors, row + 3), ax)
-    y = subtract_product(y, load(work.factors, row + 8), ay)
-    x = subtract_product(x, load(work.factors, row + 4), ay)
-    y = subtract_product(y, load(work.factors, row + 5), bx)
-    x = subtract_product(x, load(work.factors, row + 1), bx)
-    y = subtract_product(y, load(work.factors, row + 6), by)
-    x = subtract_product(x, load(work.factors, row + 2), by)
-    return subtract_product(x, load(work.factors, row), y), y
+    y = subtract_product(load(work.system.factors, row + 10), load(work.system.factors, row + 7), ax)
+    x = subtract_product(load(work.system.factors, row + 9), load(work.system.factors, row + 3), ax)
+    y = subtract_product(y, load(work.system.factors, row + 8), ay)
+    x = subtract_product(x, load(work.system.factors, row + 4), ay)
+    y = subtract_product(y, load(work.system.factors, row + 5), bx)
+    x = subtract_product(x, load(work.system.factors, row + 1), bx)
+    y = subtract_product(y, load(work.system.factors, row + 6), by)
+    x = subtract_product(x, load(work.system.factors, row + 2), by)
+    return subtract_product(x, load(work.system.factors, row), y), y
 
 
 @kernel
@@ -183,10 +209,10 @@ def eliminate_root(work, root, D, N, E, H, r, D_next, H_next, r_next, D_last, H_
         wa * inverse_y, wb * inverse_y, wc * inverse_y, wd * inverse_y, we * inverse_y, wf * inverse_y,
     )  # fmt: skip
     zx, zy = r[0] * inverse_x, wr * inverse_y
-    keep_pivots(work.root_pivots, root, inverse_x, inverse_y)
+    keep_pivots(work.system.root_pivots, root, inverse_x, inverse_y)
     left = (lower, xa, xb, xc, xd, xe, xf, ya, yb, yc, yd, ye, yf, zx, zy)
     for k in range(ROOT_ROWS):
-        store(work.root_factors, row + k, left[k])
+        store(work.system.root_factors, row + k, left[k])
     zero = splat(0.0)
     return (
         (
@@ -210,13 +236,13 @@ def eliminate_root(work, root, D, N, E, H, r, D_next, H_next, r_next, D_last, H_
 def substitute_root(work, root, following, last, hub):
     """Solution (x, y) of a root node from those of the next one, the last one and the hub."""
     row = ROOT_ROWS * root
-    x, y = load(work.root_factors, row + 13), load(work.root_factors, row + 14)
+    x, y = load(work.system.root_factors, row + 13), load(work.system.root_factors, row + 14)
     known = (hub[0], hub[1], last[0], last[1], following[0], following[1])
     columns = (5, 6, 3, 4, 1, 2)
     for k in range(6):
-        x = subtract_product(x, load(work.root_factors, row + columns[k]), known[k])
-        y = subtract_product(y, load(work.root_factors, row + columns[k] + 6), known[k])
-    return subtract_product(x, load(work.root_factors, row), y), y
+        x = subtract_product(x, load(work.system.root_factors, row + columns[k]), known[k])
+        y = subtract_product(y, load(work.system.root_factors, row + columns[k] + 6), known[k])
+    return subtract_product(x, load(work.system.root_factors, row), y), y
 
 
 @kernel
@@ -243,7 +269,11 @@ def negative(B):
 def load_root(work, root):
     """(D, H, r) of a root node after its limb has been eliminated, without the hub hinges' couplings."""
     row = RING_ROWS * root
-    return load_block(work.ring, row), load_coupling(work.ring, row + 3), load_pair(work.ring, row + 7)
+    return (
+        load_block(work.system.ring, row),
+        load_coupling(work.system.ring, row + 3),
+        load_pair(work.system.ring, row + 7),
+    )
 
 
 @kernel
@@ -251,23 +281,24 @@ def store_root(work, root, D, H, r):
     """Store (D, H, r) of a root node for load_root."""
     row = RING_ROWS * root
     for k in range(3):
-        store(work.ring, row + k, D[k])
+        store(work.system.ring, row + k, D[k])
     for k in range(4):
-        store(work.ring, row + 3 + k, H[k])
+        store(work.system.ring, row + 3 + k, H[k])
     for k in range(2):
-        store(work.ring, row + 7 + k, r[k])
+        store(work.system.ring, row + 7 + k, r[k])
 
 
 @kernel
 def hub_coupling(work, limb):
     """Block Q of the hub hinge between a limb and the next: rows of the next root node, columns of this one's."""
-    return load_coupling(work.hub_coupling, 4 * limb)
+    return load_coupling(work.hub.coupling, 4 * limb)
 
 
 @kernel
 def solve_ring(work, n_limbs, D_hub, r_hub):
-    """Eliminate the ring of root nodes and the hub, and solve for them: x of root node k is at work.root_solution row
-    2 k, y behind it, the hub's at 2 n_limbs.
+    """Eliminate the ring of root nodes and the hub, and solve for them.
+
+    Into work.system.root_solution: x of root node k in row 2 k, y behind it, the hub's at 2 n_limbs.
 
     A hub hinge from limb a to limb b adds -Q between the root nodes (b, a), Q between (b, hub), Q^T between (a, hub)
     and -Q - Q^T at the hub.
@@ -325,8 +356,8 @@ def solve_ring(work, n_limbs, D_hub, r_hub):
     decrement += part
     pivot = smaller(pivot, root_pivot)
     inverse_x, lower, inverse_y, wr, root_pivot = pivots(D_hub, r_hub)
-    keep_pivots(work.root_pivots, last, inverse_x, inverse_y)
-    keep_pivots(work.root_pivots, n_limbs, lower, lower)
+    keep_pivots(work.system.root_pivots, last, inverse_x, inverse_y)
+    keep_pivots(work.system.root_pivots, n_limbs, lower, lower)
     y = wr * inverse_y
     x = subtract_product(r_hub[0] * inverse_x, lower, y)
     decrement += add_product(r_hub[0] * r_hub[0] * inverse_x, y, wr)
@@ -340,12 +371,12 @@ def substitute_ring(work, n_limbs, hub):
     last, zero = n_limbs - 1, splat(0.0)
     of_last = substitute_node(work, 1, hub[0], hub[1], zero, zero)
     following = substitute_node(work, 0, of_last[0], of_last[1], hub[0], hub[1])
-    store_pair(work.root_solution, 2 * n_limbs, hub)
-    store_pair(work.root_solution, 2 * last, of_last)
-    store_pair(work.root_solution, 2 * last - 2, following)
+    store_pair(work.system.root_solution, 2 * n_limbs, hub)
+    store_pair(work.system.root_solution, 2 * last, of_last)
+    store_pair(work.system.root_solution, 2 * last - 2, following)
     for root in range(last - 2, -1, -1):
         following = substitute_root(work, root, following, of_last, hub)
-        store_pair(work.root_solution, 2 * root, following)
+        store_pair(work.system.root_solution, 2 * root, following)
 
 
 @kernel
@@ -358,22 +389,22 @@ def solve_lone_root(work, D_hub, r_hub):
         work, 1, D, H, nothing, r, D_hub, nothing, (zero, zero, zero), r_hub, (zero, zero)
     )
     inverse_x, lower, inverse_y, wr, hub_pivot = pivots(D_hub, r_hub)
-    keep_pivots(work.root_pivots, 0, inverse_x, inverse_y)
-    keep_pivots(work.root_pivots, 1, lower, lower)
+    keep_pivots(work.system.root_pivots, 0, inverse_x, inverse_y)
+    keep_pivots(work.system.root_pivots, 1, lower, lower)
     y = wr * inverse_y
     x = subtract_product(r_hub[0] * inverse_x, lower, y)
-    store_pair(work.root_solution, 2, (x, y))
-    store_pair(work.root_solution, 0, substitute_node(work, 1, x, y, zero, zero))
+    store_pair(work.system.root_solution, 2, (x, y))
+    store_pair(work.system.root_solution, 0, substitute_node(work, 1, x, y, zero, zero))
     return decrement + add_product(r_hub[0] * r_hub[0] * inverse_x, y, wr), smaller(pivot, hub_pivot)
 
 
 @kernel
 def turn_stiffnesses(rods, work, limb):
     """C of a limb's clamp, of elasticity and of damping [N m]; a body has one turn, which meets both."""
-    C = load(work.hub_coupling, CLAMP_ROWS * limb + ELASTIC)
+    C = load(work.hub.coupling, CLAMP_ROWS * limb + ELASTIC)
     if rods.damping is None:
         return C, splat(0.0)
-    C_d = load(work.hub_coupling, CLAMP_ROWS * limb + VISCOUS)
+    C_d = load(work.hub.coupling, CLAMP_ROWS * limb + VISCOUS)
     if rods.body is None:
         return C, C_d
     return C + C_d, splat(0.0)
@@ -436,8 +467,8 @@ def solve_rigid_hub(rods, work, D_hub, r_hub):
     )
     decrement += part
     inverse, lower, inverse_d, r_d, turn_pivot = pivots(D_turn, r_turn)
-    keep_pivots(work.root_pivots, 0, inverse, inverse_d)
-    keep_pivots(work.root_pivots, 1, lower, lower)
+    keep_pivots(work.system.root_pivots, 0, inverse, inverse_d)
+    keep_pivots(work.system.root_pivots, 1, lower, lower)
     turn_d = r_d * inverse_d
     turn = subtract_product(r_turn[0] * inverse, lower, turn_d)
     substitute_rigid_hub(rods, work, turn, turn_d)
@@ -447,33 +478,33 @@ def solve_rigid_hub(rods, work, D_hub, r_hub):
 
 @kernel
 def substitute_rigid_hub(rods, work, turn, turn_d):
-    """Solutions of the hub and of the root nodes, into work.root_solution, from those of the hub's turns."""
+    """Solutions of the hub and of the root nodes, into work.system.root_solution, from those of the hub's turns."""
     edges, zero = rods.edges_per_limb, splat(0.0)
     hub = substitute_node(work, 0, turn, turn_d, zero, zero)
-    store_pair(work.root_solution, 2 * rods.n_limbs, hub)
+    store_pair(work.system.root_solution, 2 * rods.n_limbs, hub)
     if rods.body is not None:  # for tail_solution
-        store(work.root_solution, 2 * rods.n_limbs + 2, turn)
+        store(work.system.root_solution, 2 * rods.n_limbs + 2, turn)
     for limb in range(rods.n_limbs):
         root = substitute_node(work, limb * edges + 1, hub[0], hub[1], turn, turn_d)
-        store_pair(work.root_solution, 2 * limb, root)
+        store_pair(work.system.root_solution, 2 * limb, root)
 
 
 @kernel
 def substitute_star(rods, work, x):
     """Write the solution of the eliminated system over rows x, node by node, then a body's angle [rad]."""
     edges = rods.edges_per_limb
-    hub = load_pair(work.root_solution, 2 * rods.n_limbs)
+    hub = load_pair(work.system.root_solution, 2 * rods.n_limbs)
     store_pair(x, 0, hub)
     for limb in range(rods.n_limbs):
         first = limb * edges
         before = tail_solution(rods, work, limb, hub)
-        here = load_pair(work.root_solution, 2 * limb)
+        here = load_pair(work.system.root_solution, 2 * limb)
         store_pair(x, 2 * (first + 1), here)
         for i in range(2, edges + 1):
             before, here = here, substitute_node(work, first + i, here[0], here[1], before[0], before[1])
             store_pair(x, 2 * (first + i), here)
     if rods.body is not None:
-        store(x, 2 * rods.n_nodes, load(work.root_solution, 2 * rods.n_limbs + 2))
+        store(x, 2 * rods.n_nodes, load(work.system.root_solution, 2 * rods.n_limbs + 2))
         store(x, 2 * rods.n_nodes + 1, 0.0)
 
 
@@ -497,7 +528,7 @@ def solve_again(rods, work, r, x):
         for i in range(edges, 1, -1):
             node = first + i
             r_next, r_second = eliminate_again(work, node, add(load_pair(r, 2 * node), r_next), r_second, (zero, zero))
-        store_pair(work.ring, RING_ROWS * limb + 7, add(load_pair(r, 2 * (first + 1)), r_next))
+        store_pair(work.system.ring, RING_ROWS * limb + 7, add(load_pair(r, 2 * (first + 1)), r_next))
         r_hub = add(r_hub, r_second)
         if rods.body is not None:
             torque = with_torque(work, limb, r_second, torque)
@@ -512,15 +543,15 @@ def solve_again(rods, work, r, x):
 
 @kernel
 def solve_rigid_hub_again(rods, work, r_hub, torque):
-    """Solve for the root nodes, whose right-hand sides are in work.ring, a rigid hub, and a body's angle (torque)."""
+    """Solve for root nodes with right-hand sides in work.system.ring, a rigid hub, and a body's angle (torque)."""
     edges, zero = rods.edges_per_limb, splat(0.0)
     r_turn = (torque, zero)
     for limb in range(rods.n_limbs):
-        r = load_pair(work.ring, RING_ROWS * limb + 7)
+        r = load_pair(work.system.ring, RING_ROWS * limb + 7)
         r_hub, r_turn = eliminate_again(work, limb * edges + 1, r, r_hub, r_turn)
     r_turn, _ = eliminate_again(work, 0, r_hub, r_turn, (zero, zero))
-    inverse, inverse_d = load_pair(work.root_pivots, 0)
-    lower = load(work.root_pivots, 2)
+    inverse, inverse_d = load_pair(work.system.root_pivots, 0)
+    lower = load(work.system.root_pivots, 2)
     turn_d = subtract_product(r_turn[1], lower, r_turn[0]) * inverse_d
     substitute_rigid_hub(rods, work, subtract_product(r_turn[0] * inverse, lower, turn_d), turn_d)
 
@@ -532,17 +563,17 @@ def add(a, b):
 
 @kernel
 def solve_ring_again(work, n_limbs, r_hub):
-    """Solve for the ring of root nodes, whose right-hand sides are in work.ring, and the hub."""
+    """Solve for the ring of root nodes, whose right-hand sides are in work.system.ring, and the hub."""
     last, zero = n_limbs - 1, splat(0.0)
-    r, r_last = load_pair(work.ring, 7), load_pair(work.ring, RING_ROWS * last + 7)
+    r, r_last = load_pair(work.system.ring, 7), load_pair(work.system.ring, RING_ROWS * last + 7)
     for root in range(last - 1):
-        r_next = load_pair(work.ring, RING_ROWS * (root + 1) + 7)
+        r_next = load_pair(work.system.ring, RING_ROWS * (root + 1) + 7)
         r_next, r_last, r_hub = eliminate_root_again(work, root, r, r_next, r_last, r_hub)
         r = r_next
     r_last, r_hub = eliminate_again(work, 0, r, r_last, r_hub)
     r_hub, _ = eliminate_again(work, 1, r_last, r_hub, (zero, zero))
-    inverse_x, inverse_y = load_pair(work.root_pivots, 2 * last)
-    lower = load(work.root_pivots, 2 * n_limbs)
+    inverse_x, inverse_y = load_pair(work.system.root_pivots, 2 * last)
+    lower = load(work.system.root_pivots, 2 * n_limbs)
     y = subtract_product(r_hub[1], lower, r_hub[0]) * inverse_y
     substitute_ring(work, n_limbs, (subtract_product(r_hub[0] * inverse_x, lower, y), y))
 
@@ -551,29 +582,29 @@ def solve_ring_again(work, n_limbs, r_hub):
 def solve_lone_root_again(work, r_hub):
     """Solve for root node and hub of a single limb, whose root's right-hand side is in work.ring."""
     zero = splat(0.0)
-    r_hub, _ = eliminate_again(work, 1, load_pair(work.ring, 7), r_hub, (zero, zero))
-    inverse_x, inverse_y = load_pair(work.root_pivots, 0)
-    lower = load(work.root_pivots, 2)
+    r_hub, _ = eliminate_again(work, 1, load_pair(work.system.ring, 7), r_hub, (zero, zero))
+    inverse_x, inverse_y = load_pair(work.system.root_pivots, 0)
+    lower = load(work.system.root_pivots, 2)
     y = subtract_product(r_hub[1], lower, r_hub[0]) * inverse_y
     x = subtract_product(r_hub[0] * inverse_x, lower, y)
-    store_pair(work.root_solution, 2, (x, y))
-    store_pair(work.root_solution, 0, substitute_node(work, 1, x, y, zero, zero))
+    store_pair(work.system.root_solution, 2, (x, y))
+    store_pair(work.system.root_solution, 0, substitute_node(work, 1, x, y, zero, zero))
 
 
 @kernel
 def eliminate_again(work, node, r, r_1, r_2):
     """Right-hand sides of the next node and the second next, updated as eliminate_node does."""
     row = NODE_ROWS * node
-    inverse_x, inverse_y = load_pair(work.pivots, 2 * node)
-    wr = subtract_product(r[1], load(work.factors, row), r[0])
-    store_pair(work.factors, row + 9, (r[0] * inverse_x, wr * inverse_y))
+    inverse_x, inverse_y = load_pair(work.system.pivots, 2 * node)
+    wr = subtract_product(r[1], load(work.system.factors, row), r[0])
+    store_pair(work.system.factors, row + 9, (r[0] * inverse_x, wr * inverse_y))
     xa, xb, xc, xd = (
-        load(work.factors, row + 1), load(work.factors, row + 2), load(work.factors, row + 3),
-        load(work.factors, row + 4),
+        load(work.system.factors, row + 1), load(work.system.factors, row + 2), load(work.system.factors, row + 3),
+        load(work.system.factors, row + 4),
     )  # fmt: skip
     ya, yb, yc, yd = (
-        load(work.factors, row + 5), load(work.factors, row + 6), load(work.factors, row + 7),
-        load(work.factors, row + 8),
+        load(work.system.factors, row + 5), load(work.system.factors, row + 6), load(work.system.factors, row + 7),
+        load(work.system.factors, row + 8),
     )  # fmt: skip
     return less_vector(r_1, xa, ya, xb, yb, r[0], wr), less_vector(r_2, xc, yc, xd, yd, r[0], wr)
 
@@ -582,9 +613,9 @@ def eliminate_again(work, node, r, r_1, r_2):
 def eliminate_root_again(work, root, r, r_next, r_last, r_hub):
     """Right-hand sides of the next root, the last one and the hub, updated as eliminate_root does."""
     row = ROOT_ROWS * root
-    inverse_x, inverse_y = load_pair(work.root_pivots, 2 * root)
-    wr = subtract_product(r[1], load(work.root_factors, row), r[0])
-    store_pair(work.root_factors, row + 13, (r[0] * inverse_x, wr * inverse_y))
+    inverse_x, inverse_y = load_pair(work.system.root_pivots, 2 * root)
+    wr = subtract_product(r[1], load(work.system.root_factors, row), r[0])
+    store_pair(work.system.root_factors, row + 13, (r[0] * inverse_x, wr * inverse_y))
     return (
         less_columns(work, row + 1, r_next, r[0], wr),
         less_columns(work, row + 3, r_last, r[0], wr),
@@ -595,6 +626,6 @@ def eliminate_root_again(work, root, r, r_next, r_last, r_hub):
 @kernel
 def less_columns(work, row, r, rx, wr):
     """r less what a root node takes from the two columns whose factors begin at `row`."""
-    xa, xb = load(work.root_factors, row), load(work.root_factors, row + 1)
-    ya, yb = load(work.root_factors, row + 6), load(work.root_factors, row + 7)
+    xa, xb = load(work.system.root_factors, row), load(work.system.root_factors, row + 1)
+    ya, yb = load(work.system.root_factors, row + 6), load(work.system.root_factors, row + 7)
     return less_vector(r, xa, ya, xb, yb, rx, wr)

@@ -83,9 +83,9 @@ def quadratic_length(rods, stage):
 @kernel
 def largest_hub_t(rods, work):
     """Largest tan(phi/2) of the hub hinges, as last assembled."""
-    largest = load(work.hub_t, 0)
+    largest = load(work.hub.t, 0)
     for limb in range(1, rods.n_limbs):
-        largest = larger(load(work.hub_t, limb), largest)
+        largest = larger(load(work.hub.t, limb), largest)
     return largest
 
 
@@ -153,13 +153,13 @@ def take_step(rods, work, stepping, shortening, fraction):
     """
     edges = rods.edges_per_limb
     scale = step_scale(stepping, shortening, fraction)
-    hub = load_pair(work.root_solution, 2 * rods.n_limbs)
+    hub = load_pair(work.system.root_solution, 2 * rods.n_limbs)
     largest = move_node(work, 0, hub, shortening, scale)
-    largest = move_angle(rods, work, work.root_solution, 2 * rods.n_limbs + 2, shortening, scale, largest)
+    largest = move_angle(rods, work, work.system.root_solution, 2 * rods.n_limbs + 2, shortening, scale, largest)
     for limb in range(rods.n_limbs):
         first = limb * edges
         before = tail_solution(rods, work, limb, hub)
-        here = load_pair(work.root_solution, 2 * limb)
+        here = load_pair(work.system.root_solution, 2 * limb)
         largest = larger(largest, move_node(work, first + 1, here, shortening, scale))
         for i in range(2, edges + 1):
             before, here = here, substitute_node(work, first + i, here[0], here[1], before[0], before[1])

@@ -95,7 +95,7 @@ def elastic_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
     ux, uy = edge.ux, edge.uy
     T = tension(rods, e, edge.length)
     natural = splat(0.0)
-    pull = damped_stress(rods, work.tension, e, stage.inverse_gamma, T, natural) * edge.length
+    pull = damped_stress(rods, work.damping.tension, e, stage.inverse_gamma, T, natural) * edge.length
     across = convex_part(convex, pull) + stiffness
     mu = select(convex, 0.0, net_moment)
     twice_mu = mu + mu
@@ -107,7 +107,7 @@ def elastic_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
     return (
         damped_energy(
             rods,
-            work.tension,
+            work.damping.tension,
             e,
             stage.inverse_gamma,
             T,
@@ -130,11 +130,11 @@ def hinge_slopes(rods, work, stage, hinge, t, EI_kappa_bar, convex):
     bend = moment(rods, work, hinge, t, EI_kappa_bar)
     inverse_gamma = stage.inverse_gamma
     energy = damped_energy(
-        rods, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar, bending_compliance(rods, work, hinge),
+        rods, work.damping.bending, hinge, inverse_gamma, bend, EI_kappa_bar, bending_compliance(rods, work, hinge),
         bending_energy(rods, work, hinge, bend),
     )  # fmt: skip
     stiffness = damped_stiffness(rods, inverse_gamma, bending_stiffness(rods, work, hinge))
-    damped = damped_stress(rods, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar)
+    damped = damped_stress(rods, work.damping.bending, hinge, inverse_gamma, bend, EI_kappa_bar)
     slope, s = bending_slopes(stiffness, t, damped, convex)
     return energy, slope, s
 
@@ -143,9 +143,9 @@ def hinge_slopes(rods, work, stage, hinge, t, EI_kappa_bar, convex):
 def node_slopes(rods, work, stage, node, motion, push):
     """(energy, gradient, Hessian) of a node's inertia, drag and load, and of a force that pushes it, (x, y) [N]."""
     dx, dy, wx, wy = motion
-    m = load(rods.mass, node)
+    m = load(rods.inertia.node, node)
     m_over_gamma = m * stage.inverse_gamma
-    potential, c_speed, c_over_speed = drag_slopes(load(rods.drag, node), wx, wy)
+    potential, c_speed, c_over_speed = drag_slopes(load(rods.drag.node, node), wx, wy)
     c_over_speed *= stage.inverse_gamma
     sx, sy = c_over_speed * wx, c_over_speed * wy
     diagonal = (m_over_gamma + c_speed) * stage.inverse_gamma
@@ -180,9 +180,9 @@ def assemble_hub(rods, work, stage, convex):
         edge = edge_geometry(work.q, tail_node(rods, limb * edges), limb * edges + 1)
         for k in range(EDGE_ROWS):
             store(work.root_edges, EDGE_ROWS * limb + k, edge[k])
-        store(work.hub_moment, limb, 0.0)
-        store(work.hub_stiffness, limb, 0.0)
-        store(work.hub_t, limb, 0.0)
+        store(work.hub.moment, limb, 0.0)
+        store(work.hub.stiffness, limb, 0.0)
+        store(work.hub.t, limb, 0.0)
     if rods.clamp is None:
         return assemble_hub_hinges(rods, work, stage, convex)
     return assemble_clamps(rods, work, stage, convex)
@@ -198,16 +198,16 @@ def assemble_hub_hinges(rods, work, stage, convex):
         hinge = a * edges
         first, second = load_root_edge(work, a), load_root_edge(work, b)
         t = half_angle(first, second, rods.hub.side)
-        E_b, slope, s = hinge_slopes(rods, work, stage, hinge, t, load(work.hub_EI_kappa_bar, a), convex)
+        E_b, slope, s = hinge_slopes(rods, work, stage, hinge, t, load(work.hub.EI_kappa_bar, a), convex)
         energy += E_b
-        store(work.hub_t, a, t)
-        store(work.hub_moment, a, load(work.hub_moment, a) - slope)
-        store(work.hub_moment, b, load(work.hub_moment, b) + slope)
-        store(work.hub_stiffness, a, load(work.hub_stiffness, a) + s)
-        store(work.hub_stiffness, b, load(work.hub_stiffness, b) + s)
+        store(work.hub.t, a, t)
+        store(work.hub.moment, a, load(work.hub.moment, a) - slope)
+        store(work.hub.moment, b, load(work.hub.moment, b) + slope)
+        store(work.hub.stiffness, a, load(work.hub.stiffness, a) + s)
+        store(work.hub.stiffness, b, load(work.hub.stiffness, b) + s)
         Q = coupling(s, second, first)
         for k in range(4):
-            store(work.hub_coupling, 4 * a + k, Q[k])
+            store(work.hub.coupling, 4 * a + k, Q[k])
     return energy
 
 
@@ -285,7 +285,7 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         decrement += part
         pivot = smaller(pivot, node_pivot)
         slope, s, edge, motion = slope_before, s_before, before, motion_before
-    net_moment, stiffness = load(work.hub_moment, limb) - slope, load(work.hub_stiffness, limb) + s
+    net_moment, stiffness = load(work.hub.moment, limb) - slope, load(work.hub.stiffness, limb) + s
     of_hub = motion if rods.clamp is None else tail_motion(rods, work, stage, first)  # hub hinges do not ask for it
     E_s, f, K = edge_slopes(rods, work, stage, first, edge, net_moment, stiffness, convex, of_hub, motion)
     E_n, g, inertia = node_slopes(rods, work, stage, first + 1, motion, contact_force(work, first + 1))
@@ -355,7 +355,7 @@ def hub_hinge_energy(rods, work, q, limb, edge):
     """Energy of the hub hinge from a limb, whose root edge is given, to the next one [J]."""
     root = limb * rods.edges_per_limb
     next_root = edge_of(rods, q, (root + rods.edges_per_limb) % rods.n_edges)
-    return hinge_energy(rods, work, root, edge, next_root, rods.hub.side, load(work.hub_EI_kappa_bar, limb))
+    return hinge_energy(rods, work, root, edge, next_root, rods.hub.side, load(work.hub.EI_kappa_bar, limb))
 
 
 @kernel
@@ -387,7 +387,7 @@ def add_hub_hinge_moments(rods, work, q, moments):
     for limb in range(rods.n_limbs):
         after = (limb + 1) % rods.n_limbs
         t = half_angle(edge_of(rods, q, limb * edges), edge_of(rods, q, after * edges), rods.hub.side)
-        natural_moment = load(work.hub_EI_kappa_bar, limb)
+        natural_moment = load(work.hub.EI_kappa_bar, limb)
         natural = 0.5 * load(rods.bending.dl_over_EI, limb * edges) * natural_moment
         push = moment(rods, work, limb * edges, t, natural_moment) * add_product(1.0, natural, natural)
         store(moments, limb, load(moments, limb) + push)

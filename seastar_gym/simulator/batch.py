@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 from seastar_gym.lanes.dispatch import KnownCode
 from seastar_gym.lanes.registers import N_LANES, NARROW, PLAIN
 from seastar_gym.lanes.rows import aligned_rows, from_rows, to_rows, write_rows
-from seastar_gym.model import Coefficients
+from seastar_gym.model import Coefficients, scheme_for
 from seastar_gym.rods.bundles import Work, make_work
 from seastar_gym.rods.interval import advance
 from seastar_gym.rods.potential import energies, energies_in_water
 from seastar_gym.rods.step import COVERED, MOMENTS, PEAK_MOMENT, REPORT_ROWS, SCHEMES, SMALLEST_HUB_T, WORK
 from seastar_gym.rods.terms.hub import Actuation
 from seastar_gym.scene import Scene
-from seastar_gym.schemes import scheme_for
 from seastar_gym.simulator.report import SolverStatus
 
 
@@ -98,8 +97,9 @@ its share to the others."""
 LARGEST_PART = 64
 """Lane groups in a part at most. An interrupt waits for the parts under way."""
 FEW = N_LANES // 2 if N_LANES > 4 else 0
-"""Robots at most in a batch that is advanced on NARROW lanes, to the same bits. With eight lanes few robots are 1.6 times
-as fast so, with four no faster. Code for few robots is not that for many: who swims both waits for the compiler twice."""
+"""Robots at most in a batch that is advanced on NARROW lanes, to the same bits. With eight lanes few robots are 1.6
+times as fast so, with four no faster. Code for few is not that for many: who swims both waits for the compiler twice.
+"""
 ROWS = ("q", "v", "status")
 """Arrays of shape (n_groups, k, N_LANES) that an interval changes and the next one does not make anew."""
 MOVED = (*ROWS, "last_hub")

@@ -16,10 +16,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.interrupts import held_back
 from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.model import Coefficients
-from seastar_gym.processors import processors
+from seastar_gym.process import held_back, processors
 from seastar_gym.rods.bundles import Work
 from seastar_gym.rods.step import COVERED
 from seastar_gym.rods.terms.hub import Actuation

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from seastar_gym.command import DEFAULT, refused_by_disk
 from seastar_gym.files import require_extra, within
-from seastar_gym.processors import processors
+from seastar_gym.process import processors
 from seastar_gym.scene.checks import require_count, shown
 from seastar_gym.sweep.designs import Batch
 

@@ -17,7 +17,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
-from seastar_gym.processors import processors
+from seastar_gym.process import processors
 from seastar_gym.scene.checks import require_choice, require_count, require_number
 from seastar_gym.sweep.designs import Batch, Range, Sweep
 from seastar_gym.sweep.executors import Outcome, Work, outcomes, sentence_of

@@ -78,9 +78,9 @@ def make(body, fluid=Water(), relaxation_time=None, gravity=None, contact=False,
     P = on.added_mass if on.added_mass is not None else np.zeros(3)
     weight = on.weight if on.weight is not None else np.zeros(4)
     rigid = {
-        "star": star, "arms": on.arm.reshape(-1, 2)[:N_LIMBS], "mass": float(rods.mass[0]), "moment": on.moment,
+        "star": star, "arms": on.arm.reshape(-1, 2)[:N_LIMBS], "mass": float(rods.inertia.node[0]), "moment": on.moment,
         "directions": np.array([limb.direction for limb in robot.limb_shapes()]), "inertia": float(on.inertia[0]),
-        "isotropic": float(rods.drag[0]), "strips": on.strips.reshape(-1, 4), "fall": weight[:2],
+        "isotropic": float(rods.drag.node[0]), "strips": on.strips.reshape(-1, 4), "fall": weight[:2],
         "added_mass": np.array([[P[0], P[1]], [P[1], P[2]]]), "weight_moment": weight[2:],
         "weight": 0.0 if gravity is None else float(rods.load[1] / gravity[1]),
     }  # fmt: skip

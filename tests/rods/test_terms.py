@@ -349,7 +349,7 @@ def test_what_moving_natural_curvature_stores_is_the_energy_of_the_hinges_left_b
         )
     )  # fmt: skip
     np.testing.assert_allclose(moved, expected, rtol=1e-9)
-    np.testing.assert_allclose(work.EI_kappa_bar, memory(END).EI_kappa_bar, rtol=1e-14)
+    np.testing.assert_allclose(work.along.EI_kappa_bar, memory(END).EI_kappa_bar, rtol=1e-14)
 
 
 # Coefficients
@@ -362,10 +362,10 @@ def test_kinetic_energy_is_positive_however_limbs_taper(nodes):
     for _ in range(50):
         limbs = tuple(Limb(radius=tuple(10.0 ** rng.uniform(-4, -2, rng.integers(2, 6)))) for _ in range(3))
         rods = make_rods(Scene(Seastar(n_limbs=3, nodes_per_limb=nodes, limbs=limbs)))
-        matrix = np.diag(rods.mass.copy())  # lumped masses, less what edges have less
-        for e, mu in enumerate(rods.edge_mass):
+        matrix = np.diag(rods.inertia.node.copy())  # lumped masses, less what edges have less
+        for e, mu in enumerate(rods.inertia.edge):
             matrix[np.ix_(*[[0 if e % (nodes - 1) == 0 else e, e + 1]] * 2)] -= mu * np.array(
                 [[1.0, -1.0], [-1.0, 1.0]]
             )
-        assert matrix.sum() == pytest.approx(rods.mass.sum())
+        assert matrix.sum() == pytest.approx(rods.inertia.node.sum())
         assert np.linalg.eigvalsh(matrix).min() > 0.0

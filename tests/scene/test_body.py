@@ -46,7 +46,7 @@ def test_mass_moment_and_inertia_are_those_of_body_and_roots(attachments):
     rods = on_body(body)
     root = 1000.0 * math.pi * 1.6e-3**2 * 0.1 / 4 / 2
     places = np.array([[at.x, at.y] for at in attachments])
-    assert rods.mass[0] == pytest.approx(0.02 + 4 * root)
+    assert rods.inertia.node[0] == pytest.approx(0.02 + 4 * root)
     np.testing.assert_allclose(rods.body.moment, 0.02 * np.array([2e-3, -1e-3]) + root * places.sum(axis=0), atol=1e-18)
     inertia = 0.02 * ((0.06**2 + 0.03**2) / 12.0 + 5e-6) + root * (places**2).sum()
     assert rods.body.inertia[0] == pytest.approx(inertia)
@@ -57,7 +57,7 @@ def test_mass_moment_and_inertia_are_those_of_body_and_roots(attachments):
 
 def force_and_torque(rods, velocity, omega) -> np.ndarray:
     """Drag of a body that is not turned [N], [N m], from its coefficients."""
-    c, strips = rods.drag[0], rods.body.strips.reshape(-1, 4)
+    c, strips = rods.drag.node[0], rods.body.strips.reshape(-1, 4)
     w = np.array(velocity)
     flows = strips[:, :2] @ w + strips[:, 2] * omega
     pushed = -(strips[:, 3] * np.abs(flows) * flows) @ strips[:, :3]

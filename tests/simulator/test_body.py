@@ -100,7 +100,7 @@ def test_an_ellipse_in_an_ideal_fluid_keeps_impulse_and_energy():
     simulator = alone(body, Water(drag_coefficient=0.0, added_mass_coefficient=1.0), numerics)
     set_moving(simulator, (0.05, 0.02), 1.0)
     rods = simulator.coefficients.rods(0)
-    own = np.diag(rods.mass[0] + rods.body.added_mass[[0, 2]])
+    own = np.diag(rods.inertia.node[0] + rods.body.added_mass[[0, 2]])
 
     def kept():
         c, s = math.cos(simulator.orientation()[0]), math.sin(simulator.orientation()[0])

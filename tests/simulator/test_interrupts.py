@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 
 from seastar_gym import DomainRandomization, Scene, Seastar, Simulator, SmaPulse, ThermalSma, Uniform
-from seastar_gym.interrupts import held_back, let_through
 from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.model import Coefficients
+from seastar_gym.process import held_back, let_through
 from seastar_gym.scene import Numerics
 from seastar_gym.simulator import batch as module
 from seastar_gym.simulator.state import Clock

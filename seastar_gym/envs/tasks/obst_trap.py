@@ -19,7 +19,7 @@ from seastar_gym.envs.rewards import RewardWeights
 from seastar_gym.envs.robots import Floats, Robots, Score
 from seastar_gym.envs.scenery import Ring, Scenery
 from seastar_gym.envs.waypoints import Waypoints
-from seastar_gym.interrupts import held_back
+from seastar_gym.process import held_back
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice
 from seastar_gym.scene.number import Range, not_negative, positive, ranging, whole

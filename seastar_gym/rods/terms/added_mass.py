@@ -8,6 +8,8 @@ The continuum's discretisation takes it as consistently as the robot's own mass:
 it has m_a/3 ((d_head - d_tail) n)^2/2 less than the lumped masses, d = v - v_hat.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,21 +19,28 @@ from seastar_gym.rods.body_forces import body_added_mass
 from seastar_gym.rods.star import Mesh, edge_vector, root_place, tail_node
 
 
-def coefficients(mesh: Mesh, density: float, C_a: float | None) -> NDArray[np.float64] | None:
-    """m_a = rho_f C_a A_a l/2, A_a = pi r_0^2 of a disc, per half edge as in drag.py [kg]; None for none."""
+class AddedMass(NamedTuple):
+    """Mass of the fluid.
+
+    half: m_a, two rows per node as in drag.py [kg].
+    edge: m_a/3, what the differences along an edge take from that, per edge [kg]; None for lumped masses.
+    """
+
+    half: NDArray[np.float64]
+    edge: NDArray[np.float64] | None
+
+
+def coefficients(mesh: Mesh, density: float, C_a: float | None, consistent: bool) -> AddedMass | None:
+    """m_a = rho_f C_a A_a l/2, A_a = pi r_0^2 of a disc; None for none."""
     if C_a is None:
         return None
-    return mesh.per_half_edge(half_edges(mesh, density, C_a))
+    halves = half_edges(mesh, density, C_a)
+    return AddedMass(mesh.per_half_edge(halves), halves / 3.0 if consistent else None)
 
 
 def half_edges(mesh: Mesh, density: float, C_a: float) -> NDArray[np.float64]:
     """m_a of every edge [kg]."""
     return density * C_a * mesh.at_edges.added * 0.5 * mesh.l
-
-
-def edge_coefficients(mesh: Mesh, density: float, C_a: float | None) -> NDArray[np.float64] | None:
-    """m_a/3, per edge [kg]: what the differences along an edge take from the lumped masses; None for none."""
-    return None if C_a is None else half_edges(mesh, density, C_a) / 3.0
 
 
 @kernel
@@ -44,8 +53,8 @@ def freeze_added_mass(rods, work):
         if node == 0:
             xx, xy, yy = hub_mass(rods, work, xx, xy, yy)
         else:
-            xx, xy, yy = add_half_edge_mass(load(rods.added_mass, 2 * node), work.normals, node - 1, xx, xy, yy)
-            xx, xy, yy = add_half_edge_mass(load(rods.added_mass, 2 * node + 1), work.normals, node, xx, xy, yy)
+            xx, xy, yy = add_half_edge_mass(load(rods.added_mass.half, 2 * node), work.normals, node - 1, xx, xy, yy)
+            xx, xy, yy = add_half_edge_mass(load(rods.added_mass.half, 2 * node + 1), work.normals, node, xx, xy, yy)
         store(work.added_mass, 3 * node, xx)
         store(work.added_mass, 3 * node + 1, xy)
         store(work.added_mass, 3 * node + 2, yy)
@@ -57,11 +66,13 @@ def hub_mass(rods, work, xx, xy, yy):
     edges = rods.edges_per_limb
     if rods.body is None:
         for e in range(0, rods.n_edges, edges):
-            xx, xy, yy = add_half_edge_mass(load(rods.added_mass, 2 * e + 2), work.normals, e, xx, xy, yy)
+            xx, xy, yy = add_half_edge_mass(load(rods.added_mass.half, 2 * e + 2), work.normals, e, xx, xy, yy)
         return xx, xy, yy
     for limb in range(rods.n_limbs):
         e, place = limb * edges, root_place(rods, limb)
-        mass = add_half_edge_mass(load(rods.added_mass, 2 * e + 2), work.normals, e, splat(0.0), splat(0.0), splat(0.0))
+        mass = add_half_edge_mass(
+            load(rods.added_mass.half, 2 * e + 2), work.normals, e, splat(0.0), splat(0.0), splat(0.0)
+        )
         for k in range(3):
             store(work.added_mass, 3 * place + k, mass[k])
     return body_added_mass(rods, work)
@@ -105,10 +116,10 @@ def add_fluid_inertia(work, node, dx, dy, inverse_gamma, slopes):
 @kernel
 def subtract_edge_fluid_inertia(rods, work, stage, e, tail, head, slopes):
     """(E, f, K) of an edge less mu ((d_head - d_tail) n)^2/2; unchanged where no such mass is named."""
-    if rods.edge_added_mass is None:
+    if rods.added_mass is None or rods.added_mass.edge is None:
         return slopes
     energy, (fx, fy), (xx, xy, yy) = slopes
-    mu = load(rods.edge_added_mass, e)
+    mu = load(rods.added_mass.edge, e)
     nx, ny = load(work.normals, 2 * e), load(work.normals, 2 * e + 1)
     dx, dy = head.dx - tail.dx, head.dy - tail.dy
     across = add_product(dx * nx, dy, ny)
@@ -125,12 +136,12 @@ def subtract_edge_fluid_inertia(rods, work, stage, e, tail, head, slopes):
 @kernel
 def subtract_edge_fluid_energy(rods, work, v, energy):
     """Kinetic energy of the fluid [J] less what velocities that are linear along edges take from lumped masses'."""
-    if rods.edge_added_mass is None:
+    if rods.added_mass is None or rods.added_mass.edge is None:
         return energy
     for e in range(rods.n_edges):
         dx, dy = edge_vector(v, tail_node(rods, e), e + 1)
         across = add_product(dx * load(work.normals, 2 * e), dy, load(work.normals, 2 * e + 1))
-        energy = subtract_product(energy, 0.5 * load(rods.edge_added_mass, e) * across, across)
+        energy = subtract_product(energy, 0.5 * load(rods.added_mass.edge, e) * across, across)
     return energy
 
 

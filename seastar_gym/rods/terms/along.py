@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.lanes.compile import kernel
-from seastar_gym.lanes.registers import absolute, add_product, load, select, store
+from seastar_gym.lanes.registers import N_LANES, absolute, add_product, load, select, store
+from seastar_gym.lanes.rows import aligned_rows
 from seastar_gym.rods.star import larger, tangent
 
 Floats = NDArray[np.float64]
@@ -42,8 +43,19 @@ class Along(NamedTuple):
     gain: np.ndarray
 
 
+class AlongWork(NamedTuple):
+    """Memory of limbs that actuators bend.
+
+    stiffening: Factor f of a limb's bending stiffness and 1/f, two rows per limb.
+    EI_kappa_bar: Natural moments of hinges [N m].
+    """
+
+    stiffening: np.ndarray
+    EI_kappa_bar: np.ndarray
+
+
 STIFFER, SOFTER, ALONG_ROWS = 0, 1, 2
-"""Rows of a limb in work.stiffening: f, and 1/f."""
+"""Rows of a limb in work.along.stiffening: f, and 1/f."""
 
 
 def coefficients(
@@ -63,6 +75,13 @@ def coefficients(
         slope=np.array([0.5 / width]),
         gain=np.array([(ratio - 1.0) / steps]),
     )
+
+
+def memory(along: Along | None, n_limbs: int, n_edges: int) -> AlongWork | None:
+    """Zeroed memory for one lane group; None where actuators act at the hub only."""
+    if along is None:
+        return None
+    return AlongWork(aligned_rows(ALONG_ROWS * n_limbs, N_LANES), aligned_rows(n_edges, N_LANES))
 
 
 @kernel
@@ -121,16 +140,16 @@ def turned_at_hub(rods, limb, delta):
 
 @kernel
 def set_natural_curvature(rods, work, actuation, fraction):
-    """Fill work.stiffening and work.EI_kappa_bar at `fraction` (lanes) of an interval, where actuators act along."""
+    """Fill work.along at `fraction` (lanes) of an interval, where actuators act along limbs."""
     edges = rods.edges_per_limb
     for limb in range(rods.n_limbs):
         delta = turned(actuation, limb, fraction)
         f = stiffening(rods.along, delta)
-        store(work.stiffening, ALONG_ROWS * limb + STIFFER, f)
-        store(work.stiffening, ALONG_ROWS * limb + SOFTER, 1.0 / f)
+        store(work.along.stiffening, ALONG_ROWS * limb + STIFFER, f)
+        store(work.along.stiffening, ALONG_ROWS * limb + SOFTER, 1.0 / f)
         for hinge in range(limb * edges + 1, (limb + 1) * edges):
             EI_over_dl = f * load(rods.bending.EI_over_dl, hinge)
-            store(work.EI_kappa_bar, hinge, 2.0 * EI_over_dl * natural_tangent(rods.along, hinge, delta))
+            store(work.along.EI_kappa_bar, hinge, 2.0 * EI_over_dl * natural_tangent(rods.along, hinge, delta))
 
 
 @kernel
@@ -139,7 +158,7 @@ def bending_stiffness(rods, work, hinge):
     EI_over_dl = load(rods.bending.EI_over_dl, hinge)
     if rods.along is None:
         return EI_over_dl
-    return EI_over_dl * load(work.stiffening, ALONG_ROWS * (hinge // rods.edges_per_limb) + STIFFER)
+    return EI_over_dl * load(work.along.stiffening, ALONG_ROWS * (hinge // rods.edges_per_limb) + STIFFER)
 
 
 @kernel
@@ -148,7 +167,7 @@ def bending_compliance(rods, work, hinge):
     dl_over_EI = load(rods.bending.dl_over_EI, hinge)
     if rods.along is None:
         return dl_over_EI
-    return dl_over_EI * load(work.stiffening, ALONG_ROWS * (hinge // rods.edges_per_limb) + SOFTER)
+    return dl_over_EI * load(work.along.stiffening, ALONG_ROWS * (hinge // rods.edges_per_limb) + SOFTER)
 
 
 @kernel
@@ -156,7 +175,7 @@ def natural_moment(rods, work, hinge):
     """Natural moment EI kappa_bar of a hinge within a limb now [N m]."""
     if rods.along is None:
         return load(rods.bending.EI_kappa_bar, hinge)
-    return load(work.EI_kappa_bar, hinge)
+    return load(work.along.EI_kappa_bar, hinge)
 
 
 @kernel

@@ -28,7 +28,8 @@ from typing import NamedTuple
 import numpy as np
 
 from seastar_gym.lanes.compile import kernel
-from seastar_gym.lanes.registers import add_product, load, select, splat, sqrt, store, subtract_product
+from seastar_gym.lanes.registers import N_LANES, add_product, load, select, splat, sqrt, store, subtract_product
+from seastar_gym.lanes.rows import aligned_rows
 from seastar_gym.rods.body import add_to_system, angle
 from seastar_gym.rods.star import Mesh, convex_part, load_root_edge, root_direction, rotation, tangent
 from seastar_gym.rods.terms.along import bending_stiffness, stiffening_rate, turned, turned_at_hub
@@ -40,8 +41,20 @@ class Clamp(NamedTuple):
     direction: np.ndarray
 
 
+class ClampWork(NamedTuple):
+    """Memory of clamps, (x, y) per limb.
+
+    direction: Natural directions. turn: What root edges are turned from them. hat: Directions of root edges where a
+    stage began; None without damping.
+    """
+
+    direction: np.ndarray
+    turn: np.ndarray
+    hat: np.ndarray | None
+
+
 ELASTIC, VISCOUS = 0, 1
-"""Columns of a limb in work.hub_coupling: C_j of elasticity and of damping."""
+"""Columns of a limb in work.hub.coupling: C_j of elasticity and of damping."""
 CLAMP_ROWS = 2
 
 
@@ -53,6 +66,14 @@ def coefficients(mesh: Mesh, directions: Sequence[float]) -> Clamp:
     return Clamp(np.stack([np.cos(angles), np.sin(angles)], axis=1).reshape(-1))
 
 
+def memory(clamp: Clamp | None, is_damped: bool, n_limbs: int) -> ClampWork | None:
+    """Zeroed memory for one lane group; None without clamps."""
+    if clamp is None:
+        return None
+    direction, turn, hat = (aligned_rows(2 * n_limbs, N_LANES) for _ in range(3))
+    return ClampWork(direction, turn, hat if is_damped else None)
+
+
 @kernel
 def clamp_stiffness(rods, work, limb):
     """K_j [N m]."""
@@ -61,26 +82,26 @@ def clamp_stiffness(rods, work, limb):
 
 @kernel
 def set_natural_directions(rods, work, actuation, fraction):
-    """Fill work.hub_direction with n_j at `fraction` (lanes) of an interval."""
+    """Fill work.clamp.direction with n_j at `fraction` (lanes) of an interval."""
     for limb in range(rods.n_limbs):
         t = tangent(0.5 * turned_at_hub(rods, limb, turned(actuation, limb, fraction)))
         scale = 1.0 / add_product(1.0, t, t)
         c, s = subtract_product(1.0, t, t) * scale, 2.0 * t * scale
         x, y = load(rods.clamp.direction, 2 * limb), load(rods.clamp.direction, 2 * limb + 1)
-        store(work.hub_direction, 2 * limb, subtract_product(c * x, s, y))
-        store(work.hub_direction, 2 * limb + 1, add_product(s * x, c, y))
+        store(work.clamp.direction, 2 * limb, subtract_product(c * x, s, y))
+        store(work.clamp.direction, 2 * limb + 1, add_product(s * x, c, y))
 
 
 @kernel
 def freeze_directions(rods, work, q_hat):
-    """Fill work.hub_hat with the directions of the root edges at q_hat, in scenes with a rigid hub and damping."""
+    """Fill work.clamp.hat with the directions of the root edges at q_hat, in scenes with a rigid hub and damping."""
     if rods.clamp is None:
         return
     for limb in range(rods.n_limbs):
         x, y = root_direction(rods, q_hat, limb)
         tx, ty = on_body(rods, q_hat, x, y)
-        store(work.hub_hat, 2 * limb, tx)
-        store(work.hub_hat, 2 * limb + 1, ty)
+        store(work.clamp.hat, 2 * limb, tx)
+        store(work.clamp.hat, 2 * limb + 1, ty)
 
 
 @kernel
@@ -133,14 +154,14 @@ def sum_of_turns(rods, work):
     S_x, S_y = splat(0.0), splat(0.0)
     for limb in range(rods.n_limbs):
         K = clamp_stiffness(rods, work, limb)
-        c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
+        c, s = load(work.clamp.turn, 2 * limb), load(work.clamp.turn, 2 * limb + 1)
         S_x, S_y = add_product(S_x, K, c), add_product(S_y, K, s)
     return S_x, S_y
 
 
 @kernel
 def energy_of_turns(rods, work, q):
-    """E [J] of root edges turned by (c, s) in work.hub_turn, two rows per limb, from their natural directions.
+    """E [J] of root edges turned by (c, s) in work.clamp.turn, two rows per limb, from their natural directions.
 
     q: Where a body's orientation is found, or None for a body that has not turned.
     """
@@ -148,19 +169,19 @@ def energy_of_turns(rods, work, q):
     p_x, p_y = hub_orientation(rods, q, S_x, S_y)
     total = splat(0.0)
     for limb in range(rods.n_limbs):
-        c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
+        c, s = load(work.clamp.turn, 2 * limb), load(work.clamp.turn, 2 * limb + 1)
         total += turned_energy(clamp_stiffness(rods, work, limb), c, s, p_x, p_y)
     return total
 
 
 @kernel
 def turn_clamps(rods, work, q):
-    """Fill work.hub_turn with what root edges at q are turned by from the natural directions in `work`."""
+    """Fill work.clamp.turn with what root edges at q are turned by from the natural directions in `work`."""
     for limb in range(rods.n_limbs):
         x, y = root_direction(rods, q, limb)
-        c, s = turn_from(work.hub_direction, limb, x, y)
-        store(work.hub_turn, 2 * limb, c)
-        store(work.hub_turn, 2 * limb + 1, s)
+        c, s = turn_from(work.clamp.direction, limb, x, y)
+        store(work.clamp.turn, 2 * limb, c)
+        store(work.clamp.turn, 2 * limb + 1, s)
 
 
 @kernel
@@ -180,7 +201,11 @@ def add_clamp_moments(rods, work, actuation, q, moments):
     S_x, S_y = sum_of_turns(rods, work)
     p_x, p_y = hub_orientation(rods, q, S_x, S_y)
     for limb in range(rods.n_limbs):
-        K, c, s = clamp_stiffness(rods, work, limb), load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
+        K, c, s = (
+            clamp_stiffness(rods, work, limb),
+            load(work.clamp.turn, 2 * limb),
+            load(work.clamp.turn, 2 * limb + 1),
+        )
         moment = turned_at_hub(rods, limb, K * subtract_product(s * p_x, c, p_y))
         rate = stiffening_rate(rods, load(actuation.delta_psi_start, limb))
         stiffer = add_product(-moment, rate, turned_energy(K, c, s, p_x, p_y))
@@ -192,26 +217,28 @@ def moved_clamp_energy(rods, work, actuation, start, end):
     """Energy of a robot at its natural directions, once those have moved from `start` to `end` of the interval [J]."""
     set_natural_directions(rods, work, actuation, start)
     for row in range(2 * rods.n_limbs):
-        store(work.hub_turn, row, load(work.hub_direction, row))
+        store(work.clamp.turn, row, load(work.clamp.direction, row))
     set_natural_directions(rods, work, actuation, end)
     for limb in range(rods.n_limbs):
-        c, s = turn_from(work.hub_direction, limb, load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1))
-        store(work.hub_turn, 2 * limb, c)
-        store(work.hub_turn, 2 * limb + 1, s)
+        c, s = turn_from(
+            work.clamp.direction, limb, load(work.clamp.turn, 2 * limb), load(work.clamp.turn, 2 * limb + 1)
+        )
+        store(work.clamp.turn, 2 * limb, c)
+        store(work.clamp.turn, 2 * limb + 1, s)
     return energy_of_turns(rods, work, None)
 
 
 @kernel
 def assemble_clamps(rods, work, stage, convex):
-    """Moments on root edges and their stiffnesses, into work.hub_moment, hub_stiffness and hub_coupling.
+    """Moments on root edges and their stiffnesses, into work.hub: moment, stiffness and coupling.
 
     Returns E [J], with that of damping.
     """
-    energy = add_clamps(rods, work, work.hub_direction, splat(1.0), convex, ELASTIC)
+    energy = add_clamps(rods, work, work.clamp.direction, splat(1.0), convex, ELASTIC)
     if rods.damping is None:
         return energy
     ratio = load(rods.damping, 0) * stage.inverse_gamma
-    return energy + add_clamps(rods, work, work.hub_hat, ratio, convex, VISCOUS)
+    return energy + add_clamps(rods, work, work.clamp.hat, ratio, convex, VISCOUS)
 
 
 @kernel
@@ -226,8 +253,8 @@ def add_clamps(rods, work, directions, ratio, convex, column):
         inverse = edge.length * edge.inverse
         c, s = turn_from(directions, limb, edge.x * inverse, edge.y * inverse)
         S_x, S_y = add_product(S_x, K, c), add_product(S_y, K, s)
-        store(work.hub_turn, 2 * limb, c)
-        store(work.hub_turn, 2 * limb + 1, s)
+        store(work.clamp.turn, 2 * limb, c)
+        store(work.clamp.turn, 2 * limb + 1, s)
     if rods.body is None:
         p_x, p_y = orientation(S_x, S_y)
     else:
@@ -235,13 +262,13 @@ def add_clamps(rods, work, directions, ratio, convex, column):
     energy = splat(0.0)
     for limb in range(rods.n_limbs):
         K = ratio * clamp_stiffness(rods, work, limb)
-        c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
+        c, s = load(work.clamp.turn, 2 * limb), load(work.clamp.turn, 2 * limb + 1)
         energy += turned_energy(K, c, s, p_x, p_y)
         C = convex_part(convex, K * add_product(c * p_x, s, p_y))
         moment = K * subtract_product(s * p_x, c, p_y)
-        store(work.hub_moment, limb, load(work.hub_moment, limb) + moment)
-        store(work.hub_stiffness, limb, load(work.hub_stiffness, limb) + C)
-        store(work.hub_coupling, CLAMP_ROWS * limb + column, C)
+        store(work.hub.moment, limb, load(work.hub.moment, limb) + moment)
+        store(work.hub.stiffness, limb, load(work.hub.stiffness, limb) + C)
+        store(work.hub.coupling, CLAMP_ROWS * limb + column, C)
         if rods.body is not None:  # without one, moments cancel
             add_to_system(work, splat(0.0), splat(0.0), splat(0.0), -moment)
     return energy

@@ -10,11 +10,14 @@ in the middle of the way, off by gamma/2 times its change: of first order. The n
 no material, so it is in U, not in R.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.lanes.compile import kernel
-from seastar_gym.lanes.registers import add_product, load, splat, store
+from seastar_gym.lanes.registers import N_LANES, add_product, load, splat, store
+from seastar_gym.lanes.rows import aligned_rows
 from seastar_gym.rods.star import edge_of, half_angle, hinge_edges, is_clamped
 from seastar_gym.rods.terms.bending import moment
 from seastar_gym.rods.terms.clamp import freeze_directions
@@ -26,22 +29,31 @@ def coefficients(relaxation_time: float | None) -> NDArray[np.float64] | None:
     return None if relaxation_time is None else np.array([relaxation_time])
 
 
+class DampingWork(NamedTuple):
+    """EA eps_hat [N] of edges and EI kappa_hat [N m] of hinges where a stage began; None without damping."""
+
+    tension: np.ndarray | None
+    bending: np.ndarray | None
+
+
+def memory(is_damped: bool, n_edges: int) -> DampingWork:
+    """Zeroed memory for one lane group."""
+    return DampingWork(*(aligned_rows(n_edges, N_LANES) if is_damped else None for _ in range(2)))
+
+
 @kernel
 def freeze_strains(rods, work, q_hat):
-    """Fill work.tension with EA eps_hat [N] and work.bending with EI kappa_hat [N m], in scenes with damping.
-
-    With a rigid hub, also the directions that its clamps had.
-    """
+    """Fill work.damping, and the directions that the clamps of a rigid hub had, in scenes with damping."""
     if rods.damping is None:
         return
     freeze_directions(rods, work, q_hat)
     for e in range(rods.n_edges):
-        store(work.tension, e, tension(rods, e, edge_of(rods, q_hat, e).length))
+        store(work.damping.tension, e, tension(rods, e, edge_of(rods, q_hat, e).length))
         if is_clamped(rods, e):
             continue
         a, b, side = hinge_edges(rods, e)
         t = half_angle(edge_of(rods, q_hat, a), edge_of(rods, q_hat, b), side)
-        store(work.bending, e, moment(rods, work, e, t, splat(0.0)))
+        store(work.damping.bending, e, moment(rods, work, e, t, splat(0.0)))
 
 
 @kernel

@@ -12,6 +12,8 @@ The continuum's discretisation integrates both potentials by Simpson's rule: a t
 in the middle of edges, where w is the mean of the ends' velocities.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,44 +29,42 @@ def drag_per_length(density: float, coefficient: float, width: Floats) -> Floats
     return 0.5 * density * coefficient * width
 
 
-def coefficients(mesh: Mesh, density: float, C: float) -> Floats:
-    """c = 1/2 rho_f C D dl of flow in any direction, per node [kg/m]."""
-    return mesh.per_node(drag_per_length(density, C, mesh.at_nodes.width)) * mesh.dl
+class Drag(NamedTuple):
+    """Drag of limbs [kg/m].
 
-
-def simpson_coefficients(mesh: Mesh, density: float, C: float) -> tuple[Floats, Floats]:
-    """(c per node, c per edge) [kg/m] by Simpson's rule: a third at the nodes, the rest in the middle of edges.
-
-    That per edge is an eighth of what the middle has, see middle_slopes.
+    node: c of flow in any direction, per node; with a body, per place, see star.py.
+    across: c_n of flow across an edge; two rows per node, for half of its inner and of its outer edge, zero for hub and
+        tips, which have none. None for isotropic drag.
+    middle, middle_across: c and c_n in the middle of edges over 8, see middle_slopes, per edge; None unless by
+        Simpson's rule.
     """
-    in_middle = drag_per_length(density, C, mesh.at_edges.width) * mesh.l * (2.0 / 3.0)
-    return coefficients(mesh, density, C) / 3.0, in_middle / 8.0
+
+    node: Floats
+    across: Floats | None
+    middle: Floats | None
+    middle_across: Floats | None
 
 
-def cross_coefficients(mesh: Mesh, density: float, C_d: float, C_t: float | None) -> Floats | None:
-    """c_n = 1/2 rho_f (C_d - C_t) D l/2 of flow across an edge, per half edge [kg/m]; None for isotropic drag.
+def coefficients(mesh: Mesh, density: float, C_d: float, C_t: float | None, simpson: bool) -> Drag:
+    """Drag in a fluid of a density [kg/m^3]: at the nodes, or by Simpson's rule, a third there, the rest in the middle.
 
-    Two rows per node, for half of its inner and of its outer edge; zero for hub and tips, which have none.
+    c = 1/2 rho_f C D dl, C = C_t along limbs; c_n = 1/2 rho_f (C_d - C_t) D l/2.
     """
-    if C_t is None:
-        return None
-    return mesh.per_half_edge(across_half_edges(mesh, density, C_d, C_t))
+    C = C_d if C_t is None else C_t
+    node = mesh.per_node(drag_per_length(density, C, mesh.at_nodes.width)) * mesh.dl
+    across = None if C_t is None else across_half_edges(mesh, density, C_d, C_t)
+    if not simpson:
+        return Drag(node, None if across is None else mesh.per_half_edge(across), None, None)
+    middle = drag_per_length(density, C, mesh.at_edges.width) * mesh.l * (2.0 / 3.0) / 8.0
+    if across is None:
+        return Drag(node / 3.0, None, middle, None)
+    return Drag(node / 3.0, mesh.per_half_edge(across / 3.0), middle, across * (4.0 / 3.0) / 8.0)
 
 
 def across_half_edges(mesh: Mesh, density: float, C_d: float, C_t: float) -> Floats:
     """c_n of every edge [kg/m]."""
     width = mesh.at_edges.width
     return (drag_per_length(density, C_d, width) - drag_per_length(density, C_t, width)) * 0.5 * mesh.l
-
-
-def simpson_cross_coefficients(
-    mesh: Mesh, density: float, C_d: float, C_t: float | None
-) -> tuple[Floats | None, Floats | None]:
-    """(c_n per half edge, c_n per edge) [kg/m] by Simpson's rule as above; None for isotropic drag."""
-    if C_t is None:
-        return None, None
-    halves = across_half_edges(mesh, density, C_d, C_t)
-    return mesh.per_half_edge(halves / 3.0), halves * (4.0 / 3.0) / 8.0
 
 
 @kernel
@@ -98,11 +98,11 @@ def add_half_edge(c, normals, e, wx, wy, gamma, inverse_gamma, slopes):
 @kernel
 def add_cross_flow(rods, normals, node, wx, wy, gamma, inverse_gamma, slopes):
     """Add the drag of flow across a node's edges to its slopes; without such drag it is gone when compiled."""
-    if rods.cross_drag is None:
+    if rods.drag.across is None:
         return slopes
     if node == 0 or (rods.body is not None and node > rods.n_nodes):
         return add_hub_cross_flow(rods, normals, node, wx, wy, gamma, inverse_gamma, slopes)
-    inner, outer = load(rods.cross_drag, 2 * node), load(rods.cross_drag, 2 * node + 1)
+    inner, outer = load(rods.drag.across, 2 * node), load(rods.drag.across, 2 * node + 1)
     slopes = add_half_edge(inner, normals, node - 1, wx, wy, gamma, inverse_gamma, slopes)
     return add_half_edge(outer, normals, node, wx, wy, gamma, inverse_gamma, slopes)
 
@@ -113,12 +113,12 @@ def add_hub_cross_flow(rods, normals, node, wx, wy, gamma, inverse_gamma, slopes
     edges = rods.edges_per_limb
     if rods.body is None:
         for e in range(0, rods.n_edges, edges):
-            slopes = add_half_edge(load(rods.cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
+            slopes = add_half_edge(load(rods.drag.across, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
         return slopes
     if node == 0:
         return slopes
     e = (node - root_place(rods, 0)) * edges
-    return add_half_edge(load(rods.cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
+    return add_half_edge(load(rods.drag.across, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
 
 
 @kernel
@@ -137,7 +137,7 @@ def middle_slopes(rods, work, stage, e, tail, head):
 @kernel
 def middle_drag_slopes(rods, normals, e, sx, sy, gamma, inverse_gamma):
     """(potential, force on either end, Hessian over gamma) of the drag in the middle of edge e, see middle_slopes."""
-    potential, c_speed, c_over_speed = drag_slopes(load(rods.middle_drag, e), sx, sy)
+    potential, c_speed, c_over_speed = drag_slopes(load(rods.drag.middle, e), sx, sy)
     c_over_speed *= inverse_gamma
     hx, hy = c_over_speed * sx, c_over_speed * sy
     diagonal = c_speed * inverse_gamma
@@ -146,9 +146,9 @@ def middle_drag_slopes(rods, normals, e, sx, sy, gamma, inverse_gamma):
         (c_speed * sx, c_speed * sy),
         (add_product(diagonal, hx, sx), hx * sy, add_product(diagonal, hy, sy)),
     )
-    if rods.middle_cross_drag is None:
+    if rods.drag.middle_across is None:
         return slopes
-    return add_half_edge(load(rods.middle_cross_drag, e), normals, e, sx, sy, gamma, inverse_gamma, slopes)
+    return add_half_edge(load(rods.drag.middle_across, e), normals, e, sx, sy, gamma, inverse_gamma, slopes)
 
 
 @kernel
@@ -158,7 +158,7 @@ def add_middle_drag(rods, work, stage, e, tail, head, energy, f, K):
     Returns the energy, the gradients in head and, turned round, in tail, the Hessian of either end, and, turned round,
     that between them.
     """
-    if rods.middle_drag is None:
+    if rods.drag.middle is None:
         return energy, f, f, K, K
     potential, g, h = middle_slopes(rods, work, stage, e, tail, head)
     return (

@@ -67,7 +67,7 @@ def add_work_of_current(rods, work, v, h, frame, energy):
         if rods.body is not None and node == rods.n_nodes:  # a body's angle
             continue
         wx, wy = relative(work, node, load(v, 2 * node), load(v, 2 * node + 1))
-        c_speed = drag_slopes(load(rods.drag, node), wx, wy)[1]
+        c_speed = drag_slopes(load(rods.drag.node, node), wx, wy)[1]
         slopes = (zero, (c_speed * wx, c_speed * wy), (zero, zero, zero))
         fx, fy = add_cross_flow(rods, work.normals, node, wx, wy, 1.0, 1.0, slopes)[1]
         if rods.own is not None:
@@ -82,7 +82,7 @@ def add_work_of_current(rods, work, v, h, frame, energy):
 @kernel
 def add_power_in_middle(rods, work, v, frame, power):
     """Add the power that drag in the middle of edges takes from the fluid's motion [W]."""
-    if rods.middle_drag is None:
+    if rods.drag.middle is None:
         return power
     for e in range(rods.n_edges):
         a, b = tail_node(rods, e), e + 1

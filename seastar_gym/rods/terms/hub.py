@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from seastar_gym.lanes.compile import kernel
-from seastar_gym.lanes.registers import add_product, load, store
+from seastar_gym.lanes.registers import N_LANES, add_product, load, store
+from seastar_gym.lanes.rows import aligned_rows
 from seastar_gym.rods.star import tangent
 from seastar_gym.rods.terms.along import set_natural_curvature
 from seastar_gym.rods.terms.clamp import set_natural_directions
@@ -23,6 +24,21 @@ class Hub(NamedTuple):
     angle: np.ndarray
 
 
+class HubWork(NamedTuple):
+    """Memory of the hub's hinges, or clamps.
+
+    moment, stiffness: Sums over those of a limb's root edge, per limb [N m].
+    coupling: 2 x 2 block of every hub hinge, four rows per limb [N/m]; stiffnesses of clamps, see clamp.py [N m].
+    EI_kappa_bar: Natural moment of the hub hinges, per limb [N m]. t: tan(phi/2) of theirs, per limb.
+    """
+
+    moment: np.ndarray
+    stiffness: np.ndarray
+    coupling: np.ndarray
+    EI_kappa_bar: np.ndarray
+    t: np.ndarray
+
+
 class Actuation(NamedTuple):
     """Rotation of every limb at the ends of an interval [rad], shape (n_limbs, N_LANES), linear in between."""
 
@@ -33,6 +49,11 @@ class Actuation(NamedTuple):
 def coefficients(angles: Sequence[float], turning: bool) -> Hub:
     """Measure of the hub hinges with these natural angles [rad]; turning: by the interior turning angle."""
     return Hub(side=-1.0 if turning else 1.0, angle=np.array(angles))
+
+
+def memory(n_limbs: int) -> HubWork:
+    """Zeroed memory for one lane group."""
+    return HubWork(*(aligned_rows(count * n_limbs, N_LANES) for count in (1, 1, 4, 1, 1)))
 
 
 @kernel
@@ -58,4 +79,4 @@ def set_natural_moments(rods, work, actuation, fraction):
         end = load(actuation.delta_psi_end, b) - load(actuation.delta_psi_end, a)
         angle = load(rods.hub.angle, a) + add_product(start, fraction, end - start)
         natural_moment = 2.0 * load(rods.bending.EI_over_dl, a * rods.edges_per_limb) * tangent(0.5 * angle)
-        store(work.hub_EI_kappa_bar, a, natural_moment)
+        store(work.hub.EI_kappa_bar, a, natural_moment)

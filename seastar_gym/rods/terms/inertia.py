@@ -1,6 +1,7 @@
 """Inertia: lumped masses, with the Voronoi lengths that drag has, too; the hub carries half of every root edge."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +15,21 @@ HELD = 1e15
 simulator takes back at its end, and the kernels need not know of it. With more, rounding would spoil the potential."""
 
 
-def coefficients(mesh: Mesh, density: float, held_nodes: Sequence[int] = ()) -> NDArray[np.float64]:
-    """Lumped mass, per node [kg]."""
-    mass: NDArray[np.float64] = density * mesh.per_node(mesh.at_nodes.inert) * mesh.dl
-    hold(mass, held_nodes)
-    return mass
+class Inertia(NamedTuple):
+    """Masses.
+
+    node: Lumped, per node [kg]; with a body, per place, see star.py.
+    edge: What consistent masses take from lumped ones, per edge [kg]; None for lumped masses.
+    """
+
+    node: NDArray[np.float64]
+    edge: NDArray[np.float64] | None
+
+
+def coefficients(mesh: Mesh, density: float, consistent: bool) -> Inertia:
+    """Masses of limbs of a density [kg/m^3]; consistent: Those of velocities that are linear along edges."""
+    node: NDArray[np.float64] = density * mesh.per_node(mesh.at_nodes.inert) * mesh.dl
+    return Inertia(node, edge_coefficients(mesh, density) if consistent else None)
 
 
 def hold(mass: NDArray[np.float64], nodes: Sequence[int]) -> None:
@@ -45,10 +56,10 @@ MOST_TAKEN = 0.9
 @kernel
 def subtract_edge_inertia(rods, stage, e, tail, head, slopes):
     """(E, f, K) of an edge less mu |d_head - d_tail|^2/2, d = v - v_hat; unchanged for lumped masses."""
-    if rods.edge_mass is None:
+    if rods.inertia.edge is None:
         return slopes
     energy, (fx, fy), (xx, xy, yy) = slopes
-    mu = load(rods.edge_mass, e)
+    mu = load(rods.inertia.edge, e)
     dx, dy = head.dx - tail.dx, head.dy - tail.dy
     mu_over_gamma = mu * stage.inverse_gamma
     stiffness = mu_over_gamma * stage.inverse_gamma
@@ -65,16 +76,16 @@ def kinetic_energy(rods, v, frame):
     total = splat(0.0)
     for node in range(rods.n_nodes):
         vx, vy = load(v, 2 * node) - frame[0], load(v, 2 * node + 1) - frame[1]
-        total = add_product(total, 0.5 * load(rods.mass, node), vx * vx + vy * vy)
+        total = add_product(total, 0.5 * load(rods.inertia.node, node), vx * vx + vy * vy)
     return subtract_edge_energy(rods, v, total)
 
 
 @kernel
 def subtract_edge_energy(rods, v, energy):
     """Kinetic energy less mu |v_head - v_tail|^2/2 of the edges [J]; unchanged for lumped masses (None)."""
-    if rods.edge_mass is None:
+    if rods.inertia.edge is None:
         return energy
     for e in range(rods.n_edges):
         dx, dy = edge_vector(v, tail_node(rods, e), e + 1)
-        energy = subtract_product(energy, 0.5 * load(rods.edge_mass, e), add_product(dx * dx, dy, dy))
+        energy = subtract_product(energy, 0.5 * load(rods.inertia.edge, e), add_product(dx * dx, dy, dy))
     return energy

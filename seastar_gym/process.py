@@ -1,9 +1,11 @@
-"""Ctrl-C while numba is imported, compiles or loads code, and while scipy or pygame are imported: it waits meanwhile.
+"""The process: how many processors it may use, and Ctrl-C that waits.
 
-An import or a compilation that is broken off leaves libraries half there, and the process without a simulator.
+Ctrl-C waits while numba is imported, compiles or loads code, and while scipy or pygame are imported: what is broken off
+leaves libraries half there, and the process without a simulator.
 """
 
 import contextlib
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -64,3 +66,8 @@ def let_through() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, _hold)
+
+
+def processors() -> int:
+    """Number of the processors that this process may use, which may be fewer than the machine has."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
