@@ -294,7 +294,7 @@ NUMBERS = 8.0
 
 
 def draw_robot(axes: Axes, swim: Swim, time: float, beyond: float = NUMBERS) -> None:
-    """Draw the robot at a time [s] on axes in mm, actuated limbs bold and blue, numbers so far beyond their tips [mm]."""
+    """Draw the robot at a time [s] on axes in mm, actuated limbs bold and blue, numbers that far beyond tips [mm]."""
     n = swim.scene.robot.nodes_per_limb
     nodes, active = MM * swim.positions[swim.at(time), 0], swim.actuated(time)
     for limb in range(swim.scene.robot.n_limbs):
