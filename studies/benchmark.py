@@ -42,7 +42,7 @@ from studies.gpu import EVERYTHING, scenes
 from studies.operations import count_operations, flops
 from studies.pages import markdown
 from studies.provenance import provenance
-from studies.style import CYCLE, subplots
+from studies.style import INK, subplots
 
 ROOT = Path(__file__).resolve().parents[1]
 UNIT = {"unit": "20 million times 8 fused products of one robot per lane"}
@@ -369,16 +369,18 @@ def table(results: Mapping[str, Any]) -> str:
 
 
 def draw(results: Mapping[str, Any], path: Path) -> None:
-    """Draw every thing over the runs, as a multiple of what it took in the first."""
-    runs = results["runs"]
-    figure, axes = subplots(1, 1, figsize=(8, 4.2))
-    first = next(iter(runs.values()))["ratios"]
-    for k, name in enumerate(first):
-        values = [row["ratios"].get(name, np.nan) / first[name] for row in runs.values()]
-        axes.plot(values, ("o-", "s--")[k // len(CYCLE)], color=CYCLE[k % len(CYCLE)], label=name, markersize=4)
-    axes.set(ylabel="time over that of the first run", ylim=(0.0, None))
-    axes.set_xticks(range(len(runs)), [f"{date.split()[0]}\n{row['commit']}" for date, row in runs.items()])
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    """Draw every thing as a bar: its time in the last run over that in the first."""
+    runs = list(results["runs"].items())
+    (first, before), (last, now) = runs[0], runs[-1]
+    ratios = {name: now["ratios"][name] / value for name, value in before["ratios"].items() if name in now["ratios"]}
+    figure, axes = subplots(1, 1, figsize=(7.2, 3.8))
+    bars = axes.barh(list(ratios), list(ratios.values()), height=0.6)
+    axes.bar_label(bars, fmt="%.2f", label_type="center", color="white", fontsize="small")
+    axes.axvline(1.0, color=INK, lw=1.0)
+    axes.grid(False, axis="y")
+    axes.invert_yaxis()
+    ends = (f"commit {run['commit']} of {date.split()[0]}" for date, run in ((last, now), (first, before)))
+    axes.set(xlabel=" over ".join(ends), title="processor time, over that of the first run")
     save_figure(figure, path)
 
 

@@ -293,15 +293,15 @@ NUMBERS = 8.0
 """Distance of a limb's number from its tip [mm]."""
 
 
-def draw_robot(axes: Axes, swim: Swim, time: float) -> None:
-    """Draw the robot at a time [s] on axes in mm, limbs numbered, with actuated ones bold and blue."""
+def draw_robot(axes: Axes, swim: Swim, time: float, beyond: float = NUMBERS) -> None:
+    """Draw the robot at a time [s] on axes in mm, actuated limbs bold and blue, numbers that far beyond tips [mm]."""
     n = swim.scene.robot.nodes_per_limb
     nodes, active = MM * swim.positions[swim.at(time), 0], swim.actuated(time)
     for limb in range(swim.scene.robot.n_limbs):
         line = nodes[[0, *range(1 + limb * (n - 1), 1 + (limb + 1) * (n - 1))]]
         colour, width, level = (ACTUATED, 3.2, 4.0) if active[limb] else (LIMB, 1.8, 3.0)
         axes.plot(*line.T, color=colour, linewidth=width, solid_capstyle="round", zorder=level)
-        x, y = line[-1] + NUMBERS * (line[-1] - line[-2]) / np.hypot(*(line[-1] - line[-2]))
+        x, y = line[-1] + beyond * (line[-1] - line[-2]) / np.hypot(*(line[-1] - line[-2]))
         axes.text(x, y, f"{limb + 1}", color=INK, fontsize=8, ha="center", va="center", zorder=6.0)
     axes.plot(*nodes[0], marker="o", markersize=4.5, color=INK, zorder=5.0)
 
@@ -318,9 +318,9 @@ def draw_straight(continuum: Swim, chapter: Swim, file: Path) -> None:
         axes.grid(True)
     for name, time in zip(("a1", "a2", "a3", "a4"), STRAIGHT_TIMES, strict=True):
         axes = panels[name]
-        draw_robot(axes, continuum, time)
+        draw_robot(axes, continuum, time, 2.0 * NUMBERS)
         axes.axvline(0.0, color=FAINT, linewidth=0.8, linestyle=":", zorder=1.0)
-        axes.set(aspect="equal", xlim=(-100.0, 155.0), ylim=(-115.0, 115.0), title=f"({name})  t = {time:.1f} s")
+        axes.set(aspect="equal", xlim=(-120.0, 160.0), ylim=(-130.0, 130.0), title=f"({name})  t = {time:.1f} s")
         axes.set(xticks=[-100, 0, 100], yticks=[-100, 0, 100], xlabel="x [mm]")
     panels["a1"].set_ylabel("y [mm]")
     for name, continuum_values, chapter_values in (

@@ -226,15 +226,18 @@ def picture(results: Mapping[str, Any], file: Path) -> None:
         some = points(results, kind)
         for scheme, (name, colour) in SCHEMES.items():
             axes.plot(*drawn(each for each in some if each.scheme == scheme), ".", ms=3, color=colour, label=name)
-        axes.plot(*drawn(front(some, of_any)), color=CYCLE[0], lw=1.2, label="front")
+        axes.plot(*drawn(front(some, of_any)), color=CYCLE[0], lw=1.2, label="fastest for its error")
         for fidelity in NAMES:
             x, y = drawn(each for each in some if keys_of(each.resolution) == keys_of(PRESETS[fidelity]))
             axes.plot(x, y, "o", ms=5, color=INK, zorder=3)
-            box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
-            axes.annotate(fidelity, (x[0], y[0]), (6, 5), textcoords="offset points", fontsize=8, bbox=box)
+            leader = {"arrowstyle": "-", "color": INK, "lw": 0.8}
+            axes.annotate(
+                fidelity, (x[0], y[0]), (16, -34), textcoords="offset points", fontsize=9, ha="center", va="top",
+                arrowprops=leader,
+            )  # fmt: skip
         axes.set(xscale="log", yscale="log", xlabel="speed over that of fast", title=title)
     both[0].set_ylabel("worst error of the hub's path [%]")
-    both[0].legend(loc="upper left", fontsize=7)
+    both[0].legend(loc="upper left", fontsize=8)
     save_figure(figure, file)
 
 

@@ -45,7 +45,7 @@ from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study, require_known, rounded
 from studies.operations import count_operations, numbers_moved
 from studies.pages import markdown
-from studies.style import CYCLE, FAINT, subplots
+from studies.style import CYCLE, subplots
 
 PRESETS: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
 BATCHES = (64, 256, 1024, 4096, 16384, 65536, 262144)
@@ -375,9 +375,8 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
     axes.set(
         xlabel="robots in the batch",
         ylabel="steps of robots per second",
-        title=f"One {results['gpu']['name']}; dotted: 16 cores of its host",
+        title=f"solid and dashed: one {results['gpu']['name']}; dotted: 16 cores of its host",
     )
-    axes.grid(color=FAINT, lw=0.4)
     axes.legend()
     save_figure(figure, path)
 

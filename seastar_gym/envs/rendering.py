@@ -442,9 +442,12 @@ class Renderer:
         end = gap + length * self.camera.scale
         self._scale_bar(gap, end, middle)
         end = self._canvas.write(f"{1000.0 * length:g} mm", (end + 0.5 * gap, middle), INK, (0.0, 0.5))
-        if note:
-            end = self._canvas.write(note, (end + 1.5 * gap, middle), FAINT_INK, (0.0, 0.5))
         room, x = width - end - gap, float(width)
+        legend = sum(self._canvas.text_size(text)[0] + 2.9 * gap for text, _ in LEGEND)
+        if note and legend + self._canvas.text_size(note)[0] + 1.5 * gap > room:  # no room between scale and legend
+            self._canvas.write(note, (gap, middle - 1.6 * self._text_height), FAINT_INK, (0.0, 0.5))
+        elif note:
+            self._canvas.write(note, (end + 1.5 * gap, middle), FAINT_INK, (0.0, 0.5))
         for text, colour in LEGEND:
             x -= self._canvas.text_size(text)[0] + 2.9 * gap
             if width - x > room:
