@@ -44,10 +44,15 @@ Swims = tuple[Swim, list[Swim]]
 
 def scenes_of(policy: LearnedPolicy) -> dict[str, Scene]:
     """Scenes in which a policy is measured, by name: the chapter's at every fidelity, or a robot of one's own as it was
-    trained."""
+    trained.
+
+    The chapter's robot has today's damping there, also if the policy was trained with limbs that damp nothing.
+    """
     period = policy.description.decision_period
     chapters = {fidelity: make_scene(None, fidelity, period) for fidelity in get_args(Fidelity)}
-    if any(replace(scene, numerics=policy.scene.numerics) == policy.scene for scene in chapters.values()):
+    trained = [replace(scene, numerics=policy.scene.numerics) for scene in chapters.values()]
+    undamped = [replace(scene, robot=replace(scene.robot, relaxation_time=None)) for scene in trained]
+    if policy.scene in (*trained, *undamped):
         return {fidelity: chapters[fidelity] for fidelity in FIDELITIES}
     return {OWN: policy.scene}
 

@@ -24,6 +24,7 @@ def row(text, fidelity):
 def test_every_policy_in_the_box_has_its_card(file):
     text = file.with_suffix(".md").read_text(encoding="utf-8")
     assert hashlib.sha256(file.read_bytes()).hexdigest() in text
+    assert [*scenes_of(load(file))] == [*FIDELITIES]  # or the next card would be of a robot of one's own
     training = load(file).training
     assert all(f"`{command}`" in text for command in training["commands"])
     assert f"{training['strokes']:,}" in text and f"seed: {training['seed']}" in text
