@@ -7,3 +7,9 @@ function unfold() {
 }
 addEventListener("DOMContentLoaded", unfold);
 addEventListener("hashchange", unfold);
+// A module's name is broken at its dots.
+addEventListener("DOMContentLoaded", () => {
+  for (const { firstChild: name } of document.querySelectorAll("article h1, article h2, .page-info .title"))
+    if (name?.data?.startsWith("seastar_gym."))
+      name.replaceWith(...name.data.split(/(?<=\.)/).flatMap((part) => [part, document.createElement("wbr")]));
+});
