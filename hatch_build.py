@@ -21,6 +21,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 RELATIVE = re.compile(r"(!?)(\[[^\]]*\])\((?!\w+:|#)([^)\s]+)\)")
+PICTURE = re.compile(r'(<img src=")(?!\w+:)')
 
 
 def with_absolute_links(text: str, repository: str, version: str) -> str:
@@ -31,7 +32,7 @@ def with_absolute_links(text: str, repository: str, version: str) -> str:
     def absolute(link: re.Match[str]) -> str:
         return f"{link[1]}{link[2]}({repository}/{'raw' if link[1] else 'blob'}/v{version}/{link[3]})"
 
-    return RELATIVE.sub(absolute, text)
+    return PICTURE.sub(rf"\g<1>{repository}/raw/v{version}/", RELATIVE.sub(absolute, text))
 
 
 def addresses(repository: str, version: str) -> dict[str, str]:

@@ -160,7 +160,7 @@ ADDRESS = "https://github.com/someone/seastar-gym"
 def test_a_package_index_shows_readme_with_absolute_links_once_there_is_an_address():
     metadata = {"version": "1.2.3"}
     hatch_build["CustomMetadataHook"](str(ROOT), {"repository": f"{ADDRESS}/"}).update(metadata)
-    links = re.findall(r"\]\(([^)]+)\)", text := metadata["readme"]["text"])
+    links = re.findall(r"(?:\]\(|src=\")([^)\"]+)[)\"]", text := metadata["readme"]["text"])
     assert len(links) > 20 and all(link.startswith("https://") for link in links)
     assert f"({ADDRESS}/raw/v1.2.3/docs/swim.gif)" in text and f"({ADDRESS}/blob/v1.2.3/docs/start.md)" in text
     assert metadata["urls"]["Repository"] == ADDRESS

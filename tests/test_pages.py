@@ -27,7 +27,7 @@ from seastar_gym.scene import numerics
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 FENCED = re.compile(r"^```(\S*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-LINK = re.compile(r"\]\((?!\w+:)([^)#\s]*)(#[^)\s]+)?\)")
+LINK = re.compile(r"(?:\]\(|<img src=\")(?!\w+:)([^)#\s\"]*)(#[^)\s]+)?[)\"]")
 LONGEST = 3  # steps of an episode
 
 
