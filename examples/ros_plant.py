@@ -14,7 +14,7 @@ from seastar_gym.plant.plant import Sighting
 
 
 class RosPlant(Node):
-    """Plant of the topics `hub_pose` (PoseStamped, in the tank) and `wires` (String: the lines of docs/plant.md)."""
+    """Plant of the topics `hub_pose` (PoseStamped, in the tank) and `wires` (String: those of plant/lines.py)."""
 
     def __init__(self, n_limbs: int = 5):
         super().__init__("seastar")

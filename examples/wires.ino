@@ -1,4 +1,4 @@
-// Heats the wires of a seastar robot as lines of text say: see "Lines" in docs/plant.md.
+// Heats the wires of a seastar robot as lines of text say: see docs/plant.md, and seastar_gym/plant/lines.py for lines.
 // One pin for each wire, + and - of every limb, that switches its current.
 #include <math.h>
 #include <stdint.h>

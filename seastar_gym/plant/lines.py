@@ -1,6 +1,22 @@
 """Lines of text between a driver and a plant, over whatever carries bytes: a serial port, a pipe, a socket.
 
-docs/plant.md has the table of all lines. Every line ends with the checksum of NMEA: * and two hexadecimal digits.
+A serial port has 115200 baud. A line is ASCII: words with single spaces, "*", two upper-case hexadecimal digits
+(exclusive or of all bytes before "*", the checksum of NMEA), line feed; for example "heat 80 +00-0*26".
+
+    hello 1           from the driver: version 1. Stops all wires; nothing is heated before it
+    hello 1 5         from the plant, the answer: version, number of limbs. Unasked: it has restarted, the driver stops
+    beat              from the driver, at least every 0.1 s: it lives. Any other line says so, too
+    heat 80 +00-0     from the driver: heat + of limb 1 and - of limb 4 for 80 ms from now on; other wires go on
+    stop              from the driver: heat no wire
+    sight 12.345678 0.100 0.020 1.571      from the tracker: time of the picture [s], x and y of the hub [m], heading of
+                                           limb 1 [rad]
+    sight 12.345678 0.100 0.020 1.571 0.2 ..   the same with markers: x, y [m], limb after limb, from hub to tip
+    error It is too hot.                   from the plant: all wires are stopped, and why
+
+A bad checksum, an unknown word or a refused pulse stops all wires, and the plant sends an error. A line has 4095 bytes
+at most, 62 in examples/wires.ino. Pictures in which a marker is not seen are left out. Times are those of
+`time.monotonic()` on the driver's computer, so the tracker runs there. The driver greets every 0.2 s for 5 s, until it
+was answered twice.
 """
 
 from __future__ import annotations

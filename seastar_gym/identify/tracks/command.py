@@ -4,10 +4,24 @@ Formats are table, any CSV file, whose columns are named, deeplabcut (CSV or HDF
 motive (CSV of OptiTrack).
 
 A table has a line for every picture, with the columns time,x,y and theta unless options name others. A point has the
-name of its column of x. Units are those in names, such as "x (mm)", unless options say so. Files of Kinovea, for
-example, take --x Hub/X Tip/X --y Hub/Y Tip/Y --time "Time (ms)", those of Vicon --skip 2 --headers 3 --rate 100
---x Star:Hub.X.mm --y Star:Hub.Y.mm, and those of rostopic --time %time --time-unit ns --begin first, and as --theta the
-four columns of a quaternion.
+name of its column of x. Units are those in names, such as "x (mm)", unless options say so. Options of some files:
+
+Kinovea: --time "Time (ms)" --x Hub/X Tip/X --y Hub/Y Tip/Y --nodes Hub/X=hub Tip/X=tip1
+
+Vicon: --skip 2 --headers 3 --rate 100 --time Frame --x Star:Hub.X.mm --y Star:Hub.Y.mm
+
+Tracker: --headers 2 --time mass_A.t --x mass_A.x --y mass_A.y
+
+rostopic echo -p: --time %time --time-unit ns --begin first, x and y of field.pose.position, and --theta with the four
+columns of the quaternion
+
+idtracker.ai: --time seconds --x x1 x2 --y y1 y2 --unit px --metres-per-pixel 4e-4 --nodes x1=hub x2=tip1
+
+TRex: --x "X#wcentroid (cm)" --y "Y#wcentroid (cm)" --theta ANGLE --y-down
+
+several tags: --only id=7
+
+a logger: --skip 1 --time Stamp --time-unit ms --degrees --begin 56911.836
 
 Pixels become metres by --metres-per-pixel, for a camera that looks straight down, or --homography, a CSV file with the
 pixel and the place u,v,x,y of four points or more.
