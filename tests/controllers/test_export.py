@@ -23,7 +23,7 @@ from seastar_gym.envs.layout import VELOCITY_SCALE, Layout
 from seastar_gym.envs.stations import heading_of
 
 ROOT = Path(__file__).resolve().parents[2]
-N_SWUM, N_DRAWN = 5000, 5000
+N_SWUM, N_DRAWN = 1500, 1500
 ROBOTS = 50
 CARRIED = 3e-7
 """Error of turned and mirrored numbers over the largest."""

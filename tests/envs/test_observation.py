@@ -236,7 +236,7 @@ def batch(task, n=6, **arguments):
 
 @pytest.mark.parametrize(
     "task, period",
-    [("miswired", 1.0), ("station", 0.5), ("prey", 1.0), ("fail-blind", 1.0), ("obst-trap", 0.5), ("sim-to-real", 0.2)],
+    [("miswired", 1.0), ("station", 1.0), ("prey", 1.0), ("fail-blind", 1.0), ("obst-trap", 0.5), ("sim-to-real", 0.2)],
 )
 def test_memory_shows_the_reduced_observation_and_the_past_in_the_same_limbs(task, period):
     def new():

@@ -14,6 +14,7 @@ from scipy.linalg import eigh
 
 import exact.solutions as known
 from continuum_oracle import Continuum
+from currents import NONE
 from oracle import Star, elastic_hessian, inertia_matrix
 from seastar_gym import Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.accuracy.measure import path_lengths
@@ -345,7 +346,7 @@ def paths(robot):
     actuator, commands = SmaPulse(), [STRAIGHT, *PAIRS.values(), [1, 0, -1, 0.5, 0], [-1, 1, 1, -1, 0]]
     if robot.n_limbs == 3:  # hub hinges of the chapter allow no more
         actuator, commands = SmaPulse(0.4), [[0, 1, -1], [-1, 1, 0]]
-    simulator = Simulator(Scene(robot, Water(), actuator, Numerics("implicit-midpoint", 1e-3)), len(commands))
+    simulator = Simulator(Scene(robot, NONE, actuator, Numerics("implicit-midpoint", 1e-3)), len(commands))
     hub = []
     for _ in range(10):
         assert not simulator.stroke(commands).status.any()

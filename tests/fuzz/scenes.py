@@ -72,7 +72,7 @@ SWIMMER: Terms = frozenset({BODY, ALONG, STIFFENING, "contact", ROTATIONS})
 """A body, limbs that wires bend along their length and stiffen (`SmaLimb` and the others), and contact."""
 COMPILED: tuple[Terms, ...] = (
     PLAIN, CONTACT, frozenset({ROTATIONS}), frozenset({OWN}), frozenset({OWN, ROTATIONS}), frozenset({OWN, "contact"}),
-    FLUID, frozenset({"loads"}), frozenset({CHAPTER}), frozenset({CHAPTER, "contact"}),
+    FLUID, frozenset({"loads"}), frozenset({CHAPTER}),
 )  # fmt: skip
 """The sets that other tests compile, too."""
 

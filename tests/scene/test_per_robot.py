@@ -54,13 +54,14 @@ UNEVEN = Seastar(3, 10, 0.1 * SPREAD, limbs=(
 
 
 ALONG = Seastar(3, 5, along=AlongLimb(np.linspace(0.2, 1.0, N_ROBOTS)), stiffening=Stiffening(1.0 + SPREAD))
+ON_BODY = Seastar(4, 5, body=Body.rectangle(0.06, 0.03, mass=0.03 * SPREAD))
 SCENES = {
     "numbers": varied(),
     "pulse": Scene(LENGTHS, actuator=SmaPulse(0.5 * SPREAD), numerics=FAST),
     "thermal": Scene(LENGTHS, actuator=THERMAL, numerics=FAST),
     "limbs": Scene(UNEVEN, actuator=SmaPulse(0.3), numerics=FAST),
     "contact": Scene(contact=Contact(np.geomspace(1e4, 1e6, N_ROBOTS)), numerics=Numerics.preset("fast")),
-    "bodies": Scene(Seastar(4, 5, body=Body.rectangle(0.06, 0.03, mass=0.03 * SPREAD)), numerics=FAST),
+    "bodies": Scene(ON_BODY, actuator=SmaPulse(0.5 * SPREAD), numerics=FAST),
     "along": Scene(ALONG, actuator=SmaPulse(0.6)),
     "tolerances of their own size": Scene(LENGTHS, numerics=Numerics("implicit-midpoint", 10e-3, 1e-4)),
 }

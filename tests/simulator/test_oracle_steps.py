@@ -10,7 +10,7 @@ import pytest
 
 import oracle
 from continuum_oracle import Bent, Continuum, ContinuumShaped
-from currents import CURRENTS, velocity
+from currents import CURRENTS, NONE, velocity
 from oracle import Array, Star
 from seastar_gym import (
     AlongLimb,
@@ -165,11 +165,11 @@ def cases() -> Iterator[Any]:
         for name, current in CURRENTS.items():
             yield case(name, alike(5, 4, **flowing(name)), scheme, 1, fluid=Water(current=current))
     yield case("strips", stripped(5, 10), "implicit-midpoint")
-    terms = {"fluid_density": 900.0, "relaxation_time": TAU, **EVERY, **PULLED, **flowing("shear")}
+    terms = {"fluid_density": 900.0, "relaxation_time": TAU, **EVERY, **flowing("shear")}
     fluid = Water(900.0, **EVERY, current=CURRENTS["shear"])
-    yield case("every term-strips", stripped(4, 5, **terms), "implicit-euler", 1, fluid=fluid, **PULLED)
+    yield case("every term-strips", stripped(4, 5, **terms), "implicit-euler", 1, fluid=fluid)
     for scheme, *shape in (("implicit-euler", 1, 5), ("sdirk2", 2, 4), ("implicit-midpoint", 5, 2), ("sdirk2", 5, 5)):
-        yield case(f"damped-{shape}", alike(*shape, relaxation_time=TAU), scheme)
+        yield case(f"damped-{shape}", alike(*shape, relaxation_time=TAU), scheme, fluid=NONE)
     for name, along in (("uniform", 0.0), ("shear", 0.02), ("vortex", 0.1), ("grid", 1.3)):
         terms = {"drag_coefficient": 1.3, "tangential_drag_coefficient": along, **MASS}
         fluid, more = Water(950.0, **terms, current=CURRENTS[name]), {"fluid_density": 950.0, "relaxation_time": TAU}
@@ -177,16 +177,16 @@ def cases() -> Iterator[Any]:
             twins = make(5, 4, **terms, **more, **flowing(name))
             yield case(f"every term-{name}-{type(twins[1]).__name__}", twins, "implicit-euler", 1, fluid=fluid)
     for name in ("shear", "vortex"):
-        twins = shaped(UNLIKE, 5, CURVED, fluid_density=900.0, relaxation_time=TAU, **EVERY, **PULLED, **flowing(name))
+        twins = shaped(UNLIKE, 5, CURVED, fluid_density=900.0, relaxation_time=TAU, **EVERY, **flowing(name))
         fluid = Water(900.0, **EVERY, current=CURRENTS[name])
-        yield case(f"every term-{name}-unlike", twins, "implicit-euler", 1, fluid=fluid, **PULLED)
+        yield case(f"every term-{name}-unlike", twins, "implicit-euler", 1, fluid=fluid)
     for scheme in ("implicit-euler", "implicit-midpoint"):
         yield case("bent along and stiffer", (TWIN, BENT), scheme, 3)
     pulled = HELD | PULLED
     for name, twins, parts in (
         ("plain", alike(5, 10), {}),
         ("vacuum", hinged("opening", 4, 4, drag_coefficient=0.0), {"fluid": None}),
-        ("damped", alike(5, 5, relaxation_time=TAU), {}),
+        ("damped", alike(5, 5, relaxation_time=TAU), {"fluid": NONE}),
         ("unlike and curved", shaped(UNLIKE[:3], 5, CURVED[:3]), {}),
         ("held and pulled", alike(5, 4, fluid_density=900.0, **pulled), {"fluid": Water(900.0), **pulled}),
     ):

@@ -41,20 +41,19 @@ def test_it_swims_a_robot_of_three_limbs_too(story):
 
 LEARN = """
 symmetric = BatchVecEnv(VectorSymmetryReduction(batch))
-for seed in range(10):
+for seed in range(3):
     model = PPO("MlpPolicy", symmetric, n_steps=64, batch_size=256, gamma=0.8, seed=seed, device="cpu")
-    model.learn(4096)
+    model.learn(512)
     model.save(f"{seed}.zip")
 """
 
 
-def test_ten_zips_are_one_row(story):
+def test_zips_of_several_seeds_are_one_row(story):
     story.runs(block("docs/training.md", "BatchVecEnv", "gym.make_vec").partition("model = ")[0] + LEARN)
-    zips = ",".join(f"{seed}.zip" for seed in range(10))
-    table = command("docs/controllers.md", "mine=A.zip,B.zip,C.zip").replace("A.zip,B.zip,C.zip", zips)
-    story.types(f"{table.replace('SeastarPrey', 'SeastarSwim')} --seeds 10 --decisions 30")
+    table = command("docs/controllers.md", "mine=A.zip,B.zip,C.zip").replace("A.zip,B.zip,C.zip", "0.zip,1.zip,2.zip")
+    story.types(f"{table.replace('SeastarPrey', 'SeastarSwim')} --seeds 3 --decisions 30")
     mine, learned = json.loads((story.folder / "runs/prey.json").read_text("utf-8"))
-    assert (mine["agent"], learned["agent"], len(mine["returns"])) == ("mine", "learned", 10), story.told
+    assert (mine["agent"], learned["agent"], len(mine["returns"])) == ("mine", "learned", 3), story.told
 
 
 @pytest.mark.parametrize("seed", [0, 5])

@@ -1,4 +1,4 @@
-"""From a force and a time stepping scheme in a file of one's own to a policy that swims with them.
+"""From a force in a file of one's own to a policy that swims with it.
 
 Another number of limbs than the page's has another drag, seed and time between decisions, too.
 """
@@ -10,16 +10,6 @@ import pytest
 from ways.story import block, command
 
 PAGE = "docs/extending.md"
-
-
-def test_the_page_shows_terminal_speed_and_the_order_of_a_scheme(story):
-    """As they stand there: their assertions are to 1e-6 of the closed form, and of order 3."""
-    story.runs(block(PAGE, "class LinearDrag") + block(PAGE, "register_scheme"))
-    story.runs(
-        (block(PAGE, "class LinearDrag") + block(PAGE, "register_scheme")).replace("n_limbs=3", "n_limbs=8"),
-    )
-
-
 SCENE = """
 from drag import LinearDrag
 

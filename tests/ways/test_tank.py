@@ -89,10 +89,11 @@ def test_a_robot_in_a_tank_is_filmed_fitted_trained_driven_and_put_on_a_board(st
         return story.types(f"{line} {more}", **how)
 
     for name, words in (("three.py", "peak_angle=0.5"), ("tank.py", "peak_angle=0.44")):
-        story.has(name, block(PAGE, words).replace("Seastar(3,", f"Seastar({n_limbs},"))
+        coarser = block(PAGE, words).replace('"implicit-midpoint", 1e-3', '"implicit-midpoint", 4e-3')
+        story.has(name, coarser.replace("Seastar(3,", f"Seastar({n_limbs},"))
     story.has("camera.json", json.dumps(camera))
     story.has("film.json", json.dumps({"rate": 120, "delay": 0.05, "sees": 1}))
-    story.has("path.txt", "0.1,0.0\n0.15,0.05\n")
+    story.has("path.txt", "0.1,0.0\n")
 
     # Pulses, a film of them, and the numbers of the robot in the tank.
     types("seastar drive random", more=f"--sight film.json --seed {seed} --yes --no-window --unpaced")
@@ -105,7 +106,7 @@ def test_a_robot_in_a_tank_is_filmed_fitted_trained_driven_and_put_on_a_board(st
         assert fitted[name.split(".")[0]][name.split(".")[1]] == pytest.approx(true, rel=0.04), name
 
     # A policy that sees everything cannot drive, and says what to do; that for the camera drives.
-    short = f"--strokes 65536 --save-freq 65536 --seed {seed} --no-video"
+    short = f"--strokes 24576 --save-freq 24576 --seed {seed} --no-video"
     types("train.py --scene fitted.json", more=short)
     story.types("seastar drive runs/three/policy.safetensors", ends=2)
     assert "python train.py --resume runs/three --for-camera camera.json" in story.told
