@@ -17,7 +17,7 @@ TRUE = 1.5, 0.55e6, 0.42
 FIRST = 1.1, 0.4e6, 0.52
 RINGING = Scene(
     Seastar(3, 7, limb_length=0.08, rod_radius=3e-3, youngs_modulus=FIRST[1], density=1100.0),
-    Water(drag_coefficient=FIRST[0]),
+    Water(drag_coefficient=FIRST[0], tangential_drag_coefficient=0.1),
     SmaPulse(FIRST[2]),
 )
 """Its limbs are stiff, and with a wrong modulus they ring in phase again."""
@@ -27,7 +27,7 @@ def track(scene=RINGING, n_strokes=6, noise=1e-3, seed=0, **truth):
     return synthetic(scene, dict(zip(NAMES, TRUE, strict=True)) | truth, n_strokes, noise=noise, seed=seed)
 
 
-@pytest.mark.parametrize("seed, n_strokes, factor", [(0, 6, 1.0), (1, 10, 1.0), (2, 6, 2.5), (3, 10, 0.5)])
+@pytest.mark.parametrize("seed, n_strokes, factor", [(0, 6, 1.0), (1, 10, 1.0), (2, 6, 2.5), (3, 6, 0.5)])
 def test_limbs_that_ring_have_their_modulus_found_from_afar(seed, n_strokes, factor):
     scene = with_parameters(RINGING, [NAMES[1]], [FIRST[1] * factor])
     found = identify(scene, NAMES, track(n_strokes=n_strokes, seed=seed))

@@ -1,4 +1,4 @@
-"""A story for every test of a way. The first of its parameters are near the page's; --slow runs the others, too."""
+"""A story for every test of a way. The first of its parameters are the page's; --slow runs the others, too."""
 
 from pathlib import Path
 

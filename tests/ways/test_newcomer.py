@@ -7,10 +7,7 @@ import pytest
 from ways.story import block, command
 
 
-@pytest.mark.parametrize(
-    "options, slowest",
-    [("--strokes 65536", 170.0), ("", 155.0), ("--seed 1 --decision-period 0.5 --strokes 65536", 120.0)],
-)
+@pytest.mark.parametrize("options, slowest", [("", 155.0), ("--seed 1 --decision-period 0.5 --strokes 65536", 120.0)])
 def test_the_first_command_ends_with_a_lap_and_a_report(story, options, slowest):
     (train,) = re.findall(r"python train\.py.*", command("README.md", ".[train]"))
     story.types(f"{train} {options} --no-video --out run")
