@@ -16,11 +16,11 @@ from studies.pages import markdown
 
 def environments() -> str:
     """Table of all ids: pictures, what `gym.make` gives by default, and links to docstrings."""
-    head, rows = ["id", "asks for", "actions", "numbers seen", "decision [s]"], []
+    head, rows = ["id", "asks for", "actions", "numbers seen", "decision [s]", "time limit [s]"], []
     for id, row in IDS.items():
         env: Any = gym.make(id, disable_env_checker=True).unwrapped
         place = type(env if row.task is None else env.task).__module__.replace(".", "/")
-        numbers = env.observation_space.shape[0], row.decision_period
+        numbers = env.observation_space.shape[0], row.decision_period, row.seconds
         link = f"[`{id}`](../{place}.py)<br>![{id}](ids/{id}.png)"
         rows.append([link, row.goal, f"`{env.action_space}`", *(f"{number:g}" for number in numbers)])
     return markdown(head, rows, (0, 1, 2))
