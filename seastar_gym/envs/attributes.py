@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from seastar_gym.envs.commands import Actions, action_space, command_table
 from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.instances import Split
-from seastar_gym.envs.layout import Layout, ObservationBox
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.robots import Robots, Task
 from seastar_gym.envs.sight import Drawn, Sight
@@ -84,8 +84,8 @@ class RobotsEnv:
         actions_of_one = action_space(self.actions, n_limbs)
         has_table = isinstance(actions_of_one, spaces.Discrete)
         self.command_table = command_table(self.actions, n_limbs) if has_table else None
-        seen = ObservationBox(-np.inf, np.inf, (robots.layout.size,), np.float32)
-        seen.decision_period = robots.decision_period
+        seen: Any = spaces.Box(-np.inf, np.inf, (robots.layout.size,), np.float32)
+        seen.decision_period = robots.decision_period  # files of models keep it, see `require_fit`
         return actions_of_one, seen
 
     def __setattr__(self, name: str, value: Any) -> None:

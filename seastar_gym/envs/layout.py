@@ -34,9 +34,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, Self, get_args
+from typing import Literal, get_args
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
@@ -173,20 +172,3 @@ def memory_size(actuator: Actuator) -> int:
     """Numbers that are observed of an actuator, 0 without memory."""
     known = complete(actuator)
     return known.observe(known.rest).shape[-1]
-
-
-class ObservationBox(gym.spaces.Box):
-    """Space of observations: a Box, equal to any of its kind, that says how often robots decide by them.
-
-    Files of models have the space that was learned in, and so say it, too.
-    """
-
-    decision_period: float | None = None
-    """Time between decisions [s]; None in files of earlier models."""
-
-    @classmethod
-    def of(cls, space: gym.spaces.Box) -> Self:
-        """The same space in this class."""
-        made = cls(space.low, space.high, space.shape, space.dtype)
-        made.decision_period = getattr(space, "decision_period", None)
-        return made

@@ -44,7 +44,7 @@ from seastar_gym.envs.group import (
     transform_commands,
     turns,
 )
-from seastar_gym.envs.layout import Layout, ObservationBox
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.scene import Scene, checks
 from seastar_gym.scene.actuators.base import Actuator, Mirror, complete, is_actuator
@@ -352,7 +352,10 @@ def require_symmetry(scene: Scene, randomization: DomainRandomization | None = N
     """
     why = next(_asymmetries(scene, () if randomization is None else randomization.distributions), None)
     if why is not None:
-        raise ValueError(f"This scene has neither the symmetry of the regular polygon nor a lesser one: {why}.")
+        raise ValueError(
+            f"This scene has neither the symmetry of the regular polygon nor a lesser one: {why}. Train without the "
+            "reduction: train.py --no-symmetry."
+        )
 
 
 def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
@@ -397,14 +400,19 @@ def observed_mirror(env: Any) -> Mirror:
     return mirror + tuple((len(mirror) + index, sign) for index, sign in env.added_mirror)
 
 
-class ReducedBox(ObservationBox):
-    """Space of reduced observations, equal to that of observations as they are: it says that they are reduced."""
+class ReducedBox(gym.spaces.Box):
+    """Space of reduced observations: a Box, equal to that of observations as they are, that says that they are reduced.
+
+    Files of models have the space that was learned in, and so say it, too.
+    """
 
     @classmethod
     def of(cls, space: Any) -> Self:
         """The space of observations of a space, reduced; ValueError for observations that are no arrays."""
         require_kind("The space of observations", space, gym.spaces.Box, "a Box: put other wrappers around this one")
-        return super().of(space)
+        made: Any = cls(space.low, space.high, space.shape, space.dtype)
+        made.decision_period = getattr(space, "decision_period", None)
+        return made
 
 
 class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):

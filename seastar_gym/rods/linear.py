@@ -367,7 +367,7 @@ def solve_ring(work, n_limbs, D_hub, r_hub):
 
 @kernel
 def substitute_ring(work, n_limbs, hub):
-    """Solution of the hub, given, and of the ring of root nodes, into work.root_solution."""
+    """Solution of the hub, given, and of the ring of root nodes, into work.system.root_solution."""
     last, zero = n_limbs - 1, splat(0.0)
     of_last = substitute_node(work, 1, hub[0], hub[1], zero, zero)
     following = substitute_node(work, 0, of_last[0], of_last[1], hub[0], hub[1])
@@ -440,7 +440,7 @@ def with_arm(rods, work, limb, H, x, y, C):
 
 @kernel
 def solve_rigid_hub(rods, work, D_hub, r_hub):
-    """Eliminate root nodes and hub, and solve for them; solutions as solve_ring leaves them, in work.root_solution.
+    """Eliminate root nodes and hub, and solve for them; solutions as solve_ring leaves them.
 
     Returns the part of the Newton decrement and the smallest pivot.
     """
@@ -580,7 +580,7 @@ def solve_ring_again(work, n_limbs, r_hub):
 
 @kernel
 def solve_lone_root_again(work, r_hub):
-    """Solve for root node and hub of a single limb, whose root's right-hand side is in work.ring."""
+    """Solve for root node and hub of a single limb, whose root's right-hand side is in work.system.ring."""
     zero = splat(0.0)
     r_hub, _ = eliminate_again(work, 1, load_pair(work.system.ring, 7), r_hub, (zero, zero))
     inverse_x, inverse_y = load_pair(work.system.root_pivots, 0)

@@ -333,7 +333,7 @@ def factorise(rods, work, stage, convex):
 
 @kernel
 def solve_hub(rods, work, D_hub, r_hub):
-    """Eliminate the root nodes and the hub, and solve for them, into work.root_solution.
+    """Eliminate the root nodes and the hub, and solve for them, into work.system.root_solution.
 
     Returns the part of the Newton decrement [J] and the smallest pivot.
     """

@@ -150,7 +150,7 @@ def turned_energy(K, c, s, p_x, p_y):
 
 @kernel
 def sum_of_turns(rods, work):
-    """S [N m] of root edges turned by (c, s) in work.hub_turn."""
+    """S [N m] of root edges turned by (c, s) in work.clamp.turn."""
     S_x, S_y = splat(0.0), splat(0.0)
     for limb in range(rods.n_limbs):
         K = clamp_stiffness(rods, work, limb)
@@ -243,7 +243,7 @@ def assemble_clamps(rods, work, stage, convex):
 
 @kernel
 def add_clamps(rods, work, directions, ratio, convex, column):
-    """Add clamps of `ratio` times the stiffness, with these natural directions, in this column of work.hub_coupling.
+    """Add clamps of `ratio` times the stiffness, with these natural directions, in this column of work.hub.coupling.
 
     Returns their energy [J].
     """
