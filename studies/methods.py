@@ -136,7 +136,7 @@ def ids_table(found: Any) -> str:
     lines = [
         [
             f"`{id}`", entry.why, f"{measures[id].name} [{measures[id].unit}], {measures[id].better} is better",
-            *(means.get((id, agent), "not swum yet") for agent in AGENTS),
+            *(means.get((id, agent), "none") for agent in AGENTS),
             "-" if entry.price is None else f"{entry.price:g}",
         ]
         for id, entry in ENTRIES.items()
@@ -175,6 +175,7 @@ def draw_curves(found: Any, file: Path) -> None:
         for axis, x in zip(axes, (decisions / 1000.0, seconds), strict=True):
             axis.plot(x, scores, marker="o", label=f"{row.agent}, {row.track}")
     axes[0].set(xlabel="decisions [1000]", ylabel="mean score over ids and seeds")
+    axes[0].set_ylim(bottom=-1.0)  # learners that rest score below
     axes[1].set(xlabel="processor time of a training [s]")
     axes[0].legend(fontsize="small")
     save_figure(figure, file)
