@@ -156,7 +156,7 @@ def ringing_frequency(robot, mode):
     state = simulator.get_state()
     state.positions[0, 1:, 1] += 1e-4 * robot.limb_length * np.tile(shape, 2)
     simulator.set_state(state)
-    projection = shape * make_rods(simulator.scene).mass[own]
+    projection = shape * make_rods(simulator.scene).inertia.node[own]
     samples = [(0.0, state.positions[0, own, 1] @ projection)]
     for time in simulator.stroke_in_parts(np.zeros((1, 2)), 12 * 25):
         samples.append((time, simulator.positions[0, own, 1] @ projection))
@@ -205,7 +205,7 @@ K = 1.0 / (np.pi * Seastar().rod_radius)
 def translated(time, speed, push, discretisation="continuum"):
     """(speed [m/s], distance [m]) after a time [s] of a robot whose nodes carry their mass times `push` [m/s^2]."""
     robot = Seastar(nodes_per_limb=10, discretisation=discretisation)
-    loads = tuple((node, push * m, 0.0) for node, m in enumerate(make_rods(Scene(robot)).mass))
+    loads = tuple((node, push * m, 0.0) for node, m in enumerate(make_rods(Scene(robot)).inertia.node))
     simulator = Simulator(Scene(robot, Water(), known.pause(time), IN_DRAG, loads=loads))
     state = simulator.get_state()
     state.velocities[..., 0] = speed

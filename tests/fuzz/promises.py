@@ -187,7 +187,7 @@ def momenta(simulator: Simulator) -> tuple[np.ndarray, np.ndarray]:
     """Of every robot [kg m/s], shape (n_robots, 2), and its mass [kg]."""
     scene = simulator.scene
     rods = [make_rods(scene, robot if scene.n_robots else 0) for robot in range(simulator.n_robots)]
-    masses = np.array([each.mass[: scene.robot.n_nodes] for each in rods])
+    masses = np.array([each.inertia.node[: scene.robot.n_nodes] for each in rods])
     of_nodes = np.einsum("rn,rnd->rd", masses, simulator.velocities)
     return of_nodes + turning_momenta(simulator, rods), masses.sum(axis=1)
 

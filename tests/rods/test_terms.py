@@ -349,7 +349,7 @@ def test_what_moving_natural_curvature_stores_is_the_energy_of_the_hinges_left_b
         )
     )  # fmt: skip
     np.testing.assert_allclose(moved, expected, rtol=1e-9)
-    np.testing.assert_allclose(work.along.EI_kappa_bar, memory(END).EI_kappa_bar, rtol=1e-14)
+    np.testing.assert_allclose(work.along.EI_kappa_bar, memory(END).along.EI_kappa_bar, rtol=1e-14)
 
 
 # Coefficients

@@ -90,7 +90,7 @@ def test_a_drag_coefficient_of_the_body_stands_for_the_fluids(body, own):
     draggy = on_body(replace(body, drag_coefficient=1.9, **own), drag_coefficient=1.2)
     for motion in (((0.1, 0.2), 0.0), ((0.0, 0.0), 3.0)):
         np.testing.assert_array_equal(force_and_torque(draggy, *motion), force_and_torque(same, *motion))
-    np.testing.assert_allclose(draggy.drag[1:], 1.2 / 1.9 * same.drag[1:])
+    np.testing.assert_allclose(draggy.drag.node[1:], 1.2 / 1.9 * same.drag.node[1:])
 
 
 def test_added_mass_is_that_of_an_ellipse():

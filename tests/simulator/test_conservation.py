@@ -115,12 +115,12 @@ def test_linear_momentum_is_what_weight_makes_of_it_to_rounding(scene, n_robots,
     """In vacuum, even at a loose tolerance: every Newton step solves a linear equation to the last bit."""
     simulator = begin(Simulator(scene, n_robots))
     (before, _), fastest = kept(simulator), np.abs(simulator.velocities).max()
-    weight = simulator.coefficients.rods(0).mass.sum() * np.array(scene.gravity or (0.0, 0.0))
+    weight = simulator.coefficients.rods(0).inertia.node.sum() * np.array(scene.gravity or (0.0, 0.0))
     for duration, commands in intervals:
         report = simulator.advance(duration, commands)
         arrived, fastest = report.status == SolverStatus.CONVERGED, max(fastest, np.abs(simulator.velocities).max())
         share = 1e-10 if weight.any() or (scene.contact and scene.robot.has_body) else 1e-11 * fastest
-        rounding = share * simulator.coefficients.rods(0).mass.sum()
+        rounding = share * simulator.coefficients.rods(0).inertia.node.sum()
         expected = before + weight * simulator.time[0]
         np.testing.assert_allclose(kept(simulator)[0][arrived], expected[arrived], rtol=0.0, atol=rounding)
 
@@ -134,7 +134,7 @@ def test_linear_momentum_stays_to_rounding_whatever_a_step_needs(scheme):
         before, _ = kept(simulator)
         report = simulator.stroke(np.zeros((8, 5)))
         needed, cuts = needed + report.halvings.sum(), cuts + report.energy_cuts.sum()
-        size = make_rods(simulator.scene).mass.sum() * speed
+        size = make_rods(simulator.scene).inertia.node.sum() * speed
         np.testing.assert_allclose(kept(simulator)[0], before, rtol=0.0, atol=1e-11 * size)
     assert needed > 100 and cuts > 3
 
