@@ -20,6 +20,7 @@ import tracemalloc
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -53,6 +54,8 @@ NODES_PER_LIMB = (5, 10, 20, 40, 80, 160, 320, 640)
 BATCH = 512
 """Robots of a batch."""
 ENVIRONMENTS = {"SeastarSwim-v0": "strokes of 1 s", "SeastarSwimTimedModerate-v0": "decisions of 0.2 s"}
+NEIGHBOURS = {"Swimmer-v5": "0.04 s", "HalfCheetah-v5": "0.05 s"}
+"""Environments of MuJoCo, timed where it is installed, and how long a decision is."""
 Clock = Callable[[], float]
 Row = tuple[str, str, float, float, float]
 """What a number is, its unit, its median, and the range of the middle half of its repeats."""
@@ -192,6 +195,11 @@ def throughput(seconds: float) -> Iterator[Row]:
             yield row(f"step of {name}: Python", "ms", [1e3 * each for each in beyond])
             yield row(f"step of {name}: kernels", "ms", [1e3 * each for each in kernels])
             yield row(f"decisions of {name}", "1/s", [(n_robots or 1) / each for each in beyond + kernels])
+    for id, what in NEIGHBOURS.items() if find_spec("mujoco") else ():
+        env = gym.make(id, max_episode_steps=10**9)
+        rates = [1.0 / step_of(env, max(3, int(2000 * seconds)))[0] for _ in range(5)]
+        env.close()
+        yield row(f"decisions of {id}, {what}", "1/s", rates)
 
 
 # Cold start

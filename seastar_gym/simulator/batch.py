@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.lanes.dispatch import KnownCode
-from seastar_gym.lanes.registers import N_LANES, NARROW, PLAIN
+from seastar_gym.lanes.registers import N_LANES, NARROW, PLAIN, Form
 from seastar_gym.lanes.rows import aligned_rows, from_rows, to_rows, write_rows
 from seastar_gym.model import Coefficients, scheme_for
 from seastar_gym.rods.bundles import Work, make_work
@@ -97,9 +97,12 @@ its share to the others."""
 LARGEST_PART = 64
 """Lane groups in a part at most. An interrupt waits for the parts under way."""
 FEW = N_LANES // 2 if N_LANES > 4 else 0
-"""Robots at most in a batch that is advanced on NARROW lanes, to the same bits. With eight lanes few robots are 1.6
-times as fast so, with four no faster. Code for few is not that for many: who swims both waits for the compiler twice.
+"""Robots at most that are advanced on NARROW lanes, to the same bits: a whole batch, or the rest of a small one. With
+eight lanes few robots are 1.6 times as fast so, with four no faster. Code for few is not that for many: who swims both
+waits for the compiler twice.
 """
+SMALL = 4
+"""Lane groups at most of a batch whose rest is advanced apart: in a larger one the rest hardly counts."""
 ROWS = ("q", "v", "status")
 """Arrays of shape (n_groups, k, N_LANES) that an interval changes and the next one does not make anew."""
 MOVED = (*ROWS, "last_hub")
@@ -129,7 +132,7 @@ class Batch:
     def __init__(self, scene: Scene, n_robots: int, threads: int, effort: bool):
         self._scene, self.n_robots = scene, n_robots
         self._known_parts: dict[bool, list[slice]] = {}  # by whether coefficients are shared
-        self._code, self._form = KnownCode(), NARROW if n_robots <= FEW else PLAIN
+        self._code = KnownCode()
         n_groups, n_limbs, n_rows = -(-n_robots // N_LANES), scene.robot.n_limbs, 2 * scene.robot.n_nodes
         self._scheme = scheme_for(scene)
         self.coefficients = Coefficients(scene, n_robots)
@@ -313,7 +316,7 @@ class Batch:
             work, actuation = self.memory[thread]
             shape, n_turning = self._shape_of(part, begin, end)
             self._call(
-                advance.at(self._form), self.coefficients.rods(part.start), work, self._scheme,
+                advance.at(self._form(part)), self.coefficients.rods(part.start), work, self._scheme,
                 SCHEMES["implicit-euler"], actuation, self.q[part], self.v[part], self.a[part], self.peaks[part], times,
                 shape, n_turning, self.status[part], self.report[part], self.coefficients.limits(part.start),
                 self.effort[part], kind=shape.ndim,
@@ -327,9 +330,15 @@ class Batch:
         if are_shared not in self._known_parts:
             n_parts = 1 if threads == 1 else min(n_groups, PARTS_PER_THREAD * threads)
             n_parts = max(n_parts, -(-n_groups // LARGEST_PART)) if are_shared else n_groups
-            bounds = [n_groups * k // n_parts for k in range(n_parts + 1)]
-            self._known_parts[are_shared] = list(map(slice, bounds[:-1], bounds[1:]))
+            bounds = {n_groups * k // n_parts for k in range(n_parts + 1)}
+            ends = sorted(bounds | {n_groups - 1} if self._form(slice(n_groups - 1, n_groups)) is NARROW else bounds)
+            self._known_parts[are_shared] = list(map(slice, ends[:-1], ends[1:]))
         return self._known_parts[are_shared]
+
+    def _form(self, part: slice) -> Form:
+        """Width of the lanes on which a part is advanced."""
+        n_groups, n_robots = len(self.status), self.n_robots - part.start * N_LANES
+        return NARROW if n_robots <= FEW and n_groups <= SMALL else PLAIN
 
     def _call(self, entry: Callable[..., None], *args: Any, kind: int = 0) -> None:
         """Call compiled code with arguments whose types differ only by `kind`, and by what robots share."""

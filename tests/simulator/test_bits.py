@@ -289,7 +289,7 @@ FEW["held, along limbs"] = Row(
 def test_few_robots_on_narrow_lanes_have_their_bits(monkeypatch, name):
     whole = swim(FEW[name])
     monkeypatch.setattr(batch, "FEW", N_LANES // 2)
-    for robots in (np.array([0]), np.arange(1, 1 + N_LANES // 2)):
+    for robots in (np.array([0]), np.arange(1, 1 + N_LANES // 2), np.arange(N_LANES + 1)):
         for one, wanted in zip(swim(FEW[name], robots), whole, strict=True):
             for field in one:
                 np.testing.assert_array_equal(one[field], wanted[field][robots], err_msg=field)
