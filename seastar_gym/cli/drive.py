@@ -23,7 +23,7 @@ from seastar_gym.cli.swim import camera_of
 from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.registry import HELP, learned_policy, load_agent
+from seastar_gym.controllers.registry import HELP, learned_policy, load_agent, period_of
 from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.options import make_scene, scene_at
 from seastar_gym.envs.paths import PATH_HELP, WAYPOINT_RADIUS, load_path
@@ -79,7 +79,7 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
         require_number("--decision-period", options.decision_period, "s")
     policy = learned_policy(options.policy, options.decision_period)
     fidelity: Fidelity = options.fidelity or "fast"
-    own: dict[str, Any] = {"decision_period": 0.5, "sight": Sight(), "path": "pentagon"}
+    own: dict[str, Any] = {"decision_period": period_of(options.policy) or 0.5, "sight": Sight(), "path": "pentagon"}
     if policy is not None:
         about = policy.description
         require_camera(options.policy, about)

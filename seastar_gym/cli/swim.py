@@ -16,7 +16,7 @@ import gymnasium as gym
 from seastar_gym.cli.screen import Show, outcome, rate, screen, show_all
 from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.controllers.contract import Policy
-from seastar_gym.controllers.registry import HELP, is_file, learned_policy, load_agent
+from seastar_gym.controllers.registry import HELP, is_file, learned_policy, load_agent, period_of
 from seastar_gym.envs.commands import decisions_in
 from seastar_gym.envs.paths import PATH_HELP, load_path
 from seastar_gym.envs.sight import Camera, Sight, read_camera
@@ -78,7 +78,7 @@ def trained_for(options: argparse.Namespace) -> dict[str, Any]:
         return {"decision_period": LEARNED_PERIOD}
     policy = learned_policy(options.agent)
     if policy is None:
-        return {}
+        return {"decision_period": period_of(options.agent)}
     about = policy.description
     own = {"decision_period": about.decision_period, "sight": about.sight, "action_delay": about.action_delay}
     return own | ({"scene": about.scene} if is_file(options.agent) else {})

@@ -8,7 +8,7 @@ import gymnasium as gym
 
 from seastar_gym.controllers.contract import Policy, actions_in, is_batched, require_policy, sees_reduced
 from seastar_gym.controllers.learned import reason_of
-from seastar_gym.envs.symmetry import symmetry_in
+from seastar_gym.envs.symmetry import box_of, symmetry_in
 from seastar_gym.scene.checks import require_kind
 
 
@@ -36,9 +36,7 @@ class ReducedPolicy:
         self.batched = is_batched(policy)
         sees: Any = getattr(policy, "observation_space", None)
         if sees is not None:
-            plain: Any = gym.spaces.Box(sees.low, sees.high, sees.shape, sees.dtype)
-            plain.decision_period = getattr(sees, "decision_period", None)
-            self.observation_space = plain
+            self.observation_space = box_of(sees)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):

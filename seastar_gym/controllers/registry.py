@@ -142,6 +142,8 @@ def is_model(path: str | Path) -> bool:
 def load_model(path: str | Path) -> Policy:
     """The policy of any algorithm of Stable-Baselines3, as it is in the file. Unpickles: see above.
 
+    Its `num_timesteps` is how many decisions it learned for.
+
     One that learned behind `VectorSymmetryReduction` is to be given reduced observations, see `ReducedPolicy`; agents
     by name are behind it already. ValueError, with one sentence, if there is none in the file.
     """
@@ -162,6 +164,7 @@ def load_model(path: str | Path) -> Policy:
         raise ValueError(f"{path} is damaged, or no model of Stable-Baselines3: {reason_of(unfit)}.") from unfit
     if not all(np.isfinite(one.cpu().numpy()).all() for one in policy.state_dict().values()):
         raise ValueError(f"{path} has weights that are not finite numbers.")
+    policy.num_timesteps = data.get("num_timesteps")
     _warn_of_normalised(path, data)
     return policy
 
@@ -337,6 +340,13 @@ def learned_policy(name: str, decision_period: float | None = None) -> learned.L
     if name.endswith(".zip"):
         file = None if is_model(name) else Path(name)
     return None if file is None else learned.load(file)
+
+
+def period_of(name: str) -> float | None:
+    """Time between decisions [s] that a model of Stable-Baselines3 learned with, if this is the file of one and says
+    it."""
+    sees: Any = getattr(_load_file(name), "observation_space", None) if is_file(name) and is_model(name) else None
+    return getattr(sees, "decision_period", None)
 
 
 def is_file(name: str) -> bool:

@@ -400,6 +400,13 @@ def observed_mirror(env: Any) -> Mirror:
     return mirror + tuple((len(mirror) + index, sign) for index, sign in env.added_mirror)
 
 
+def box_of(space: Any, kind: Any = gym.spaces.Box) -> Any:
+    """A Box of a kind that is equal to a Box of observations, and says the same time between decisions."""
+    made = kind(space.low, space.high, space.shape, space.dtype)
+    made.decision_period = getattr(space, "decision_period", None)
+    return made
+
+
 class ReducedBox(gym.spaces.Box):
     """Space of reduced observations: a Box, equal to that of observations as they are, that says that they are reduced.
 
@@ -410,9 +417,7 @@ class ReducedBox(gym.spaces.Box):
     def of(cls, space: Any) -> Self:
         """The space of observations of a space, reduced; ValueError for observations that are no arrays."""
         require_kind("The space of observations", space, gym.spaces.Box, "a Box: put other wrappers around this one")
-        made: Any = cls(space.low, space.high, space.shape, space.dtype)
-        made.decision_period = getattr(space, "decision_period", None)
-        return made
+        return box_of(space, cls)
 
 
 class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):

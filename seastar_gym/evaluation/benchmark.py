@@ -22,7 +22,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from seastar_gym.controllers.contract import Policy
-from seastar_gym.controllers.registry import load_agent
+from seastar_gym.controllers.registry import is_file, is_function, load_agent
 from seastar_gym.envs import IDS
 from seastar_gym.envs.instances import SIZES, Split
 from seastar_gym.envs.robots import Task
@@ -168,6 +168,20 @@ def track_of(policy: Policy) -> Track:
     return "symmetric" if getattr(policy, "symmetric", False) else "plain"
 
 
+def length_of(policy: Policy) -> int | None:
+    """Decisions that a policy learned for; None where it does not say."""
+    training = getattr(policy, "training", None)
+    own = training.get("strokes") if isinstance(training, dict) else None
+    return getattr(policy, "num_timesteps", own)
+
+
+def require_length(name: str, policy: Policy, decisions: int | None) -> None:
+    """ValueError where a policy says that it learned for another number of decisions, beyond its last rollout."""
+    own = length_of(policy)
+    if decisions is not None and own is not None and abs(own - decisions) > 0.1 * decisions:
+        raise ValueError(f"{name} learned for {own:,} decisions: say --decisions {own}.")
+
+
 def measured(
     id: str, agent: str, names: Sequence[str], first: int = 0, threads: int | None = None,
     decisions: int | None = BUDGETS[0],
@@ -175,14 +189,17 @@ def measured(
     """Cells of an agent: what each of its policies reaches.
 
     names: Names of policies as of `load_agent`, such as one file for each seed. ValueError for one that does not fit.
-    decisions: Length of their trainings, which says in which table they are.
+    decisions: Length of their trainings, which says in which table they are. Rules have none, and what the package
+    brings its own; ValueError for a file that says a length more than a tenth away.
     """
     env, cells = env_of(id, task=task_of(id), split="test", fidelity=FIDELITY), list[Cell]()
     for seed, name in enumerate(names):
         policy = load_agent(name, env)
+        length = length_of(policy) if not (is_file(name) or is_function(name)) else decisions
+        require_length(name, policy, length)
         batch = make(id, EPISODES, "test", threads, actions=require_seen(policy, env))
         reached = swum(batch, policy, first)
-        cells.append(Cell(agent, track_of(policy), id, seed, contract(id), first, **reached, decisions=decisions))
+        cells.append(Cell(agent, track_of(policy), id, seed, contract(id), first, **reached, decisions=length))
     env.close()
     return cells
 

@@ -124,6 +124,20 @@ def test_results_join_those_of_a_folder_and_files_are_shown_by_ids(tmp_path, sca
     assert "nothing to show" in capsys.readouterr().err
 
 
+def pentagon(env):
+    return scripted("pentagon")
+
+
+OWN = pretrained("station").training["strokes"]
+
+
+@pytest.mark.parametrize("name, length", [("pentagon", None), ("station", OWN), (f"{__name__}:pentagon", 200_000)])
+def test_rules_have_no_length_and_what_the_package_brings_its_own(name, length, monkeypatch):
+    monkeypatch.setattr(benchmark, "swum", lambda *_: {"measure": [1.0], "returns": [1.0], "success": [True]})
+    (found,) = benchmark.measured(STATION, "mine", [name])
+    assert found.decisions == length
+
+
 REFUSED = {
     "leave out --seeds": ["--seeds", "10"], "leave out --path": ["--path", "pentagon"],
     "leave out --decision-period": ["--decision-period", "0.5"], "leave out --random-heading": ["--random-heading"],

@@ -56,6 +56,24 @@ def test_zips_of_several_seeds_are_one_row(story):
     assert (mine["agent"], learned["agent"], len(mine["returns"])) == ("mine", "learned", 3), story.told
 
 
+OWN_PERIOD = """
+import gymnasium as gym
+from stable_baselines3 import PPO
+
+from seastar_gym import Sight
+
+env = gym.make("SeastarSwim-v0", fidelity="fast", decision_period=0.2, sight=Sight())
+PPO("MlpPolicy", env, n_steps=8, batch_size=8, device="cpu").learn(8).save("mine.zip")
+"""
+
+
+def test_a_zip_swims_and_drives_at_the_period_that_it_learned_with(story):
+    story.runs(OWN_PERIOD)
+    story.types("seastar swim --agent mine.zip --sight pose --seconds 0.4 --film swim.gif")
+    story.types("seastar drive mine.zip --yes --no-window --unpaced --seconds 2")
+    assert "in 10 decisions" in story.told
+
+
 @pytest.mark.parametrize("seed", [0, 5])
 def test_a_loop_in_one_file_ends_with_a_policy_that_arrives(story, seed):
     story.has("loop.py", (ROOT / "examples/single_file_ppo.py").read_text("utf-8"))
