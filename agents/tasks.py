@@ -58,7 +58,7 @@ FAR_SEED = 10**6
 
 @dataclass(frozen=True)
 class Options:
-    """Train the bundled policy of every task, and write its card."""
+    """Train the bundled policy of every task, and write its card; with --benchmark, cells of the benchmark instead."""
 
     tasks: tuple[str, ...] = tuple(RECIPES)
     """Environments."""
