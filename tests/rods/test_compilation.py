@@ -402,26 +402,6 @@ def test_code_of_the_package_that_does_not_fit_never_runs(shipped, monkeypatch, 
     assert [shipped.call(), shipped.call()] == [COMPILED, FOUND]
 
 
-# Whoever waits is told
-
-NUMBERS = """
-import sys
-import numba
-numba.config.CACHE_DIR = sys.argv[1]
-sys.path.insert(0, sys.argv[2])
-from mine import number
-number(1.0), number(3), number(1j)
-"""
-
-
-def said(tmp_path: Path, cache: str, before: str = "") -> str:
-    """What a process whose standard error is a pipe writes there; before: Code that it runs first."""
-    (tmp_path / "mine.py").write_text(NUMBER, encoding="utf-8")
-    environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
-    command = [sys.executable, "-c", before + NUMBERS, str(tmp_path / cache), str(tmp_path)]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stderr
-
-
 # The digest
 
 
