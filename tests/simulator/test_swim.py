@@ -57,24 +57,6 @@ def test_schemes_agree_on_the_converged_distance_and_fidelities_are_as_far_off_a
     assert error > 5e-5 or path[0, 0, 0] == pytest.approx(one, rel=2e-5)
 
 
-# The pairs of Fig. 13.8
-
-PAIRS = np.array(
-    [[-1.0, 1.0, 0.0, 0.0, 0.0], [-1.0, 0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0, 1.0]]
-)
-BISECTORS = [36.0, 72.0, 108.0, 144.0]
-
-
-@pytest.mark.parametrize("robot, third_goes_farther", [(CHAPTER, False), (TEN, True)], ids=["chapter", "new"])
-def test_every_pair_of_figure_13_8_moves_along_its_bisector_and_1_4_goes_farthest(robot, third_goes_farther):
-    """That {1-,5+} goes farther than {1-,3+} is the chapter's discretisation, not mechanics."""
-    hub = swim(swimmer("implicit-midpoint", 0.5e-3, 4, robot=robot), PAIRS)[-1]
-    np.testing.assert_allclose(np.degrees(np.arctan2(hub[:, 1], hub[:, 0])), BISECTORS, rtol=0.0, atol=0.01)
-    minus_1_plus_2, minus_1_plus_3, minus_1_plus_4, minus_1_plus_5 = np.hypot(*hub.T)
-    assert minus_1_plus_4 > max(minus_1_plus_5, minus_1_plus_3) > min(minus_1_plus_5, minus_1_plus_3) > minus_1_plus_2
-    assert (minus_1_plus_3 > minus_1_plus_5) == third_goes_farther
-
-
 # Symmetry
 
 
