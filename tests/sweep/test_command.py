@@ -81,28 +81,6 @@ def test_a_search_from_words_to_its_best(tmp_path, capsys):
     assert (tmp_path / "somebody's").read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    "words, sentence",
-    [
-        (["robot.colour=1,2"], "nothing that a sweep can vary"),
-        (["robot.n_limbs="], "NAME=VALUES"),
-        (["robot=@nowhere.json"], "nowhere.json"),
-        (["--workers", "0"], "workers"),
-    ],
-)
-def test_bad_input_is_one_sentence(words, sentence, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    try:
-        code = main([*words, "--out", str(tmp_path / "out"), "--settling", "0", "--measured", "1"])
-        told = capsys.readouterr().err
-    except OSError as refused:  # of which `run_command` makes a sentence
-        code, told = 2, str(refused)
-    assert code == 2
-    last = told.strip().splitlines()[-1]
-    assert sentence in last
-    assert not list((tmp_path / "out").glob("parts/*/*"))
-
-
 def command(tmp_path, *words):
     seastar = "from seastar_gym.cli.main import run; run()"
     arguments = [sys.executable, "-c", seastar, "sweep", *words, "--out", str(tmp_path)]
