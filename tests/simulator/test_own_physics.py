@@ -99,11 +99,6 @@ def test_the_guard_knows_an_own_energy():
     assert after.sum() <= before.sum() + 1e-8 * after[1]
 
 
-def test_scenes_with_own_terms_and_schemes_come_back_from_plain_data():
-    scene = trapped(Trap(k=1 / 3, c=np.array([0.1, 1 / 7])))
-    assert Scene.from_dict(scene.to_dict()) == scene
-
-
 SOURCE = """
 from constants import RATE
 from seastar_gym.lanes.compile import kernel
