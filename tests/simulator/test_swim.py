@@ -8,6 +8,7 @@ import pytest
 
 from hubs import HUBS, TEN, robot_with
 from seastar_gym import AlongLimb, Numerics, Scene, Seastar, Simulator, SmaPulse, Stiffening, Vortex, Water
+from slopes import rotated
 
 CHAPTER = Seastar(discretisation="chapter")
 SCHEMES = ["implicit-euler", "sdirk2", "implicit-midpoint"]
@@ -64,11 +65,6 @@ def random_commands(n_robots: int, n_limbs: int = 5) -> np.ndarray:
     return np.random.default_rng(4).uniform(-1.0, 1.0, (2, n_robots, n_limbs))
 
 
-def turned(vectors: np.ndarray, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return vectors @ np.array([[c, s], [-s, c]])
-
-
 BENT = Seastar(nodes_per_limb=6, along=AlongLimb(0.8, (1.0, 0.5)), stiffening=Stiffening())
 PENTAGONS = {
     **{f"{scheme}, {hub}": (scheme, robot_with(hub), 1e-13) for scheme in SCHEMES for hub in HUBS},
@@ -91,7 +87,7 @@ def test_commanding_the_next_limb_turns_the_swim_by_72_degrees_and_mirrored_comm
         return np.concatenate([plain[:, :1], limbs.reshape(8, -1, 2)], axis=1)
 
     assert np.abs(plain - robot.nodes()).max() > 1e-3
-    expected = turned(moved([4, 0, 1, 2, 3]), FIFTH_OF_TURN)
+    expected = rotated(moved([4, 0, 1, 2, 3]), FIFTH_OF_TURN)
     np.testing.assert_allclose(next_limb, expected, rtol=0.0, atol=rounding)
     np.testing.assert_allclose(mirrored, moved(mirror) * [1.0, -1.0], rtol=0.0, atol=rounding)
 
@@ -126,7 +122,7 @@ def end_of_a_stroke(scene: Scene, scheme: str, commands: tuple[float, ...], n_st
     if scene is BENDING:
         nodes, arc = robot.nodes(), np.arange(1, 4) * robot.edge_length
         bent = np.stack([np.sin(3.0 * arc) / 3.0, (1.0 - np.cos(3.0 * arc)) / 3.0], axis=1)
-        nodes[1:] = np.concatenate([turned(bent, limb * robot.opening_angle) for limb in range(3)])
+        nodes[1:] = np.concatenate([rotated(bent, limb * robot.opening_angle) for limb in range(3)])
         simulator.set_state((nodes[None], np.tile([0.3, 0.1], (1, robot.n_nodes, 1)), np.zeros(1)))
     report = simulator.stroke([commands])
     assert report.status[0] == 0 and report.halvings[0] == 0
