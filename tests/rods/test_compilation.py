@@ -116,21 +116,6 @@ def test_a_process_that_is_killed_while_it_compiles_lets_the_others_go_on(copy):
     assert second.communicate()[0].split() == ["makes", "b'code'"]
 
 
-def test_code_of_another_lane_width_is_another_code(copy):
-    results = [copy.run(SEASTAR_LANES=width) for width in ("2", "4")]
-    assert [misses for _, _, misses in results] == [1, 1]
-    assert len({energy for energy, _, _ in results}) == 1
-
-
-def test_an_edited_entry_point_outside_the_package_does_not_run_from_the_cache_either(copy):
-    module = copy.folder / "mine.py"
-    body = "from seastar_gym.lanes.compile import entry_point\n\n\n@entry_point\ndef number():\n    return {}\n"
-    module.write_text(body.format(1.5), encoding="utf-8")
-    assert copy.run("import mine; print(mine.number())") == [1.5]
-    module.write_text(body.format(2.5), encoding="utf-8")
-    assert copy.run("import mine; print(mine.number())") == [2.5]
-
-
 NUMBER = """
 from seastar_gym.lanes.compile import entry_point
 

@@ -59,6 +59,7 @@ MAKING = [
     (partial(on_body, PLATE, (0.03, 0.015, 1.0), (-0.03, 0.0, math.pi), bend=45.0), "limb 1 touches the body"),
     # Fluids
     (partial(GridCurrent, (0.0, 0.0), 0.1, np.zeros((1, 2, 2))), "velocities", "(1, 2, 2)"),
+    (partial(GridCurrent, (0.0, 0.0), 0.1, np.full((2, 2, 2), np.nan)), "velocities", "finite"),
     (partial(GridCurrent.from_function, swirl, (0.0, 0.0), (0.0, 1.0), 0.1), "x", "spacing apart"),
     (partial(GridCurrent.from_function, swirl, (0.0, 1e4), (0.0, 1e4), 0.1), "points", "larger spacing"),
     # The continuum, and limbs that bend along their length
