@@ -20,6 +20,7 @@ from seastar_gym.envs.stations import (
     stations_of,
     weights,
 )
+from slopes import rotated
 
 ORIGIN = np.zeros(2)
 
@@ -186,8 +187,7 @@ def test_stations_begin_at_the_roots_of_straight_limbs_and_the_heading_turns_wit
     robot, ten, angle = (*(Seastar(4 if body else 5, nodes, body=body) for nodes in (n, 10)), 2.5)
     rest = at_stations(robot.nodes(), robot, np.zeros(()))
     np.testing.assert_allclose(rest, ten.nodes(), rtol=0.0, atol=1e-15)
-    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    turned = robot.nodes() @ turn + [3.0, -1.0]
+    turned = rotated(robot.nodes(), angle) + [3.0, -1.0]
     for orientation in (None, np.array([angle])):
         np.testing.assert_allclose(body_heading(turned[None], robot, orientation), angle, atol=1e-13)
 

@@ -8,7 +8,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from episodes import break_robot
 from refusals import assert_refused
 from seastar_gym import (
     Body,
@@ -17,7 +16,6 @@ from seastar_gym import (
     Scene,
     Seastar,
     SmaWires,
-    SolverStatus,
     ThermalSma,
     Uniform,
 )
@@ -160,28 +158,6 @@ def test_an_episode_is_over_with_success_at_the_last_waypoint():
         env.step(STRAIGHT)
     env.reset()
     assert env.step(STRAIGHT)[2] is False
-
-
-# Failure
-
-
-@pytest.mark.parametrize("status", [SolverStatus.NOT_CONVERGED, SolverStatus.NOT_FINITE])
-def test_a_solver_that_gives_up_ends_the_episode_with_a_status_and_a_sentence(status):
-    env, fresh = fast(), fast()
-    env.reset(seed=0), fresh.reset(seed=0)
-    break_robot(env, status)
-    observation, reward, terminated, truncated, info = env.step(STRAIGHT)
-    assert terminated is True and truncated is False
-    assert SolverStatus(info["solver_status"]) is status
-    assert "solver_message" not in info and status.sentence.endswith(".")
-    assert info["is_success"] is False
-    assert np.isfinite(observation).all() and np.isfinite(reward)
-    no_numbers = ("energy_per_metre",)  # a robot that makes no way has no energy per metre of it
-    assert all(np.isfinite(value).all() for name, value in info.items() if name not in no_numbers)
-    with pytest.raises(gym.error.ResetNeeded):
-        env.step(STRAIGHT)
-    env.reset(seed=0)
-    np.testing.assert_array_equal(env.step(STRAIGHT)[0], fresh.step(STRAIGHT)[0])
 
 
 # Pictures

@@ -203,6 +203,3 @@ def test_the_command_takes_a_scene_with_its_own_steps_or_those_it_is_given(tmp_p
     for line in (own[:2], own, [*own, "--step", "0.02"]):
         assert main(line) == 2
     assert steps == [0.005, 0.01, 0.02]
-    for line in ([], ["path.csv"]):
-        with pytest.raises(SystemExit):
-            main(line)

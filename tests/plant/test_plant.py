@@ -11,18 +11,15 @@ import tty
 from collections import deque
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from evaluation import made_up
 from faults import LIES, Tank
 from refusals import assert_refused
 from seastar_gym import Body, DomainRandomization, Scene, Seastar, Sight, Simulator, SmaPulse, SmaWires, Uniform, files
 from seastar_gym.cli import drive as drive_command
-from seastar_gym.cli.drive import report
 from seastar_gym.cli.main import main
 from seastar_gym.controllers.open_loop import OpenLoopPolicy
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -440,17 +437,6 @@ def test_an_interrupted_drive_stops_the_wires(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         drive(tmp_path, "--yes")
     assert not plants[-1].heated().any()
-
-
-def test_the_report_of_a_drive_is_as_kept(golden, tmp_path):
-    (tmp_path / "poses.csv").write_text("captured,received,x,y,turn\n0,0.05,0,0,0\n0.03,0.09,0,0,0\n0.13,0.17,0,0,0\n")
-    options = SimpleNamespace(out=tmp_path, policy="straight", plant="serial:/dev/ttyACM0")
-    planned, swum, _ = made_up.swims()
-    envs = [
-        SimpleNamespace(stopped=stopped, latest=0.0123, dropped_pictures=3, decision_period=0.5)
-        for stopped in ("", "No new picture.")
-    ]
-    golden("report.md", "\n".join(report(options, planned, swum, env) for env in envs))
 
 
 @pytest.mark.parametrize(

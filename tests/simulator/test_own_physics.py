@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from own_terms import Trap
+from refusals import assert_refused
 from seastar_gym import Body, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, register_scheme, register_term
 from seastar_gym.envs.symmetry import require_symmetry
 from seastar_gym.gradients import differentiate
@@ -172,7 +173,7 @@ REFUSED = {
     "a list": (
         swims(wrong(None, lambda c, x, y: (0.5 * c * x * x, [c * x, 0.0 * y], (c, 0.0, 0.0)))), "does not compile: ",
     ),
-    "a power": (swims(wrong(lambda c, x, y: (0.5 * c * x**2, (c * x, 0.0), (c, 0.0, 0.0)))), "for \\*\\* or pow"),
+    "a power": (swims(wrong(lambda c, x, y: (0.5 * c * x**2, (c * x, 0.0), (c, 0.0, 0.0)))), "for ** or pow"),
     "an infinite one": (
         swims(wrong(lambda c, x, y: (c / x, (-c / (x * x), 0.0 * y), (2.0 * c / (x * x * x), 0.0 * c, 0.0 * c)))),
         "is not finite where both",
@@ -202,10 +203,8 @@ REFUSED = {
 
 @pytest.mark.parametrize(("call", "sentence"), REFUSED.values(), ids=REFUSED)
 def test_what_cannot_be_done_is_said_in_a_sentence(call, sentence):
-    with pytest.raises(ValueError, match=sentence) as refused:
+    with assert_refused(sentence):
         call()
-    assert str(refused.value).endswith(".")
-    assert "\n" not in str(refused.value)
 
 
 def test_error_bars_know_own_terms():

@@ -13,7 +13,7 @@ from seastar_gym.command import INTERRUPTED
 from seastar_gym.scene import Scene, Seastar
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.scene.serial import to_dict
-from seastar_gym.sweep.command import as_text, axis_of, main
+from seastar_gym.sweep.command import axis_of, main
 from seastar_gym.sweep.designs import Choices, Range
 from seastar_gym.sweep.run import Progress, ResultFiles, read_results
 
@@ -118,12 +118,6 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path, monkeypatch):
     monkeypatch.setattr("seastar_gym.sweep.command.bar_of", lambda *_: interrupt)
     assert main([*words[:-2], "--executor", "here", "--out", str(tmp_path)]) == INTERRUPTED
     assert {*kept} == {len(names)} and len(names | {*ResultFiles(tmp_path).names()}) == len(names) + 3
-
-
-def test_what_was_done_is_told_with_what_was_not(golden):
-    told = {"kept": 2, "done": 1, "designs": 1234}
-    some = Progress(**told, problems={"0123456789": "Lost."}), Progress(**told, damaged=[Path("a"), Path("b")])
-    golden("told.txt", "\n".join(as_text(tally, Path("out")) for tally in some))
 
 
 @pytest.mark.parametrize("problems, code", [({}, 0), ({"cell": "Lost."}, 1)])
