@@ -1,6 +1,6 @@
 """Measurements of the simulator and of learning: `python -m studies` lists them, `python -m studies NAME` runs one.
 
-They need the extra `studies`, those of `learning` also the extra `train`.
+They need the extra `studies`, that of `methods` also the extra `train`.
 """
 
 import os

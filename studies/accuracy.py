@@ -289,27 +289,14 @@ def fresh(results: Results, only: Iterable[str], samples: int) -> None:
     """Swim fresh sequences, and keep how many exceed what is promised, and the largest over it."""
     for name in only:
         found = exceeding(name, samples)
-        results[name] = {
-            fidelity: {
-                each: [int((off > 1.0).sum()), off.size, rounded(float(off.max()), 2)] for each, off in by.items()
-            }
-            for fidelity, by in found.items()
-        }
+        results[name] = {fidelity: {each: told_of(off) for each, off in by.items()} for fidelity, by in found.items()}
         results.update(results.about)
         results.save()
-        show(fresh_table(results, name), f"{name}: beyond the promise, of how many, and the largest over it")
 
 
 def told_of(off: Floats) -> list[float]:
     """How many are beyond the promise, of how many, and the largest over it."""
     return [int((off > 1.0).sum()), off.size, rounded(float(off.max()), 2)]
-
-
-def fresh_table(results: Mapping[str, Any], name: str) -> str:
-    """Fresh swims beyond the promise by class."""
-    rows = [[f"`{fidelity}`", *(f"{out} of {n}, {most:g}" for out, n, most in by.values())]
-            for fidelity, by in results[name].items()]  # fmt: skip
-    return markdown(["fidelity", *next(iter(results[name].values()))], rows)
 
 
 def fresh_summary(results: Mapping[str, Any]) -> str:
@@ -443,27 +430,15 @@ def presets(_: object) -> str:
     return markdown(head, rows)
 
 
-def by_class(_: object, names: Sequence[str], fidelities: Iterable[Fidelity] = tuple(PURPOSES)) -> str:
-    """Errors of presets by class of commands, of strokes or of decisions."""
-    classes = certificate_of(names[0]).settings[0].errors
+def by_class(_: object) -> str:
+    """Errors of presets by class of decisions, and by the damping of limbs."""
+    classes = certificate_of(SAID[0][0]).settings[0].errors
     rows = [
-        [f"`{fidelity}`", *([dict(SAID)[name]] if name in dict(SAID) else []),
-         *(percent(known.errors[each], known.typical[each]).replace(" %", "") for each in classes)]
-        for name in names for fidelity in fidelities for known in [in_table(fidelity, name)]
+        [f"`{fidelity}`", said, *(percent(known.errors[each], known.typical[each]).replace(" %", "")
+                                  for each in classes)]
+        for name, said in SAID for fidelity in DETAILED for known in [in_table(fidelity, name)]
     ]  # fmt: skip
-    damping = ["damping"] if names[0] in dict(SAID) else []
-    return markdown(["fidelity", *damping, *(f"{each} [%]" for each in classes)], rows, range(1 + len(damping)))
-
-
-def by_period(_: object) -> str:
-    """Largest errors of all classes of decisions, by the time between them [s]."""
-    rows = []
-    for name, said in SAID:
-        of_periods = certificate_of(name).measured_over["largest and median by period"]
-        for fidelity in PURPOSES:
-            found = [max(of_period[fidelity][0].values()) for of_period in of_periods.values()]
-            rows.append([f"`{fidelity}`", said, *(percent(each).replace(" %", "") for each in found)])
-    return markdown(["fidelity", "damping", *(f"{each} s [%]" for each in of_periods)], rows, (0, 1))
+    return markdown(["fidelity", "damping", *(f"{each} [%]" for each in classes)], rows, (0, 1))
 
 
 @dataclass(frozen=True)
@@ -515,9 +490,7 @@ def run(options: Options, results: Results) -> None:
 STUDY = Study(
     "accuracy", run, Options, file="accuracy/fresh.json",
     tables={
-        "errors": readme, "choosing": choosing, "presets": presets, "periods": by_period,
-        "strokes": partial(by_class, names=("strokes",)),
-        "timed": partial(by_class, names=("wires", "undamped"), fidelities=DETAILED),
+        "errors": readme, "choosing": choosing, "presets": presets, "timed": by_class,
         "robots": robots_table, "fresh": fresh_summary,
     },
 )  # fmt: skip

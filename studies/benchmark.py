@@ -367,15 +367,6 @@ def figures(results: Mapping[str, Any]) -> str:
     return markdown(["what", "median", "unit", "middle half"], rows, (0, 2))
 
 
-def table(results: Mapping[str, Any]) -> str:
-    """Table in Markdown of the first run of the history and of the last."""
-    runs = list(results["runs"].items())
-    told = [f"{date} (`{run['commit']}`)" for date, run in (runs[0], runs[-1])]
-    before, now = (run["ratios"] for _, run in (runs[0], runs[-1]))
-    rows = [(name, f"{before[name]:,.3g}", f"{now[name]:,.3g}", f"{now[name] / before[name]:.2f}") for name in now]
-    return markdown(["what", *told, "last over first"], rows)
-
-
 def draw(results: Mapping[str, Any], path: Path) -> None:
     """Draw every thing as a bar: its time in the last run over that in the first."""
     runs = list(results["runs"].items())
@@ -394,5 +385,5 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
 
 STUDY = Study(
     "benchmark", run, Options, "speed/speed_history.json", settings=lambda _: UNIT,
-    pictures={"speed_history.png": draw}, tables={"speed history": table, "speed figures": figures},
+    pictures={"speed_history.png": draw}, tables={"speed figures": figures},
 )  # fmt: skip

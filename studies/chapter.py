@@ -7,7 +7,6 @@ with 73 nodes, too. The statements are printed; distances and motions are writte
 
 from __future__ import annotations
 
-import time as clock
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,6 +21,7 @@ from seastar_gym.files import save_figure
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator, SolverStatus
+from studies.benchmark import real_time_factors
 from studies.frame import Floats, Results, Study, rounded
 from studies.pages import markdown, show
 from studies.style import FAINT, INK, MM, MS, new_figure, subplots
@@ -148,21 +148,6 @@ class Cost(NamedTuple):
     regularised: NDArray[np.bool_]
 
 
-def computing_time(scene: Scene, n_robots: int, seconds: float) -> float:
-    """Computing over simulated time per robot on one thread, in the shortest stroke of so many seconds.
-
-    The shortest one counts, because other work of the machine can only add time.
-    """
-    simulator, commands = Simulator(scene, n_robots, threads=1), np.tile(STRAIGHT, (n_robots, 1))
-    found: list[float] = []
-    simulator.stroke(commands)
-    while sum(found) < seconds or len(found) < 3:
-        began = clock.perf_counter()
-        simulator.stroke(commands)
-        found.append(clock.perf_counter() - began)
-    return min(found) / scene.actuator.period / n_robots
-
-
 def needs_regularisation(scene: Scene) -> bool:
     """Whether Newton's matrix is indefinite in some step of ten strokes of the straight swim."""
     simulator = Simulator(scene)
@@ -174,7 +159,7 @@ def measure_cost(robot: Seastar, steps: Floats, seconds: float, progress: Callab
     rows = []
     for step in steps:
         scene = Scene(robot, numerics=Numerics("implicit-euler", float(step)))
-        times = (computing_time(scene, n, seconds) for n in (1, BATCH))
+        times = (1.0 / max(real_time_factors(scene, n, seconds)) for n in (1, BATCH))  # other work only adds time
         rows.append((step, *times, needs_regularisation(scene)))
         progress()
     steps, alone, in_batch, regularised = map(np.array, zip(*rows, strict=True))

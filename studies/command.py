@@ -17,7 +17,7 @@ from typing import Any
 
 import tyro
 
-from seastar_gym.files import require_extra, write_atomically
+from seastar_gym.files import write_atomically
 from studies.frame import Results, Study, require_known
 from studies.pages import show, stale
 from studies.provenance import provenance
@@ -43,10 +43,8 @@ def run(study: Study, doc: str, given: Sequence[str]) -> str | None:
     parser.add_argument("--out", type=Path, default=study.default_out)
     asked, rest = parser.parse_known_args(given) if study.options else (parser.parse_args(given), [])
     options = (tyro.cli(study.options, prog=prog, description=doc, args=rest),) if study.options else ()
-    if study.extra:
-        require_extra(f"Runs of {prog}", study.extra, *study.packages)
     file = asked.out / Path(study.file).name if study.file else None
-    about = provenance(shlex.join([*prog.split(), *rest]), *study.packages)
+    about = provenance(shlex.join([*prog.split(), *rest]))
     results = Results(about, file, study.settings(*options) if study.settings else None, asked.out)
     failed = study.run(*options, results)
     if file is not None and results.keys() - {"settings"}:

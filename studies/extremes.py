@@ -1,11 +1,8 @@
 """Fidelities in extreme scenes: whole strokes of random commands in the scenes of the atlas of `studies.stability`.
 
 Every fidelity has its own nodes and numerics. Robots begin at rest, or with random velocities or shifts of their nodes.
-
-    python -m studies.extremes
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -17,7 +14,6 @@ from seastar_gym.scene.numerics import PRESETS, Fidelity
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.drive import step_times
 from studies.frame import Results, Study, rounded
-from studies.pages import markdown
 from studies.stability import SWEEPS, Case, disturb
 
 STROKES = 3
@@ -59,15 +55,4 @@ def run(results: Results) -> None:
     results.fill({("fidelities", each): partial(swum, each) for each in fidelities}, str)
 
 
-def table(results: Mapping[str, Any]) -> str:
-    """Fidelities in Markdown."""
-    columns = ["fidelity", "scenes", "robots", "failed", "strokes", "with halved steps", "iterations per step (most)"]
-    rows = [
-        [f"`{name}`", *(f"{of[key]:,}" for key in ("scenes", "robots", "failed", "strokes", "halved")),
-         f"{of['iterations']:.2g} ({of['most']:.0f})"]
-        for name, of in results["fidelities"].items()
-    ]  # fmt: skip
-    return markdown(columns, rows)
-
-
-STUDY = Study("extremes", run, file="stability/extremes.json", settings=dict, tables={"extremes": table})
+STUDY = Study("extremes", run, file="stability/extremes.json", settings=dict)

@@ -29,7 +29,6 @@ class Study:
     settings: What all numbers of a file have in common, of the options if there are any. A study that tells it resumes.
     pictures: By their names, how they are drawn from the numbers into a file beside them.
     tables: By the names that pages give them, tables in Markdown.
-    packages: Packages whose versions count, beside those of every study. extra: What brings them.
     """
 
     name: str
@@ -40,8 +39,6 @@ class Study:
     settings: Callable[..., Mapping[str, Any]] | None = None
     pictures: Mapping[str, Callable[[Any, Path], None]] = field(default_factory=dict)
     tables: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
-    packages: tuple[str, ...] = ()
-    extra: str = ""
 
     @property
     def default_out(self) -> Path:

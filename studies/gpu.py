@@ -1,4 +1,4 @@
-"""Robots on a GPU: the bits of the processor, speed over the size of the batch, and a learner.
+"""Robots on a GPU: the bits of the processor, and speed over the size of the batch.
 
 Every scene is swum on the processor and on the device with the same random commands, and compared to the last bit.
 So are environments whose observations stay on the device.
@@ -56,8 +56,6 @@ N_ROBOTS, N_STROKES = 64, 3
 """Robots that are compared with the processor's, and their strokes."""
 EVERYTHING = "all, a body, bent along, contact"
 ON_DEVICE = "cuda, observations left there"
-LEARNER: dict[str, Any] = {"n_steps": 8, "batch_size": 8192, "n_epochs": 4}
-ROBOTS_OF_LEARNER, ROUNDS_OF_LEARNER = 4096, 4
 ROBOTS_OBSERVED, EPISODE = 35, 3
 """Robots of an environment that is compared, and decisions of its episodes."""
 NOT_ON_DEVICES = "energy_growth"
@@ -266,24 +264,6 @@ def decisions(device: str, on_device: bool = False) -> dict[str, float]:
     return {"decisions_per_second": rounded(3 * DECIDING / seconds), "robots": DECIDING}
 
 
-def learning(device: str) -> dict[str, float]:
-    """Decisions per second of Stable-Baselines3's PPO with its update, on the device's robots."""
-    import torch
-    from stable_baselines3 import PPO
-
-    from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-
-    batch = batch_on(device, ROBOTS_OF_LEARNER, actions="pairs", autoreset_mode="SameStep")
-    on_gpu = torch.cuda.is_available() and device == "cuda"
-    model = PPO("MlpPolicy", BatchVecEnv(batch), seed=0, device="cuda" if on_gpu else "cpu", **LEARNER)
-    per_round = LEARNER["n_steps"] * ROBOTS_OF_LEARNER
-    model.learn(per_round)
-    began = time.perf_counter()
-    model.learn(ROUNDS_OF_LEARNER * per_round)
-    seconds = time.perf_counter() - began
-    return {"decisions_per_second": rounded(ROUNDS_OF_LEARNER * per_round / seconds), "robots": ROBOTS_OF_LEARNER}
-
-
 def gpu() -> dict[str, Any]:
     """The GPU: its name, its driver's version, and CuPy's."""
     arrays = cuda.arrays()
@@ -334,7 +314,6 @@ def measure(results: Results) -> None:
             name = f"{preset}{', contact' * contact}"
             cells["speed", name, device] = partial(batches, preset, contact, device)
         cells["environment", device] = partial(decisions, device)
-        cells["learner", device] = partial(learning, device)
     results.fill(cells, str)
 
 

@@ -1,11 +1,8 @@
 """What policies lose to delays, noise and softer limbs, one change at a time: those that see everything, and that of
 `SimToReal`, which sees what a camera sees.
 
-    python -m studies.robustness
-
 The bundled policies swim held-out random paths at "fast", all in the same robots, under one condition after the other.
-Ten more trainings say what a seed makes of the policy for the camera. A swim that does not arrive within the limit
-counts with the limit.
+A swim that does not arrive within the limit counts with the limit.
 """
 
 from collections.abc import Callable, Mapping
@@ -33,8 +30,6 @@ PERIODS: dict[str, float | None] = {"1 s": None, "0.5 s": 0.5, "0.2 s": 0.2, CAM
 """Time between decisions [s], None for strokes, by what the table calls it."""
 RATE = 20.0
 """Pictures per second [Hz]: decisions and delays are whole multiples of the time between two."""
-ID = "SeastarSwimSimToReal-v0"
-SEEDS = range(10)
 
 
 @dataclass(frozen=True)
@@ -64,8 +59,6 @@ CONDITIONS = {
     "modulus x 0.5": Condition(modulus=0.5),
     "camera delay 100 ms, modulus x 0.7": Condition(delay=0.1, modulus=0.7),
 }
-OF_SEEDS = ("camera delay 50 ms", "camera delay 100 ms", "camera delay 150 ms", "camera delay 100 ms, modulus x 0.7")
-"""Conditions that are told of every seed."""
 
 
 class Seeing:
@@ -113,15 +106,6 @@ def examine(name: str, condition: Condition) -> dict[str, Any] | None:
     return swum(Seeing(load(bundled_file(period)), condition, layout), condition, period, "nodes")
 
 
-def examine_seed(seed: int) -> dict[str, Any]:
-    """Mean times [s] of a training for the camera by condition, and how many arrive."""
-    from agents.distillation import ENOUGH
-    from agents.tasks import imitate
-
-    policy = imitate(ID, seed, ENOUGH, FIDELITY, None)
-    return {name: swum(policy, CONDITIONS[name], PERIODS[CAMERA], "pose") for name in OF_SEEDS}
-
-
 def table(results: Mapping[str, Any]) -> str:
     """Mean times, and how many arrive where not all do."""
     lines = []
@@ -135,16 +119,6 @@ def table(results: Mapping[str, Any]) -> str:
     return markdown(["", *(f"every {column}" for column in PERIODS)], lines)
 
 
-def seeds(results: Mapping[str, Any]) -> str:
-    """Mean times of ten trainings for the camera: smallest, mean and largest."""
-    lines = []
-    for name in OF_SEEDS:
-        found = [one[name] for one in results["seeds"].values()]
-        means, lost = [one["mean"] for one in found], sum(N_PATHS - one["arrived"] for one in found)
-        lines.append([name, f"{min(means):.1f}", f"{np.mean(means):.1f}", f"{max(means):.1f}", str(lost)])
-    return markdown(["", "best seed [s]", "mean [s]", "worst seed [s]", "swims that do not arrive"], lines)
-
-
 def run(results: Results) -> None:
     """Swim what is missing."""
     results.read()
@@ -154,13 +128,6 @@ def run(results: Results) -> None:
         for name, condition in CONDITIONS.items()
     }
     results.fill(cells, lambda found: "does not apply" if found is None else f"{found['mean']:.1f} s")
-    trainings: dict[tuple[str, ...], Callable[[], Any]] = {
-        ("seeds", str(seed)): partial(examine_seed, seed) for seed in SEEDS
-    }
-    results.fill(trainings, lambda found: f"{found[OF_SEEDS[0]]['mean']:.1f} s")
 
 
-STUDY = Study(
-    "robustness", run, file="plant/robustness.json", tables={"robustness": table, "robustness seeds": seeds},
-    packages=("torch",), extra="train",
-)  # fmt: skip
+STUDY = Study("robustness", run, file="plant/robustness.json", tables={"robustness": table})

@@ -12,6 +12,7 @@ import numpy as np
 import oracle
 from continuum_oracle import Continuum
 from oracle import Array, Clamp
+from slopes import rotated
 
 
 class Apart(Continuum):
@@ -33,11 +34,6 @@ class Apart(Continuum):
         masses = np.array(self.density * np.pi * self.rod_radius**2 * self.voronoi_lengths)
         masses[[self.node(limb, 0) for limb in range(self.n_limbs)]] = 0.0
         return masses
-
-
-def turned(angle: float, points: Array) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    return points @ np.array([[c, s], [-s, c]])
 
 
 def crossed(points: Array) -> Array:
@@ -67,12 +63,12 @@ class Rigid:
     def places(self, u: Array) -> Array:
         """Positions of nodes and roots [m]."""
         nodes = u[:-1].reshape(-1, 2)
-        return np.concatenate([nodes, nodes[0] + turned(u[-1], self.arms)])
+        return np.concatenate([nodes, nodes[0] + rotated(self.arms, u[-1])])
 
     def rates(self, u: Array, rate: Array) -> Array:
         """Velocities of nodes and roots [m/s]."""
         nodes = rate[:-1].reshape(-1, 2)
-        return np.concatenate([nodes, nodes[0] + rate[-1] * crossed(turned(u[-1], self.arms))])
+        return np.concatenate([nodes, nodes[0] + rate[-1] * crossed(rotated(self.arms, u[-1]))])
 
     def directions_of_roots(self, q: Array) -> Array:
         e = oracle.edge_vectors(self.star, q)
@@ -87,7 +83,7 @@ class Rigid:
         star = self.star
         guess = (first - u_hat) / gamma
         omega = guess[-1]
-        arms, frozen = turned(first[-1], self.arms), self.places(first)
+        arms, frozen = rotated(self.arms, first[-1]), self.places(first)
         q, q_hat = self.places(u), self.places(u_hat)
         # Where roots would have come from, straight on with the velocities of the guess, and what they should have.
         from_where = frozen - gamma * self.rates(first, guess)
@@ -113,20 +109,20 @@ class Rigid:
         """Inertia, drag and weight of the body itself [J]."""
         rate, guess = (u - u_hat) / gamma, (first - u_hat) / gamma
         d, turn, omega = (rate - v_hat)[:2], (rate - v_hat)[-1], guess[-1]
-        S = turned(first[-1], self.moment)
+        S = rotated(self.moment, first[-1])
         total = 0.5 * self.mass * d @ d + 0.5 * self.inertia * turn**2 + turn * d @ crossed(S)
         total -= gamma * omega**2 * d @ S
         u_fluid = np.zeros(2) if self.star.current is None else self.star.current(first[:2][None])[0]
         w, w_guess = rate[:2] - u_fluid, guess[:2] - u_fluid
-        R = turned(first[-1], np.eye(2)).T
+        R = rotated(np.eye(2), first[-1]).T
         P = R @ self.added_mass @ R.T
         K = np.array([[0.0, -1.0], [1.0, 0.0]])
         P_turns = K @ P - P @ K
         total += 0.5 * d @ P @ d + gamma * omega * d @ P_turns @ w_guess
         total -= gamma * turn * 0.5 * w_guess @ P_turns @ w_guess
-        flows = turned(first[-1], self.strips[:, :2]) @ w + self.strips[:, 2] * rate[-1]
+        flows = rotated(self.strips[:, :2], first[-1]) @ w + self.strips[:, 2] * rate[-1]
         total += gamma * (self.isotropic * np.linalg.norm(w) ** 3 + self.strips[:, 3] @ np.abs(flows) ** 3) / 3.0
-        fallen = turned(u[-1], self.weight_moment) - turned(u_hat[-1], self.weight_moment)
+        fallen = rotated(self.weight_moment, u[-1]) - rotated(self.weight_moment, u_hat[-1])
         return float(total - self.fall @ fallen - gamma * self.weight * self.fall @ d)
 
 
@@ -162,12 +158,12 @@ class Touching(Rigid):
 
     def points(self, u: Array) -> Array:
         """Places, then corners [m]."""
-        return np.concatenate([self.places(u), u[:2] + turned(u[-1], self.corners)])
+        return np.concatenate([self.places(u), u[:2] + rotated(self.corners, u[-1])])
 
     def looked_at(self, u: Array, u_hat: Array, v_hat: Array, gamma: float) -> Array:
         if not self.ahead:
             return self.points(u)
-        rates = v_hat[-1] * crossed(turned(u_hat[-1], np.concatenate([self.arms, self.corners])))
+        rates = v_hat[-1] * crossed(rotated(np.concatenate([self.arms, self.corners]), u_hat[-1]))
         velocities = np.concatenate([v_hat[:-1].reshape(-1, 2), v_hat[:2] + rates])
         return self.points(u_hat) + 4.0 * (self.points(u) - self.points(u_hat)) - gamma * velocities
 

@@ -75,12 +75,12 @@ class Heated:
 
 
 class Tank:
-    """Wires that are heated as told, and a tracker; the clock may be shifted."""
+    """Wires that are heated as told, and a tracker; the clock may be shifted, and the times of pictures lag behind."""
 
     n_limbs = 5
 
     def __init__(self):
-        self.time, self.shift, self.seen_until, self.fails = 0.0, 0.0, np.inf, None
+        self.time, self.shift, self.lag, self.seen_until, self.fails = 0.0, 0.0, 0.0, np.inf, None
         self.heated = Heated()
 
     def now(self):
@@ -93,7 +93,7 @@ class Tank:
         if self.fails is not None:
             raise self.fails
         taken_at = np.floor(min(self.time, self.seen_until) * 50.0) / 50.0
-        return Sighting(float(taken_at), self.now(), (1e-9 * float(taken_at), 0.0, 0.0))
+        return Sighting(float(taken_at) - self.lag, self.now(), (1e-9 * float(taken_at), 0.0, 0.0))
 
     def heat(self, limbs, seconds):
         for limb, sign in enumerate(limbs):

@@ -98,7 +98,7 @@ def outcome(call, arguments):
         return REFUSED if is_our_own(refused) else f"deep inside: {text!r}"
     except OSError as refused:
         return REFUSED if refused.errno is not None else f"no sentence: {refused!r}"
-    except Exception as other:
+    except Exception as other:  # what is no refusal is told, so that it fails its test
         return f"{type(other).__name__}: {other}"
     return TAKEN
 

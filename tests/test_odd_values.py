@@ -1,6 +1,5 @@
 """Whatever is given as an argument is taken, as a file says, or refused with a ValueError of one sentence."""
 
-import inspect
 import time
 
 import numpy as np
@@ -30,8 +29,7 @@ def calls_of(name):
     if name not in TOP_LEVEL:
         return [(call, arguments) for known, call, arguments in documented.calls() if known == name]
     call, arguments = TOP_LEVEL[name]
-    others = [each for each in inspect.signature(call).parameters.values() if each.kind is not each.VAR_KEYWORD]
-    return [(call, {each.name: each.default for each in others} | arguments)]
+    return [(call, documented.complete(call, arguments))]
 
 
 @pytest.fixture(autouse=True)

@@ -183,19 +183,6 @@ def test_no_table_stands_on_two_pages():
     assert [*repeated(texts)] == []
 
 
-HEAD = "| n | [m] | [s] |\n|---|---:|---:|\n"
-
-
-@pytest.mark.parametrize(
-    "copy", ["| `a` | 1.50 | 3 |\n| [b](c1.md) | **2** | -4 s |", "| 1.5 | 3 | x |\n| 2.0, -4 | y |"]
-)
-def test_a_table_that_is_copied_is_found(copy):
-    kept = f"# One\n\n{HEAD}| a | 1.5 | 3 |\n| b | 2 | -4 |\n| c | 3 | 5 |\n"
-    found = [*repeated({"one.md": kept, "two.md": f"{HEAD}{copy}\n| d | 7 | 8 |\n"})]
-    assert found == [("one.md", "two.md", (1.5, 3.0))]
-    assert [*repeated({"one.md": kept, "two.md": f"{HEAD}| a | 1.5 | 3 |\n| b | 2 | 4 |\n"})] == []
-
-
 # Pages that are made when the site is built
 
 SECTIONS = ["Description", "Action Space", "Observation Space", "Rewards", "Starting State", "Episode End", "Info",

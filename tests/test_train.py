@@ -95,8 +95,6 @@ def test_a_robot_of_a_file_is_trained_compared_and_continued(tmp_path, capsys, s
         ("no_such.py", None, "no_such.py is no file."),
         (None, "[1, 2]", "must be JSON such as"),
         (None, '{"robot.youngs_modulus": 1e6}', "must be JSON such as"),
-        (None, '{"robot.youngs_modulus": [2e6, 1e6]}', "low must not exceed high"),
-        (None, '{"robot.toes": [1, 2]}', "has no number 'robot.toes' to draw"),
     ],
 )
 def test_robots_that_cannot_be_trained_are_refused_before_there_is_a_folder(tmp_path, capsys, scene, intervals, words):
@@ -181,8 +179,6 @@ def test_a_finished_run_can_be_trained_for_more_strokes(finished, tmp_path, caps
 @pytest.mark.parametrize(
     "name, sight, more, words",
     [
-        ("none", None, [], "There is no camera in"),
-        ("camera", {"fps": 30}, [], "'fps'"),
         ("camera", {"sees": "nodes"}, [], "sees all nodes, as the run's policy does"),
         ("evaluation", {}, [], "has a folder evaluation already"),
         ("camera", {}, ["--strokes", "1024"], "cannot continue with another strokes"),
@@ -190,8 +186,7 @@ def test_a_finished_run_can_be_trained_for_more_strokes(finished, tmp_path, caps
 )
 def test_a_camera_for_which_no_policy_can_be_made_is_refused(name, sight, more, words, finished, tmp_path, capsys):
     file, before = tmp_path / f"{name}.json", sorted(finished.rglob("*"))
-    if sight is not None:
-        file.write_text(json.dumps(sight))
+    file.write_text(json.dumps(sight))
     assert train.main(["--resume", str(finished), "--for-camera", str(file), *more]) == 2
     assert_told(capsys, words)
     assert sorted(finished.rglob("*")) == before
@@ -416,12 +411,7 @@ def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_pa
     assert "not recorded" not in card
 
 
-def test_a_quick_run_is_short_and_fast_and_published_only_when_asked_twice(tmp_path, capsys):
-    options = training.read_options(["--quick"])
-    assert options.length <= training.Options().length / 2 and options.fidelity == "fast"
-    in_time = ["--decision-period", "0.5"]
-    assert training.read_options([]).length < training.read_options(in_time).length
-    assert training.read_options([*in_time, "--strokes", "7"]).length == 7
+def test_a_quick_run_is_published_only_when_asked_twice(tmp_path, capsys):
     for asked, words in (("--quick --publish", "only with --publish-anyway"), ("--publish-anyway", "give both")):
         assert train.main([*asked.split(), "--out", str(tmp_path / "run")]) == 2
         assert_told(capsys, words)
@@ -434,8 +424,6 @@ def test_a_run_says_how_long_it_took_to_round_the_pentagon_in_time(finished):
     pentagon, waypoints = run_folder.recorded(finished)[-1][1:]
     assert (found.strokes_to_target is not None) == (waypoints == 5 and pentagon <= 170)
     report = (finished / "evaluation" / "report.html").read_text(encoding="utf-8")
-    assert "strokes until the pentagon takes 170 s" in report and 'id="curves"' in report
-    assert "Trained for 512 strokes, seed 4" in report
     assert html.escape(json.loads((finished / "config.json").read_text())["commands"][0]) in report
 
 

@@ -347,7 +347,7 @@ class Guard:
             yield
         except PlantError as why:
             raise self.refuse(str(why)) from None
-        except BaseException as failure:
+        except BaseException as failure:  # wires are cold whatever it is, an interrupt, too
             self.refuse(f"The drive was ended by a {type(failure).__name__}: all wires are stopped.")
             raise
 

@@ -250,7 +250,7 @@ class LinePlant:
             self._take(self._wires)
             if self._tracker is not None:
                 self._take(self._tracker)
-        except BaseException:
+        except BaseException:  # an interrupt, too: wires are cold before anybody hears of it
             self.stop()
             raise
         return self._seen
@@ -322,7 +322,7 @@ class Server:
         except (ValueError, PlantError) as bad:
             self.stop()
             self._refuse(bad)
-        except BaseException:
+        except BaseException:  # what ends the loop stops the wires first
             self.stop()
             raise
         else:

@@ -272,7 +272,7 @@ class PlantRobot(Robots):
         """Context that stops all wires, whatever ends it but its end."""
         try:
             yield
-        except BaseException:
+        except BaseException:  # a fault of the policy's or an interrupt: wires are cold all the same
             self.guard.plant.stop()
             raise
 

@@ -57,7 +57,7 @@ class Workers:
 
         try:
             list(pool.map(take_parts, range(self.n)))
-        except BaseException:
+        except BaseException:  # an interrupt, too: no thread works on once it is told
             _stop(waiting, at_work)
             raise
 

@@ -469,7 +469,7 @@ class Simulator:
                 watch.begin(float(duration), checked)
             yield interval
             self._lock.release()
-        except BaseException:
+        except BaseException:  # whatever ends an interval, also that its generator is dropped, undoes it
             with held_back():  # another Ctrl-C waits for the end
                 if self._lock.resume(interval):  # unless robots were put into another state since
                     self._batch.restore(rows)

@@ -7,11 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from currents import CURRENTS, velocity
+from currents import CURRENTS
 from seastar_gym import Body, Numerics, Scene, Seastar, Simulator, SmaWires, UniformCurrent
 from seastar_gym.accuracy import commands, measure, resonance
 from seastar_gym.accuracy import measure as endurance
-from seastar_gym.accuracy import measure as water
 from seastar_gym.accuracy.certificate import at, resolved
 from seastar_gym.scene.numerics import Resolution
 from seastar_gym.scene.robot import SILICONE
@@ -170,29 +169,13 @@ def test_the_energy_of_a_swim_that_fails_grows_without_bound(monkeypatch):
     assert endurance.energy_growth(SCENE) == np.inf
 
 
-@pytest.mark.parametrize("kind", CURRENTS)
-def test_the_water_moves_as_its_current_says(kind):
-    places = np.random.default_rng(0).uniform(-0.3, 0.3, (7, 3, 2))
-    expected = velocity(kind, places.reshape(-1, 2)).reshape(places.shape)
-    np.testing.assert_allclose(water.velocity(in_water(CURRENTS[kind]), places), expected, rtol=1e-9, atol=1e-14)
-    assert not water.velocity(SCENE, places).any()
-
-
 @pytest.mark.parametrize("body", [None, pytest.param(Body(radius=0.02, mass=0.02), marks=pytest.mark.slow)])
 def test_a_uniform_current_is_a_translation(body):
-    """Energies, ways and errors are those in still water, for any scheme."""
+    """Ways and errors are those in still water."""
     current = UniformCurrent(0.05, -0.02)
     still = Scene(Seastar(nodes_per_limb=5, discretisation="continuum", body=body), numerics=EULER)
     moving = in_water(current, still)
     drawn = commands.draw_classes(1, 5, 0)
-    one, two = (water.with_the_water(scene, drawn.shape[1]) for scene in (still, moving))
-    for each in drawn:
-        one.stroke(each), two.stroke(each)
-        energies = [each.kinetic_energy(relative_to_water=True) for each in (one, two)]
-        np.testing.assert_allclose(energies[1], energies[0], rtol=1e-4, atol=1e-18)
-    before = two.get_state()
-    two.kinetic_energy(relative_to_water=True)
-    np.testing.assert_array_equal(two.velocities, before.velocities)
     hub, in_current = (measure.swim(scene, drawn).hub for scene in (still, moving))
     np.testing.assert_allclose(in_current - np.arange(1, 11)[:, None, None] * [0.05, -0.02], hub, atol=1e-7)
     lengths = measure.path_lengths(moving, in_current)

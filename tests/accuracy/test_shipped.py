@@ -142,34 +142,6 @@ def test_for_error_picks_the_fastest_setting_that_keeps_the_error(error, any_gai
             assert row.promise(classes) > error
 
 
-TEN, FIFTEEN = (Seastar(nodes_per_limb=n, discretisation=kind) for n, kind in ((10, "chapter"), (15, "continuum")))
-
-
-@pytest.mark.parametrize(
-    "error, robot, sentence",
-    [
-        (0.01, TEN, "No measured setting keeps the path error below 1 %"),  # with none of their steps
-        (0.01, FIFTEEN, r"Errors were measured with 6, 7, .* not with 15\.$"),
-        (0.01, Seastar(youngs_modulus=2e6), "The certificate is of the chapter's"),
-        (0.01, Seastar(n_limbs=3), "The certificate is of the chapter's"),
-        (0.9, Seastar(discretisation="chapter", hub_hinge="turning"), '.*hub_hinge="opening"'),
-    ],
-)
-def test_for_error_refuses_another_robot_and_what_was_not_measured(error, robot, sentence):
-    with pytest.raises(ValueError, match=rf"^{sentence}") as refusal:
-        scene_for(error, robot=robot)
-    assert str(refusal.value).endswith(".")
-
-
-@pytest.mark.parametrize("any_gait", [False, True])
-def test_for_error_refuses_what_the_table_cannot_promise_and_names_the_best(any_gait):
-    best = min(row.promise(TABLE.promised if any_gait else RANDOM) for row in TABLE.settings)
-    with pytest.raises(ValueError, match=r"^No measured setting keeps .*: the best, .* keeps .* %\.$") as refusal:
-        scene_for(0.9 * best, any_gait)
-    assert f"{100 * best:g} %" in str(refusal.value)
-    assert scene_for(best, any_gait)
-
-
 # The promise, kept
 
 

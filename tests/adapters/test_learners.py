@@ -137,15 +137,6 @@ def test_the_loop_in_one_file_learns_for_an_iteration_a_policy_of_the_project(si
     assert swim("learned", policy, env, max_strokes=2, seed=0).strokes == 2
 
 
-@pytest.mark.slow
-def test_the_loop_in_one_file_learns_to_swim(single_file):
-    """After a third of its training, it swims round the pentagon faster than the script, which takes 241 strokes."""
-    learned = {"num_envs": 128, "rollout": 16, "batch_size": 512, "epochs": 6, "hidden": 128, "num_threads": None}
-    policy = single_file(strokes=32_768, **learned)
-    env = gym.make("SeastarSwim-v0", actions="pairs", fidelity="fast").unwrapped
-    assert swim("learned", policy, env, max_strokes=240).finished
-
-
 @pytest.mark.filterwarnings("ignore")  # of the library's own
 def test_torchrl_learns_for_an_iteration():
     pytest.importorskip("torchrl")

@@ -6,16 +6,10 @@ import pytest
 from later import Later
 from refusals import assert_refused
 from seastar_gym import Simulator
-from seastar_gym.controllers.description import Description
-from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.controllers.open_loop import scripted
-from seastar_gym.envs import symmetry
 from seastar_gym.envs.options import make_scene
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.comparison import evaluate
-from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import lagged_gait, straight_gait, thrifty_gait, timed, turning_wave
-from symmetries import assert_equivariant
 
 ppo = Later("agents.ppo")
 
@@ -61,9 +55,6 @@ def test_gaits_in_time_round_the_pentagon(gait):
 def test_gaits_that_do_not_fit_the_decisions_are_refused(name, period):
     with assert_refused("decision"):
         scripted(name, decision_period=period)
-    for other in (1.0, 0.2):
-        with assert_refused("every 0.5 s", f"every {other:g} s"):
-            swim("a", scripted("lagged", decision_period=0.5), SeastarSwimEnv(decision_period=other), max_strokes=1)
 
 
 # Training
@@ -81,12 +72,3 @@ def test_discount_and_time_limit_are_those_of_seconds():
     for wrong in ({"actions": "continuous"}, {"batch_size": 7}, {"hidden": ()}, {"hidden": (2**20,) * 3}):
         with assert_refused(next(iter(wrong))):
             ppo.Hyperparameters(**wrong)
-
-
-def test_a_timed_policy_behind_the_symmetry_is_equivariant():
-    scene, rng = make_scene(None, "fast", 0.5), np.random.default_rng(0)
-    description = Description("pairs", True, scene, (16,), 0.5)
-    shapes = description.shapes()
-    policy = LearnedPolicy(description, {name: rng.normal(size=shapes[name]).astype(np.float32) for name in shapes})
-    seen = rng.normal(size=(100, 196)).astype(np.float32)
-    assert_equivariant(policy, seen, symmetry.memory_mirror(scene.actuator))

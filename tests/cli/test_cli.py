@@ -154,6 +154,7 @@ REFUSED = [
     ("drive straight --plant serial:", "A plant is sim, sim:FILE, or serial:/dev/"),
     ("drive learned --dry", "learned was trained for full sight, which no plant gives"),
     ("drive straight --sight nodes", "A tracker sees no nodes"),
+    ("sweep robot=@nowhere.json", "There is no file nowhere.json"),
     *((f"{command} wrong.py", "wrong.py, line 2: NameError: name 'nothing' is not defined.") for command in (
         "swim --scene", "evaluate --scene", "certify", "sweep --scene", "identify a.csv b.csv --scene",
     )),

@@ -20,6 +20,7 @@ from seastar_gym.controllers.registry import load_agents
 from seastar_gym.controllers.search import Budget, Planner, gait_planner
 from seastar_gym.envs.commands import action_space, to_commands
 from seastar_gym.envs.tasks import NAMED
+from seastar_gym.evaluation.benchmark import track_of
 from seastar_gym.evaluation.swim import swim_many
 
 stable_baselines3 = Later("stable_baselines3")
@@ -158,6 +159,7 @@ def test_a_robot_rests_by_an_observation_that_cannot_be_and_others_go_on(shown):
 def test_a_model_acts_as_it_did_when_it_was_saved(actions, trained):
     model, file = (of[actions] for of in trained)
     (policy,) = load_agents([str(file)]).values()
+    assert track_of(policy) == "plain"
     observations = np.random.default_rng(0).normal(size=(50, 186)).astype(np.float32)
     acted, expected = (each.predict(observations, deterministic=True)[0] for each in (policy, model))
     np.testing.assert_array_equal(acted, expected)

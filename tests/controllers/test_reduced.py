@@ -13,7 +13,7 @@ from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Sight, SymmetryReduction, VectorSymmetryReduction
 from seastar_gym.controllers.contract import sees_reduced
 from seastar_gym.controllers.reduced import ReducedPolicy
-from seastar_gym.controllers.registry import load_agent, load_agents
+from seastar_gym.controllers.registry import load_agent
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import ReducedBox
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -55,11 +55,11 @@ def env_of(actions="pairs", **more):
     return SeastarSwimEnv(PATH, actions=actions, scene=FAST, random_heading=True, **more)
 
 
-def saved(learner, folder, reduced=True):
+def saved(learner, folder):
     """A model, its file, and what it learned in."""
     make, actions, more = LEARNERS[learner]
     batch = batch_of(actions, more, "SameStep")
-    model = make(adapter.BatchVecEnv(VectorSymmetryReduction(batch) if reduced else batch))
+    model = make(adapter.BatchVecEnv(VectorSymmetryReduction(batch)))
     model.save(folder / "mine.zip")
     return model, str(folder / "mine.zip"), actions, more
 
@@ -80,14 +80,6 @@ def test_a_model_from_its_file_swims_as_it_does_behind_the_reduction(learner, tm
     env = env_of(actions, **more)
     expected = rollout(SymmetryReduction(env), model, seeds=3, **SWIMS)
     assert_same(rollout(env, agent, seeds=3, **SWIMS), expected)
-
-
-def test_a_model_of_the_plain_environment_swims_as_it_did(tmp_path):
-    model, file, actions, more = saved("PPO", tmp_path, reduced=False)
-    agent = load_agents([file], scene=FAST)["mine"]
-    assert track_of(agent) == "plain"
-    expected = rollout(batch_of(actions, more), model, seeds=3, **SWIMS)
-    assert_same(rollout(batch_of(actions, more), agent, seeds=3, **SWIMS), expected)
 
 
 def test_a_model_that_sees_reduced_observations_is_refused_where_they_are_not(tmp_path, monkeypatch):

@@ -100,7 +100,6 @@ REFUSED = [
       for name in ("pentagon", "wave", "lagged-pentagon")),
     (lambda: OpenLoopPolicy(np.ones((1, 5)), "pairs"), 'no action with actions="pairs"'),
     (lambda: OpenLoopPolicy(np.full((1, 5), 0.5), "limbs"), 'no action with actions="limbs"'),
-    (lambda: OpenLoopPolicy(np.zeros((0, 5))), "commands"),
     (lambda: swim("a", agent(action_space=Discrete(243)), env("pairs"), max_strokes=1), 'actions="pairs"'),
     (lambda: swim_many("a", agent(observation_space=Box(-1.0, 1.0, (7,))), "line", 2, FAST), "of shape (7,), the"),
     *((lambda made=made: gait(made), "decisions made of shape (2,).") for made in (

@@ -9,7 +9,6 @@ from seastar_gym.controllers import search
 from seastar_gym.controllers.open_loop import to_actions
 from seastar_gym.controllers.search import (
     Budget,
-    GreedyPolicy,
     Planner,
     Targets,
     displacement_map,
@@ -59,13 +58,6 @@ def test_the_map_is_measured_once_for_every_scene_and_again_where_its_file_is_da
     assert list((cache / "seastar-gym").iterdir()) == files
     with pytest.raises(TypeError):
         displacement_map(Scene(numerics=Numerics.preset("accurate")))
-
-
-def test_it_swims_a_path_with_a_random_heading():
-    agent = GreedyPolicy(FAST)
-    env = SeastarSwimEnv(path=[[0.05, 0.0], [0.05, 0.05]], random_heading=True, actions=agent.actions, fidelity="fast")
-    done = swim("greedy", agent, env, max_strokes=60, seed=1)
-    assert done.finished
 
 
 def test_displacements_are_a_stroke_s_share_in_the_frame_in_which_they_begin(monkeypatch):

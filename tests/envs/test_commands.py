@@ -13,6 +13,7 @@ from seastar_gym import SymmetryReduction
 from seastar_gym.envs.commands import LIMB_COMMANDS, action_space, command_table, to_commands
 from seastar_gym.envs.goal import SERVED, GoalForm
 from seastar_gym.envs.layout import Layout
+from slopes import rotated
 
 
 @pytest.mark.parametrize("n_limbs", [3, 5, 6])
@@ -61,8 +62,7 @@ def test_an_observation_has_the_goals_in_the_world_and_the_robot_without_waypoin
 
 def put(env, place, heading) -> None:
     """Put the robot, at rest, where its hub is at a place [m] and its limb 1 looks in a direction [rad]."""
-    simulator, (c, s) = env.unwrapped.simulator, (np.cos(heading), np.sin(heading))
-    nodes = env.unwrapped.scene.robot.nodes() @ np.array([[c, s], [-s, c]]) + place
+    simulator, nodes = env.unwrapped.simulator, rotated(env.unwrapped.scene.robot.nodes(), heading) + place
     state = simulator.get_state()
     simulator.set_state(state._replace(positions=nodes[None], velocities=np.zeros_like(state.velocities)))
 

@@ -506,18 +506,6 @@ def test_effort_is_the_price_of_pulses_and_the_time_limit_truncates(id):
             assert info["reward_effort"] == -0.01 * pulses < 0.0
 
 
-@pytest.mark.parametrize("id", IDS)
-def test_a_step_before_the_first_reset_is_refused_and_pictures_are_drawn(id):
-    pytest.importorskip("pygame")
-    env, batch = made(id, render_mode="rgb_array").unwrapped, batched(id, 2, render_mode="rgb_array")
-    for one in (env, batch):
-        with pytest.raises(gym.error.ResetNeeded, match=r"reset\(\) before step\(\)\.$"):
-            one.step(one.action_space.sample())
-        one.reset(seed=0)
-    for picture in (env.render(), *batch.render()):
-        assert picture.shape == (720, 960, 3) and picture.dtype == np.uint8 and np.ptp(picture) > 0
-
-
 def no_actions(mode: str) -> list:
     """What is no action of a robot of four limbs."""
     good, beyond = {

@@ -144,10 +144,6 @@ def test_ids_are_those_of_the_table(id):
 # Tasks
 
 
-def test_names_are_those_of_tasks_with_their_numbers():
-    assert name_of(None) is name_of(Prey(wanted=9)) is None and name_of(Prey()) == "prey"
-
-
 @pytest.mark.parametrize("id", TASK_IDS)
 def test_info_of_a_task_is_that_of_the_docstrings(id):
     env = gym.make(id, fidelity="fast")

@@ -26,8 +26,7 @@ from seastar_gym import (
     SymmetryReduction,
     Uniform,
 )
-from seastar_gym.envs.attributes import checked_options
-from seastar_gym.envs.commands import action_space, choices, command_table, to_commands
+from seastar_gym.envs.commands import choices, command_table
 from seastar_gym.envs.goal import GoalForm
 from seastar_gym.envs.headings import HeadingTargets
 from seastar_gym.envs.layout import Layout
@@ -39,9 +38,7 @@ from seastar_gym.envs.sight import TEMPLATE, read_camera
 from seastar_gym.envs.symmetry import Symmetry, VectorFrameStack, VectorSymmetryReduction, memory_mirror
 from seastar_gym.envs.tasks.obst_trap import ObstTrap, draw_discs
 from seastar_gym.envs.tasks.prey import Pursuit, draw_course
-from seastar_gym.envs.vector import SeastarSwimVectorEnv, checked_seeds
-from seastar_gym.envs.waypoints import AlongPath
-from seastar_gym.scene.numerics import MAX_STEPS, SHORTEST
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.serial import to_dict
 from symmetries import symmetry_for
 
@@ -49,8 +46,7 @@ LIMBS, SHARES, JOINT = (Symmetry(5, (), Layout(5), mode) for mode in ("limbs", "
 ONE = np.zeros(1, int)
 WIRES = memory_mirror(SmaWires())
 NINE = Scene(Seastar(9), actuator=SmaPulse(0.1))
-LEG, WIRED = np.array([[0.1, 0.0]]), Scene(actuator=SmaWires())
-SHORTEST_DECISION, LONGEST_DECISION = SHORTEST * WIRED.numerics.step, MAX_STEPS * WIRED.numerics.step
+LEG = np.array([[0.1, 0.0]])
 RNG, SLOW = np.random.default_rng(0), Pursuit(1e-3, 1e-3)
 
 
@@ -90,71 +86,43 @@ def drawing(name, low, high, **options):
 
 REFUSED = {
     "goals of two shapes": (lambda: goals(np.zeros((3, 2)), np.zeros(2)), "Goals must have one shape (..., 2)"),
-    "goals in space": (lambda: goals(np.zeros(3), np.zeros(3)), "Goals must have one shape (..., 2)"),
     "goals of a cart": (lambda: GoalForm(gym.make("CartPole-v1")), "GoalForm needs an environment of waypoints"),
     "goals seen by a camera": (lambda: GoalForm(gym.make("SeastarSwim-v0", sight=Sight())), "which no camera knows"),
-    "a range downwards": (lambda: Uniform(2.0, 1.0), "low must not exceed high"),
     "a range beyond floats": (lambda: Uniform(-1e308, 1e308), "high - low must be finite"),
     "a number as a draw": (lambda: DomainRandomization({"fluid.density": 3.0}), "fluid.density", "needs a Uniform"),
     "a misspelt draw": (lambda: drawing("limb_strength", 0.5, 1.0), "'limb_strength'", "limb_strengths"),
     "a draw of limbs": (lambda: drawing("robot.n_limbs", 3, 5), "robot.n_limbs", "same for all robots of a batch"),
     "a draw of lengths below zero": (lambda: drawing("robot.limb_length", -0.1, 0.2), "limb_length", "positive"),
-    "a draw of densities below zero": (lambda: drawing("robot.density", -1.0, 0.2), "density", "positive"),
     "a draw of peaks": (lambda: drawing("actuator.peak_angle", 0.1, 4.0), "peak angle", "4 rad"),
     "a draw of no current": (lambda: drawing("fluid.current.u_x", 0.1, 0.2), "fluid.current.u_x"),
     "strong limbs": (lambda: DomainRandomization({"limb_strengths": Uniform(0.5, 1.1)}), "drawn from 0 to 1"),
     "limbs that push back": (lambda: DomainRandomization({"limb_strengths": Uniform(-0.1, 1.0)}), "drawn from 0 to 1"),
-    "a mirror of triples": (lambda: Symmetry(5, ((0, 1, 1),), Layout(5, 1)), "mirror must be a tuple of pairs"),
     "a mirror beyond": (lambda: Symmetry(5, ((1, 1),), Layout(5, 1)), "mirror must be a tuple of pairs"),
     "a mirror before": (lambda: Symmetry(5, ((-1, 1),), Layout(5, 1)), "mirror must be a tuple of pairs"),
     "a mirror that doubles": (lambda: Symmetry(5, ((0, 2),), Layout(5, 1)), "mirror must be a tuple of pairs"),
-    "a mirror of shares": (lambda: Symmetry(5, ((0, 1.0),), Layout(5, 1)), "mirror must be a tuple of pairs"),
     "another number of limbs": (lambda: Symmetry(4, (), Layout(5)), "A group of 4 limbs and a mirror of 0 numbers"),
     "another number of numbers": (lambda: Symmetry(5, (), Layout(5, 1)), "do not fit a layout of 5 limbs and 1"),
-    "seen of seven limbs": (lambda: symmetry_for(7).reduce(np.zeros((1, 186))), "not that of a robot of 7 limbs"),
     "seen of wires alone": (lambda: symmetry_for(5, WIRES).reduce(np.zeros((1, 186))), "not that of a robot of 5"),
-    "seen of more than that": (lambda: symmetry_for(5).reduce(np.zeros((1, 206))), "not that of a robot of 5 limbs"),
     "seen of headings": (lambda: symmetry_for(5, WIRES).reduce(np.zeros((1, 200))), "not that of a robot of 5 limbs"),
-    "actions below": (lambda: JOINT.restore(np.array([-1]), ONE), "an action is a whole number from 0 to 242"),
     "actions beyond": (lambda: JOINT.restore(np.array([243]), ONE), "an action is a whole number from 0 to 242"),
-    "halves of actions": (lambda: JOINT.restore(np.array([0.5]), ONE), "an action is a whole number from 0 to 242"),
     "a reduced cart": (lambda: SymmetryReduction(gym.make("CartPole-v1").unwrapped), "SeastarSwim-v0", "CartPole"),
     "reduced carts": (
         lambda: VectorSymmetryReduction(gym.make_vec("CartPole-v1", 2, "sync")), "SeastarSwim-v0", "SyncVectorEnv",
     ),
     "a past of headings": (lambda: VectorFrameStack(swimmers(headings=HeadingTargets()), 2), "Asked headings have no"),
     "whole observations": (lambda: LIMBS.reduce(np.zeros((1, 186), int)), "Observations must be floats"),
-    "elements of floats": (lambda: LIMBS.restore(np.zeros((1, 5), int), [0.0]), "elements must be whole numbers"),
-    "elements below": (lambda: LIMBS.restore(np.zeros((1, 5), int), [-1]), "elements must be whole numbers from 0"),
     "elements above": (lambda: LIMBS.restore(np.zeros((1, 5), int), [10]), "elements must be whole numbers from 0"),
-    "shares of texts": (lambda: SHARES.carry_actions(np.full((1, 5), "a"), ONE), "an action is numbers, not"),
-    "unknown options": (lambda: checked_options({"way": 1}, {"path"}), "Unknown reset option(s)"),
     "seeds that are too few": (lambda: swimmers().reset(seed=[1]), "seed must be one number or 2 of them, not 1"),
-    "a seed below zero": (lambda: checked_seeds([1, -1], 2), "seed"),
-    "a radius beyond": (lambda: AlongPath(waypoint_radius=2e6), "waypoint_radius must be at most 1e+06 m"),
     "a table of limbs": (lambda: command_table("limbs", 5), "not a table of commands: use LIMB_COMMANDS"),
     "too many limbs": (lambda: command_table("joint", 9), "would have 3^9 = 19,683 actions for 9 limbs"),
     "an action for nine limbs": (lambda: SeastarSwimEnv(scene=NINE, actions="joint"), "19,683 actions"),
     "a table of shares": (lambda: command_table("continuous", 5), 'actions="continuous" has no finite number'),
     "choices of shares": (lambda: choices("continuous", 5), 'actions="continuous" has no finite number of actions'),
-    "no action mode": (lambda: action_space("Limbs", 5), "actions must be one of", "'limbs', 'joint', 'pairs'"),
-    "too large a share": (lambda: to_commands("continuous", 1, [[1.001]], 1), "is numbers from -1 to 1"),
-    "an action of shares": (lambda: to_commands("pairs", 5, [1.0], 1), "are whole numbers of shape (1,)"),
-    "a heading beyond": (lambda: HeadingTargets(1.1e6), "HeadingTargets.target must be"),
-    "half a turn and more": (lambda: HeadingTargets(tolerance=3.2), "HeadingTargets.tolerance must be at most pi"),
     "a goal too far": (lambda: ObstTrap(distance=(0.45, 0.61)), "ObstTrap.distance must lie from 0.45 to 0.6"),
-    "a goal too near": (lambda: ObstTrap(distance=(0.1, 0.5)), "ObstTrap.distance must lie from 0.45 to 0.6 m"),
     "no potential": (lambda: ObstTrap(potential="by air"), "ObstTrap.potential must be one of 'straight', 'geodesic'"),
     "prey too fast": (lambda: draw_course(RNG, (9.0, 10.0), (0.5, 1.0), 0.1, SLOW), "a robot could meet none"),
     "discs without end": (lambda: draw_discs(RNG, np.array([0.5, 0.0]), 3, 0.4), "none can be passed"),
-    "a camera of 2 kHz": (lambda: Sight(2e3), "at most 1000 Hz"),
     "a camera that may foresee": (lambda: Sight(delay=Uniform(-0.1, 0.1)), "Sight.delay"),
-    "a camera too late": (lambda: Sight(delay=6.0), "at most 5 s"),
-    "two markers": (lambda: Sight(sees=2), "1, 3 or 9 markers"),
-    "a heading among others": (lambda: HeadingTargets((0.1, np.nan)), "HeadingTargets.target", "along"),
-    "a path in space": (lambda: path([[0.1, 0.2, 0.3]]), "must have shape (n, 2)", "not (1, 3)"),
-    "no waypoints": (lambda: path(np.zeros((0, 2))), "at least one waypoint"),
-    "one place twice": (lambda: path([[0.1, 0.0], [0.1, 0.0]]), "are the same point"),
     "a path that stays": (lambda: path([[0.0, 0.0]]), "must lead away from the origin"),
     "a path beyond": (lambda: path([[0.0, -1.1e6]]), "within"),
     "one name for two paths": (lambda: register_path("line")(lambda rng: LEG), "a path of the name 'line' already"),
@@ -162,10 +130,6 @@ REFUSED = {
                                   ", since it leaves that out (None): give it a value there."),
     "a body's radius": (lambda: drawn_of("robot.body.radius"), "'robot.body.radius'", "same for all robots of a"),
     "a colour": (lambda: drawn_of("robot.colour"), "has no number 'robot.colour' to draw: it has ", "fluid.density"),
-    "a step that is too short": (lambda: SeastarSwimEnv(scene=WIRED, decision_period=0.99 * SHORTEST_DECISION),
-                                 "decision_period must be from"),
-    "a step that is too long": (lambda: SeastarSwimEnv(scene=WIRED, decision_period=1.01 * LONGEST_DECISION),
-                                "decision_period must be from"),
     "a window of a batch": (lambda: SeastarSwimVectorEnv(2, render_mode="human"), 'draws with render_mode="rgb_array"'),
     "no mode of a task": (lambda: SeastarSwimEnv(task="prey", render_mode="film"), "render_mode"),
     "films of tasks": (lambda: gym.make_vec("SeastarPrey-v0", render_mode="film"), "The batch draws"),
@@ -176,11 +140,9 @@ REFUSED = {
     "two draws": (lambda: drawing("fluid.drag_coefficient", 0.5, 1.0, task="fail-blind"), "leave out randomization"),
     "no split": (lambda: SeastarSwimVectorEnv(task="prey", split="validation"), "split must be one of 'train', 'test'"),
     "pictures too small": (lambda: drawn_by(size=(100, 100)), "at least 320 x 240 pixels, not 100 x 100"),
-    "a robot beside numbers": (lambda: drawn_by(positions=np.full((46, 2), np.nan)), "of shape (46, 2)"),
     "a node that is missing": (lambda: drawn_by(positions=np.zeros((45, 2))), "must be finite and of shape (46, 2)"),
     "a command of four": (lambda: drawn_by(command=np.zeros(4)), "must have shape (5,), not (4,)"),
     "an endless trail": (lambda: drawn_by(trail=np.full((3, 2), np.inf)), "must be finite and of shape (k, 2)"),
-    "a flat trail": (lambda: drawn_by(trail=np.zeros(2)), "must be finite and of shape (k, 2)"),
 }  # fmt: skip
 """What is refused, and words of the sentence."""
 
@@ -202,11 +164,7 @@ def draws(name, low=0.0, high=1.0):
 
 
 ARGUMENTS = [
-    ({"path": "hexagon"}, "hexagon"), ({"path": None}, "path"), ({"actions": "binary"}, "actions"),
-    ({"fidelity": "exact"}, "fidelity"), ({"scene": "chapter"}, "Scene"), ({"scene": Seastar()}, "Scene"),
-    ({"reward": 1.0}, "RewardWeights"), ({"waypoint_radius": 0.0}, "waypoint_radius"),
-    ({"waypoint_radius": 1e300}, "waypoint_radius"), ({"random_heading": "False"}, "random_heading"),
-    ({"observe_actuators": 1}, "observe_actuators"), ({"randomization": {}}, "DomainRandomization"),
+    ({"path": "hexagon"}, "hexagon"), ({"waypoint_radius": 1e300}, "waypoint_radius"),
     ({"scene": Scene(Seastar(hub_hinge="turning", discretisation="chapter"))}, "turning"),
     ({"scene": Scene(Seastar(hub_hinge="turning", discretisation="chapter"), actuator=SmaPulse(0.3)),
       **draws("actuator.peak_angle", 0.3, np.pi / 5.0)}, "close a hub hinge"),
@@ -219,11 +177,9 @@ ARGUMENTS = [
     ({"headings": "along"}, "eading"), ({"headings": {"kind": "HeadingTargets"}}, "eading"),
     ({"headings": HeadingTargets((0.1, 0.2))}, "2 angles", "5 waypoint"),
     ({"path": [[0.1, 0.0], [0.1, 0.0], [0.2, 0.0]], "headings": HeadingTargets()}, "leg to waypoint 2"),
-    ({"sight": 30.0}, "a Sight or None"), ({"action_delay": -1.0}, "action_delay"),
     ({"action_delay": Sight()}, "action_delay"), ({**draws("sight.delay"), "decision_period": 0.5}, "sight.delay"),
     ({**draws("sight.rate"), **SEEN}, "sight.rate"), ({**draws("sight.delay", 0.0, 9.0), **SEEN}, "at most 5 s"),
-    ({**draws("action_delay", -1.0), **SEEN}, "action_delay"), ({"decision_period": 0.0}, "decision_period"),
-    ({"decision_period": np.nan}, "decision_period"), ({"decision_period": 1e30}, "decision_period"),
+    ({**draws("action_delay", -1.0), **SEEN}, "action_delay"),
     *(({"action_delay": 0.1, "scene": scene}, "action_delay", "whole decisions of 1 s", "SmaWires")
       for scene in (None, Scene(actuator=SmaPulse()))),
     *(({"decision_period": 0.5, "scene": Scene(actuator=each)}, "decision_period", type(each).__name__, "SmaWires")

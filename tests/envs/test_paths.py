@@ -20,6 +20,7 @@ from seastar_gym.envs.stations import (
     stations_of,
     weights,
 )
+from slopes import rotated
 
 ORIGIN = np.zeros(2)
 
@@ -107,6 +108,8 @@ def test_the_shortest_way_is_the_shortest_of_those_by_any_point_of_the_circle():
     rng, radius = np.random.default_rng(0), 0.01
     away = radius + rng.exponential([0.001, 0.01, 0.1], size=(2, 200, 3)).reshape(2, 600)
     angles = rng.uniform(-np.pi, np.pi, size=(2, 600))
+    angles[1, ::7], angles[1, 3::7] = angles[0, ::7], angles[0, 3::7] + np.pi  # in one direction, and in opposite ones
+    away[1, ::5] = away[0, ::5]
     waypoints = rng.normal(size=(600, 2))
     begin, end = waypoints + away[..., None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     circle = 2.0 * np.pi * np.arange(5000)[:, None] / 5000
@@ -119,36 +122,6 @@ def test_the_shortest_way_is_the_shortest_of_those_by_any_point_of_the_circle():
     np.testing.assert_allclose(ways[near], straight[near], rtol=1e-14)
     np.testing.assert_allclose(ways[~near], by_touch[~near], atol=2e-6)
     assert (ways >= straight * (1.0 - 1e-14)).all()
-
-
-def bisected(begin, waypoint, after, radius):
-    """The shortest way as numpy bisects it: the arc between both ends, halved twelve times."""
-    (p_x, p_y), (n_x, n_y) = (begin - waypoint).T.copy(), (after - waypoint).T.copy()
-    start = np.arctan2(p_y, p_x)
-    arc = np.remainder(np.arctan2(n_y, n_x) - start + np.pi, 2.0 * np.pi) - np.pi
-    share, half = np.full(len(arc), 0.5), 0.5
-    while True:
-        c, s = np.cos(start + share * arc), np.sin(start + share * arc)
-        to_p, to_n = np.hypot(p_x - radius * c, p_y - radius * s), np.hypot(n_x - radius * c, n_y - radius * s)
-        half *= 0.5
-        if half < 2.0**-12:
-            return to_p + to_n
-        slope = (p_x * s - p_y * c) * to_n * np.sign(arc) + (n_x * s - n_y * c) * to_p * np.sign(arc)
-        share = share - half * np.where(slope > 0.0, 1.0, -1.0)
-
-
-@pytest.mark.parametrize("near", [0.3, 1e-3, 1e-9, 0.0])
-def test_compiled_routes_are_numpys_to_the_last_bit(near):
-    """Also where both ends lie almost, or just, in one direction or in opposite ones, and only rounding decides."""
-    rng = np.random.default_rng(0)
-    begin, waypoint = rng.normal(scale=0.2, size=(2, 2000, 2))
-    scale = rng.uniform(0.5, 2.0, size=(2000, 1)) * rng.choice([-1.0, 1.0], size=(2000, 1))
-    after = waypoint + scale * (begin - waypoint) + near * rng.normal(size=(2000, 2))
-    after[::5] = waypoint[::5] + (begin - waypoint)[::5, ::-1]  # as far away
-    for radius in (0.007, 0.0):
-        bends = cross_track_error(waypoint, begin, after) > radius
-        ways = shortest_way(begin, waypoint, after, radius)[bends]
-        assert ways.tobytes() == bisected(begin[bends], waypoint[bends], after[bends], radius).tobytes() and bends.any()
 
 
 # Paths of one's own
@@ -214,8 +187,7 @@ def test_stations_begin_at_the_roots_of_straight_limbs_and_the_heading_turns_wit
     robot, ten, angle = (*(Seastar(4 if body else 5, nodes, body=body) for nodes in (n, 10)), 2.5)
     rest = at_stations(robot.nodes(), robot, np.zeros(()))
     np.testing.assert_allclose(rest, ten.nodes(), rtol=0.0, atol=1e-15)
-    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    turned = robot.nodes() @ turn + [3.0, -1.0]
+    turned = rotated(robot.nodes(), angle) + [3.0, -1.0]
     for orientation in (None, np.array([angle])):
         np.testing.assert_allclose(body_heading(turned[None], robot, orientation), angle, atol=1e-13)
 

@@ -8,7 +8,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from episodes import break_robot
 from refusals import assert_refused
 from seastar_gym import (
     Body,
@@ -16,16 +15,11 @@ from seastar_gym import (
     RewardWeights,
     Scene,
     Seastar,
-    Simulator,
     SmaWires,
-    SolverStatus,
     ThermalSma,
     Uniform,
 )
-from seastar_gym.accuracy import chapters_certificate, timed_certificate
-from seastar_gym.accuracy.certificate import MARGIN
 from seastar_gym.envs import rendering, seastar_swim
-from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.paths import cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -35,20 +29,6 @@ STRAIGHT = np.array([0, 1, 0, 0, 2])
 
 def fast(**arguments) -> SeastarSwimEnv:
     return SeastarSwimEnv(fidelity="fast", **arguments)
-
-
-def random_episode(env, n_strokes: int, seed: int = 0, **options):
-    """Observations, rewards and infos of strokes with random actions."""
-    rng = np.random.default_rng(seed)
-    observation, info = env.reset(seed=seed, **options)
-    observations, rewards, infos = [observation], [], [info]
-    for _ in range(n_strokes):
-        observation, reward, terminated, truncated, info = env.step(rng.integers(0, 3, 5))
-        assert not terminated and not truncated
-        observations.append(observation)
-        rewards.append(reward)
-        infos.append(info)
-    return np.array(observations), np.array(rewards), infos
 
 
 # Contracts
@@ -80,21 +60,12 @@ def test_info_promises_nothing_for_robots_and_times_that_were_not_measured_or_we
     assert np.isnan(env.step(STRAIGHT)[4]["batch_real_time_factor"])
 
 
-def swum_straight(simulator: Simulator) -> bytes:
-    simulator.stroke([[0.0, 1.0, 0.0, 0.0, -1.0]])
-    return simulator.positions.tobytes()
-
-
 @pytest.mark.parametrize("fidelity", [None, "fast"])
 def test_a_scene_that_names_no_numerics_is_swum_at_the_fidelity_however_it_is_asked_for(fidelity):
     asked = {} if fidelity is None else {"fidelity": fidelity}
-    simulators = [Simulator(Scene.preset(fidelity or "balanced"))]
-    for arguments in ({}, {"scene": Scene()}, {"scene": Scene().to_dict()}, {"scene": Scene(Seastar())}):
-        env = gym.make("SeastarSwim-v0", **arguments, **asked)
-        env.reset(seed=0)
-        simulators.append(env.unwrapped.simulator)
-    assert len({swum_straight(each) for each in simulators}) == 1
     scene, preset = Scene(Seastar(density=1100.0)), Scene.preset(fidelity or "balanced")
+    for arguments in ({}, {"scene": Scene()}, {"scene": Scene().to_dict()}, {"scene": Scene(Seastar())}):
+        assert gym.make("SeastarSwim-v0", **arguments, **asked).unwrapped.simulator.scene == preset
     for given in (scene, pickle.loads(pickle.dumps(scene)), replace(scene, contact=None)):
         found = SeastarSwimEnv(scene=given, **asked).scene
         assert found == replace(preset, robot=replace(preset.robot, density=1100.0))
@@ -124,20 +95,6 @@ def test_next_waypoint_is_the_current_one_on_the_last_leg():
     observation, _, _, _, info = env.step(STRAIGHT)
     assert info["waypoint_index"] == 1
     np.testing.assert_array_equal(observation[182:184], observation[184:186])
-
-
-def test_the_same_episode_under_another_heading_looks_the_same():
-    """random_heading draws the heading after the path; an array as path draws nothing."""
-    path = np.array([[0.1, 0.02], [0.2, -0.05]])
-    heading = gym.utils.seeding.np_random(5)[0].uniform(-np.pi, np.pi)
-    assert abs(heading) > 0.1
-    c, s = np.cos(heading), np.sin(heading)
-    here, there = fast(path=path), fast(path=path @ [[c, s], [-s, c]], random_heading=True)
-    seen_here, rewards_here, _ = random_episode(here, 20, seed=5)
-    seen_there, rewards_there, _ = random_episode(there, 20, seed=5)
-    np.testing.assert_allclose(seen_there, seen_here, rtol=0.0, atol=1e-5)
-    np.testing.assert_allclose(rewards_there, rewards_here, rtol=0.0, atol=1e-8)
-    assert np.abs(there.simulator.positions - here.simulator.positions).max() > 0.01
 
 
 # Reward and waypoints
@@ -203,28 +160,6 @@ def test_an_episode_is_over_with_success_at_the_last_waypoint():
     assert env.step(STRAIGHT)[2] is False
 
 
-# Failure
-
-
-@pytest.mark.parametrize("status", [SolverStatus.NOT_CONVERGED, SolverStatus.NOT_FINITE])
-def test_a_solver_that_gives_up_ends_the_episode_with_a_status_and_a_sentence(status):
-    env, fresh = fast(), fast()
-    env.reset(seed=0), fresh.reset(seed=0)
-    break_robot(env, status)
-    observation, reward, terminated, truncated, info = env.step(STRAIGHT)
-    assert terminated is True and truncated is False
-    assert SolverStatus(info["solver_status"]) is status
-    assert "solver_message" not in info and status.sentence.endswith(".")
-    assert info["is_success"] is False
-    assert np.isfinite(observation).all() and np.isfinite(reward)
-    no_numbers = ("energy_per_metre",)  # a robot that makes no way has no energy per metre of it
-    assert all(np.isfinite(value).all() for name, value in info.items() if name not in no_numbers)
-    with pytest.raises(gym.error.ResetNeeded):
-        env.step(STRAIGHT)
-    env.reset(seed=0)
-    np.testing.assert_array_equal(env.step(STRAIGHT)[0], fresh.step(STRAIGHT)[0])
-
-
 # Pictures
 
 
@@ -270,23 +205,6 @@ def test_rendering_without_a_mode_warns_and_draws_nothing():
         env.reset(seed=0)
         with pytest.warns(UserWarning, match="draws nothing"):
             assert env.render() is None
-
-
-@pytest.mark.parametrize("fidelity, period", [("fast", 1.0), ("chapter", 1.0), ("reference", 0.5), ("fast", 0.1)])
-def test_info_tells_what_was_measured_of_the_fidelity(fidelity, period):
-    """Of decisions in time, by wires; speeds were measured of strokes."""
-    in_time, scene = period < 1.0, make_scene(None, fidelity, period)
-    certificate = timed_certificate(period) if in_time else chapters_certificate()
-    known, repeated = certificate.of(scene), certificate.repeated(certificate.actions)
-    others = [name for name in certificate.actions if name not in repeated]
-    _, info = SeastarSwimEnv(fidelity=fidelity, decision_period=period).reset(seed=0)
-    assert (info["path_error"], info["gait_error"]) == (known.promise(others), known.promise(repeated))
-    typical = known.typical_error(others), known.typical_error(repeated)
-    assert (info["typical_error"], info["typical_gait_error"]) == typical
-    assert (info["space_error"], info["time_error"]) == (known.space_error, known.time_error)
-    assert info.get("batch_real_time_factor") == (None if in_time else known.speed)
-    assert 0.0 < info["typical_error"] < info["path_error"] and info["typical_gait_error"] < info["gait_error"]
-    assert info["path_error"] <= MARGIN * (info["space_error"] + info["time_error"]) * (1.0 + 1e-2)
 
 
 def test_what_a_caller_does_to_infos_and_waypoints_changes_no_robot():

@@ -96,9 +96,6 @@ def test_files_hold_the_swims_and_a_picture_their_traces(written, tmp_path, monk
     assert found == {"evaluation.csv", "trajectories.csv", "there/evaluation.csv", "there/traces.png"}
 
 
-# imageio does not close the pipes of the process that it reads from.
-
-
 REST = {"a": scripted("rest")}
 REFUSED = [
     (lambda: evaluate({}, SHORT, **EASY), "at least one agent"),

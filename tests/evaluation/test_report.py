@@ -163,10 +163,8 @@ READ = {
         ("trials.csv", "a,b\n1,2\n", "trials.csv is not what trials write"),
         ("trials.csv", csv_of(TRIALS), "trials.csv is not what trials write"),
         ("trials.csv", csv_of(TRIALS, [*TRIAL[:9], "x", *TRIAL[10:]]), "line 2: 'x' is no number"),
-        ("trials.csv", csv_of(TRIALS, [*TRIAL[:9], "inf", *TRIAL[10:]]), "'inf' is no finite number"),
         ("trials.csv", csv_of(TRIALS, [*TRIAL, 3]), "line 2: the line must have 23"),
         ("progress.csv", "1000,400,3\n2000,2", "line 2: every line must have"),
-        ("progress.csv", "1,2,x\n", "'x' is no number"),
         ("progress.csv", "1,2,.5\n", "be whole"),
         ("curve", "", "The training of a has no learning curve yet"),
     ],
@@ -213,16 +211,6 @@ def evaluated(tmp_path_factory):
     agents = {"straight": scripted("straight"), MARKUP: ForthAndBack()}
     options = {"max_strokes": 9, "waypoint_radius": 2e-3, "fidelity": "fast", "video": False, "say": lambda text: None}
     return folder, evaluate(agents, SHORT, out=folder, report=remarks, **options)
-
-
-def test_the_page_needs_nothing_beside_it_and_is_light(evaluated):
-    text = (evaluated[0] / "report.html").read_text(encoding="utf-8")
-    own = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
-    assert not re.findall(r'\b(?:src|href)="(?!data:)', own) and "{{" not in own
-    assert len(text) < 6_000_000 and MARKUP not in text
-    (recorded,) = re.findall(r"^const recorded = (.*);$", text, flags=re.MULTILINE)
-    assert [each["agent"] for each in json.loads(recorded)["swims"]] == ["straight", MARKUP]
-    assert json.loads(recorded)["path"] == [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0]]
 
 
 class Watched:
@@ -294,7 +282,7 @@ def test_the_robot_moves_as_slider_strokes_and_play_say_and_its_actuated_limbs_a
 # Films have their pictures, in their order and for their time.
 
 
-BLUE, RED, PALE = (np.array(colour, np.uint8) for colour in ((20, 60, 200), (200, 30, 30), (219, 231, 245)))
+BLUE, RED = (np.array(colour, np.uint8) for colour in ((20, 60, 200), (200, 30, 30)))
 
 
 def picture(colour, column):

@@ -80,12 +80,14 @@ TRIALS = {
     "from a state that is set again within a stroke": Trial(("bits of pieces",), 15),
     "free robots in vacuum keep their momentum": Trial(("momentum",), 30, [PLAIN, CONTACT]),
     "implicit euler without commands creates no energy": Trial(("energy",), 30, [PLAIN]),
-    "alike turned, mirrored and elsewhere": Trial(("frames",), 25, [PLAIN, CONTACT, FLUID], wild=False),
-    "alike seen from a moving frame": Trial(("moving frame",), 40, [FLUID], wild=False),
+    "alike turned, mirrored and elsewhere": Trial(
+        ("frames",), 32, [PLAIN, CONTACT, FLUID, frozenset({CHAPTER})], wild=False
+    ),
+    "alike seen from a moving frame": Trial(("moving frame",), 45, [PLAIN, CONTACT, FLUID], wild=False),
     "water with contact and nothing else": Trial(EVERYWHERE, 10, [CONTACT], change=in_water),
     "contact in vacuum": Trial(EVERYWHERE, 10, [CONTACT], change=in_vacuum),
     "chapter-like robots with contact": Trial(EVERYWHERE, 15, [CONTACT], wild=False, change=in_water),
-    "robots with numbers of their own": Trial(EVERYWHERE, 15, [terms for terms in COMPILED if OWN in terms]),
+    "robots with numbers of their own": Trial(EVERYWHERE, 24, [terms for terms in COMPILED if OWN in terms]),
     "all terms with limited actuators": Trial(EVERYWHERE, 20, [EVERYTHING], change=limited, slow=True),
     "all terms with numbers of each robot": Trial(EVERYWHERE, 20, [frozenset(TERMS)], slow=True),
     "hub hinges of the chapter that touch": Trial(EVERYWHERE, 20, [CONTACT | {CHAPTER}], slow=True),

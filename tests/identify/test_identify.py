@@ -23,7 +23,6 @@ from seastar_gym import (
     Numerics,
     Scene,
     Seastar,
-    Simulator,
     SmaLimb,
     SmaPulse,
     Stiffening,
@@ -80,7 +79,6 @@ RECOVERED = {
     "strips": (Scene(STRIPS, numerics=Numerics("implicit-midpoint", 0.02)),
                {"robot.limbs.2.section.width": 3e-3, "robot.limbs.2.section.height": 5e-3}, 2, 1e-4),
     "curve": (replace(SCENE, actuator=CURVE), {"actuator.angles.1": 0.55, "fluid.drag_coefficient": 1.2}, 2, 0.0),
-    "truth": (SCENE, TRUTH, 2, 0.0),
 }  # fmt: skip
 
 
@@ -109,16 +107,6 @@ def test_coordinates_that_were_not_seen_do_not_count(measurement):
     few, all_of_them = (identify(SCENE, ["actuator.peak_angle"], data) for data in (partly, measurement))
     assert few.upper[0] - few.lower[0] > 1.05 * (all_of_them.upper[0] - all_of_them.lower[0])
     assert few.values[0] == pytest.approx(all_of_them.values[0], rel=0.02)
-
-
-def test_a_trajectory_is_that_of_the_simulator_at_the_ends_of_strokes():
-    commands = np.random.default_rng(0).integers(-1, 2, (2, 5)).astype(float)
-    simulator = Simulator(SCENE)
-    simulator.stroke(commands[:1])
-    found = trajectory(np.array([0.0, 1.0]), (0, 9), commands, SCENE)
-    np.testing.assert_allclose(found[0], SCENE.robot.nodes()[[0, 9]], atol=1e-15)
-    np.testing.assert_allclose(found[1], simulator.positions[0, [0, 9]], atol=1e-12)
-    np.testing.assert_array_equal(trajectory(np.array([0.0, 1.0]), (0, 9), commands[:1], SCENE), found)
 
 
 def test_the_command_line_fits_a_scene_of_ones_own_and_writes_it(tmp_path, monkeypatch, capsys):
@@ -215,6 +203,3 @@ def test_the_command_takes_a_scene_with_its_own_steps_or_those_it_is_given(tmp_p
     for line in (own[:2], own, [*own, "--step", "0.02"]):
         assert main(line) == 2
     assert steps == [0.005, 0.01, 0.02]
-    for line in ([], ["path.csv"]):
-        with pytest.raises(SystemExit):
-            main(line)

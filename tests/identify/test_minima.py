@@ -11,6 +11,7 @@ from seastar_gym import Scene, Seastar, SmaPulse, Water
 from seastar_gym.identify import command as its_command
 from seastar_gym.identify import identify, synthetic, with_parameters
 from seastar_gym.identify.fit import DOUBT
+from slopes import rotated
 
 NAMES = ("fluid.drag_coefficient", "robot.youngs_modulus", "actuator.peak_angle")
 TRUE = 1.5, 0.55e6, 0.42
@@ -82,10 +83,6 @@ def test_a_scene_that_lacks_something_is_told_and_its_intervals_are_not_trained_
     assert Scene.from_dict(json.loads((tmp_path / "fitted.json").read_text())).numerics == RINGING.numerics
 
 
-def turned(angle):
-    return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-
-
 @pytest.mark.parametrize(
     "change, words",
     [
@@ -93,7 +90,7 @@ def turned(angle):
         (lambda m: replace(m, positions=1e2 * m.positions), ["may be in cm."]),
         (lambda m: replace(m, positions=0.5 * m.positions), ["at rest", "Scaled by 0.5"]),
         (lambda m: replace(m, positions=m.positions * [1.0, -1.0]), ["at rest"]),
-        (lambda m: replace(m, positions=m.positions @ turned(0.5)), ["at rest", "Turned by 2"]),
+        (lambda m: replace(m, positions=rotated(m.positions, 0.5)), ["at rest", "Turned by 2"]),
         (lambda m: replace(m, positions=m.positions + [0.03, 0.0]), ["at rest", "Moved by ("]),
         (lambda m: replace(m, positions=m.positions[:, [0, 1, 3, 2]]), ["at rest", "Mirrored"]),
         (lambda m: replace(m, time=1e3 * m.time, command_times=1e3 * np.arange(6.0)), ["40 s apart", "milliseconds"]),

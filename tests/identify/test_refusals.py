@@ -109,26 +109,22 @@ HEADER, ROW, COMMAND = "time,x0,y0\n", "0,0,0\n", "0,1,0,0,-1\n"
 FILES = [
     *((text, COMMAND, "path.csv: the first line must be time,x0,y0") for text in (
         "", "time\n0\n", HEADER, "time,x0\n0,0\n", "t,x0,y0\n0,0,0\n", "time,x0,y1\n0,0,0\n", "time,x²,y²\n0,0,0\n")),
-    (HEADER + ROW + "0,nan,0\n", COMMAND, "path.csv, line 3: 'nan' is no finite number"),
     (HEADER + "0,0\n", COMMAND, "path.csv, line 2: the line must have 3 fields"),
     (HEADER + ROW + ",0,0\n", COMMAND, "path.csv, line 3: there is no time"),
     (HEADER + "1,0,0\n" + ROW, COMMAND, "path.csv: Times must be finite, not negative, and in order"),
     (HEADER + "0,1e308,0\n", COMMAND, "path.csv: Positions must be within 1000 m"),
-    ("\xff", COMMAND, "path.csv, line 1: this is no UTF-8 text"),
-    (HEADER + ROW, "0,,1\n", "commands.csv, line 1: '' is no number"),
     (HEADER + ROW, "", "commands.csv has no line with one number per limb"),
     (HEADER + ROW, COMMAND + "1\n", "commands.csv, line 2: every line must have one number per limb"),
     *((HEADER + ROW, text, "commands.csv: after time there must be one column per limb")
       for text in ("time\n0\n", "time,a\n")),
     (HEADER + ROW, "time,a,b\n0,1\n", "commands.csv, line 2: the line must have 3 fields"),
-    (HEADER + ROW, "time,a\n0,\n", "commands.csv, line 2: '' is no number"),
     (HEADER + ROW, "time,a\n0,1\n0,1\n", "command_times must be 2 finite times that increase"),
 ]  # fmt: skip
 
 
 def test_a_file_that_cannot_be_read_is_refused_by_its_name(tmp_path, subtests):
     for path, commands, words in FILES:
-        (tmp_path / "path.csv").write_text(path, encoding="latin-1" if "\xff" in path else "utf-8")
+        (tmp_path / "path.csv").write_text(path, encoding="utf-8")
         (tmp_path / "commands.csv").write_text(commands)
         with subtests.test(path=path, commands=commands), assert_refused(words):
             Measurement.from_csv(tmp_path / "path.csv", tmp_path / "commands.csv")

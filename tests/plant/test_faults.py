@@ -180,12 +180,3 @@ def test_whatever_goes_wrong_wires_are_cold_soon_and_never_too_hot(seeds):
         broken += [(fault, seed, what) for what in drive.tank.heated.broken(ended)]
         drive.close()
     assert not broken
-
-
-def test_the_heat_is_held_as_far_as_it_may():
-    """Or the other tests would show nothing: a wire is nearly as hot as it may be, and the plant never says no."""
-    drive = Drive(np.random.default_rng(0))
-    drive.guard.begin()
-    assert drive.swim(10.0)
-    drive.close()
-    assert Limits().hottest - 10.0 < drive.tank.heated.hottest() <= Limits().hottest

@@ -124,18 +124,12 @@ def test_what_policies_command_is_heated(name, options, policy, most):
     assert asked > 30 and masked <= most * asked and plant.heated.hottest() <= 100.0
 
 
-def test_a_swim_takes_the_numbers_of_the_scene_s_wires():
-    scene = Scene(actuator=ThermalSma(steady_rise=450.0)).at("fast")
-    with assert_refused("120 deg C", "allows 100 deg C"):
-        PlantSwim(Tank(), scene=scene)
-
-
 @pytest.mark.parametrize(
     "make, words",
-    [(lambda: Limits(hottest=20.0), "above the water's 20 deg C"), (lambda: Limits(hottest=np.nan), "Limits.hottest"),
-     (lambda: Limits(antagonists=1), "Limits.antagonists"), (lambda: Limits(wire=SmaWires()), "a ThermalSma"),
+    [(lambda: Limits(hottest=20.0), "above the water's 20 deg C"),
+     (lambda: PlantSwim(Tank(), scene=Scene(actuator=ThermalSma(steady_rise=450.0)).at("fast")), "120 deg C"),
      (lambda: PlantSwim(Tank(), Limits(0.3), scene=Scene(actuator=SmaWires(heating_time=0.3))), "134 deg C")],
 )  # fmt: skip
-def test_limits_that_cannot_be_are_refused(make, words):
+def test_limits_that_cannot_be_and_wires_of_a_scene_that_would_be_too_hot_are_refused(make, words):
     with assert_refused(words):
         make()

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bodied_oracle import Apart, Rigid, Touching, turned
+from bodied_oracle import Apart, Rigid, Touching
 from currents import CURRENTS, velocity
 from fuzz.frames import mirrored_body, swapped
 from seastar_gym import Attachment, Body, Contact, Numerics, Scene, Seastar, SmaPulse, Water
@@ -23,7 +23,7 @@ from seastar_gym.rods.newton import move_along
 from seastar_gym.rods.potential import factorise
 from seastar_gym.rods.step import REPORT_ROWS, SCHEMES, Stage, Step, share_of_body, try_step
 from seastar_gym.rods.terms.hub import Actuation
-from slopes import gradient, hessian, plain, slope
+from slopes import gradient, hessian, plain, rotated, slope
 from stages import EVERYONE, begun_on_body, unknown_rows, unknowns
 
 ANGLE, N_LIMBS = 0.3, 3
@@ -100,7 +100,7 @@ def random_stage(oracle: Rigid, gamma: float, seed: int, kind: str | None = None
     """
     rng = np.random.default_rng(seed)
     angle = rng.uniform(-9.0, 9.0)
-    u = np.append((turned(angle, folded(oracle, rng, kind)) + 0.05 * rng.standard_normal(2)).ravel(), angle)
+    u = np.append((rotated(folded(oracle, rng, kind), angle) + 0.05 * rng.standard_normal(2)).ravel(), angle)
     assert kind is None or kind in pressed(oracle, u)
     wild = np.append(np.full(len(u) - 1, 0.1), 2.0)
     back, speed = (gamma, 1.0) if kind is None else (1e-5, 0.1)
@@ -313,7 +313,7 @@ def test_steps_whose_ends_are_in_the_body_are_seen_in_their_own_robot(name):
     outside = random_stage(oracle, 2e-3, 1, "side").u
     node, inside, through = oracle.star.node(1, 3), outside.copy(), outside.copy()
     inside[2 * node : 2 * node + 2] = outside[:2] + 1e-3
-    across = turned(outside[-1], np.array([[0.0, -0.025], [0.0, 0.024]]))
+    across = rotated(np.array([[0.0, -0.025], [0.0, 0.024]]), outside[-1])
     through[2 * node - 2 : 2 * node + 2] = (outside[:2] + across).ravel()
     for end, start, good in ((outside, outside, True), (inside, outside, False), (through, outside, False),
                              (inside, inside, True), (outside, inside, True)):  # fmt: skip

@@ -116,21 +116,6 @@ def test_a_process_that_is_killed_while_it_compiles_lets_the_others_go_on(copy):
     assert second.communicate()[0].split() == ["makes", "b'code'"]
 
 
-def test_code_of_another_lane_width_is_another_code(copy):
-    results = [copy.run(SEASTAR_LANES=width) for width in ("2", "4")]
-    assert [misses for _, _, misses in results] == [1, 1]
-    assert len({energy for energy, _, _ in results}) == 1
-
-
-def test_an_edited_entry_point_outside_the_package_does_not_run_from_the_cache_either(copy):
-    module = copy.folder / "mine.py"
-    body = "from seastar_gym.lanes.compile import entry_point\n\n\n@entry_point\ndef number():\n    return {}\n"
-    module.write_text(body.format(1.5), encoding="utf-8")
-    assert copy.run("import mine; print(mine.number())") == [1.5]
-    module.write_text(body.format(2.5), encoding="utf-8")
-    assert copy.run("import mine; print(mine.number())") == [2.5]
-
-
 NUMBER = """
 from seastar_gym.lanes.compile import entry_point
 
@@ -400,26 +385,6 @@ UNFIT = {
 def test_code_of_the_package_that_does_not_fit_never_runs(shipped, monkeypatch, spoil):
     spoil(shipped, monkeypatch)
     assert [shipped.call(), shipped.call()] == [COMPILED, FOUND]
-
-
-# Whoever waits is told
-
-NUMBERS = """
-import sys
-import numba
-numba.config.CACHE_DIR = sys.argv[1]
-sys.path.insert(0, sys.argv[2])
-from mine import number
-number(1.0), number(3), number(1j)
-"""
-
-
-def said(tmp_path: Path, cache: str, before: str = "") -> str:
-    """What a process whose standard error is a pipe writes there; before: Code that it runs first."""
-    (tmp_path / "mine.py").write_text(NUMBER, encoding="utf-8")
-    environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
-    command = [sys.executable, "-c", before + NUMBERS, str(tmp_path / cache), str(tmp_path)]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stderr
 
 
 # The digest

@@ -104,9 +104,6 @@ def test_a_step_does_to_a_vibration_what_the_stability_function_says(scheme, dam
     assert abs(factor - stability(scheme, 1j * y, damping) ** n_steps) < 2e-4
 
 
-# Corners of the ramp
-
-
 # Newton's method: it ends where the potential is least, and leaves alone whom it was not asked for
 
 

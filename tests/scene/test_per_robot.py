@@ -1,26 +1,17 @@
-"""Robots of a batch with numbers of their own swim, to the last bit, as each would alone."""
-
-import pickle
+"""A simulator has the bits of its robots' numbers however it came to them; that each swims as alone: tests/fuzz."""
 
 import numpy as np
 import pytest
 
 from seastar_gym import (
-    AlongLimb,
-    Body,
-    Contact,
-    Limb,
     Numerics,
     Scene,
     Seastar,
     Simulator,
     SmaPulse,
-    Stiffening,
-    ThermalSma,
     Water,
 )
 from seastar_gym.lanes.registers import N_LANES
-from strokes import assert_same_bits
 
 N_ROBOTS = N_LANES + 3
 FAST = Numerics("sdirk2", 20e-3)
@@ -45,42 +36,7 @@ COMMANDS = np.random.default_rng(0).uniform(-1.0, 1.0, (2, N_ROBOTS, 5))
 
 SPREAD = np.linspace(0.7, 1.2, N_ROBOTS)
 LENGTHS = Seastar(limb_length=0.1 * SPREAD)
-THERMAL = ThermalSma(0.6 * SPREAD, 0.1, 0.9, 0.4 * SPREAD, 220.0 / SPREAD, 15.0 * SPREAD, 24.0 * SPREAD, 70.0 * SPREAD,
-                     56.0 * SPREAD, 21.0 * SPREAD)  # fmt: skip
-UNEVEN = Seastar(3, 10, 0.1 * SPREAD, limbs=(
-    Limb(length=0.12 * SPREAD[::-1], radius=1.6e-3 * SPREAD), Limb(natural_curvature=3.0 * (SPREAD - 1.0)),
-    Limb(radius=(2e-3, 1e-3), youngs_modulus=1e6 * SPREAD**2),
-))  # fmt: skip
-
-
-ALONG = Seastar(3, 5, along=AlongLimb(np.linspace(0.2, 1.0, N_ROBOTS)), stiffening=Stiffening(1.0 + SPREAD))
-ON_BODY = Seastar(4, 5, body=Body.rectangle(0.06, 0.03, mass=0.03 * SPREAD))
-SCENES = {
-    "numbers": varied(),
-    "pulse": Scene(LENGTHS, actuator=SmaPulse(0.5 * SPREAD), numerics=FAST),
-    "thermal": Scene(LENGTHS, actuator=THERMAL, numerics=FAST),
-    "limbs": Scene(UNEVEN, actuator=SmaPulse(0.3), numerics=FAST),
-    "contact": Scene(contact=Contact(np.geomspace(1e4, 1e6, N_ROBOTS)), numerics=Numerics.preset("fast")),
-    "bodies": Scene(ON_BODY, actuator=SmaPulse(0.5 * SPREAD), numerics=FAST),
-    "along": Scene(ALONG, actuator=SmaPulse(0.6)),
-    "tolerances of their own size": Scene(LENGTHS, numerics=Numerics("implicit-midpoint", 10e-3, 1e-4)),
-}
-
-
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name == "along")) for name in SCENES])
-def test_every_robot_swims_as_it_would_alone(name):
-    scene = SCENES[name]
-    batch, commands = Simulator(scene, N_ROBOTS, threads=2), COMMANDS[..., : scene.robot.n_limbs].copy()
-    if name == "contact":
-        commands[:] = [1.0, -1.0, 0.0, 1.0, -1.0]  # neighbours meet
-    positions = strokes(batch, commands)
-    assert len({tuple(hub) for hub in positions[:, 0]}) == N_ROBOTS
-    for robot in range(0, N_ROBOTS, 1 if name == "numbers" else 3):
-        alone = Simulator(scene.of_robot(robot))
-        np.testing.assert_array_equal(strokes(alone, commands[:, robot : robot + 1])[0], positions[robot])
-        assert_same_bits(alone.get_state(), batch.get_state().of_robots(slice(robot, robot + 1)))
-        np.testing.assert_array_equal(alone.observe_actuators()[0], batch.observe_actuators()[robot])
-        assert alone.elastic_energy()[0] == batch.elastic_energy()[robot]
+PULSES = Scene(LENGTHS, actuator=SmaPulse(0.5 * SPREAD), numerics=FAST)
 
 
 def of_moduli(moduli) -> Scene:
@@ -106,11 +62,10 @@ def changed_by_masks() -> Simulator:
 MASKED = of_moduli(np.where(np.arange(N_ROBOTS) % 3 == 1, 5e5, 7e5))
 OTHER_SIZES = Scene(Seastar(limb_length=0.1 * SPREAD[::-1]), actuator=SmaPulse(0.5 * SPREAD), numerics=FAST)
 SAME = {
-    "other sizes and actuators": (lambda: changed(SCENES["pulse"], OTHER_SIZES), OTHER_SIZES),
-    "one scene for all": (lambda: changed(SCENES["pulse"], Scene(numerics=FAST)), Scene(numerics=FAST)),
+    "other sizes and actuators": (lambda: changed(PULSES, OTHER_SIZES), OTHER_SIZES),
+    "one scene for all": (lambda: changed(PULSES, Scene(numerics=FAST)), Scene(numerics=FAST)),
     "robots in a mask": (changed_by_masks, MASKED),
     "equal robots": (lambda: Simulator(of_moduli(np.full(N_ROBOTS, 1e6)), N_ROBOTS), Scene(numerics=FAST)),
-    "a copy": (lambda: pickle.loads(pickle.dumps(Simulator(varied(), N_ROBOTS))), varied()),
 }
 
 

@@ -77,6 +77,3 @@ def test_scenes_and_numerics_are_shown_as_the_short_call_that_makes_them(part):
 
 def test_notebooks_show_every_part_of_a_scene_with_its_units(golden):
     golden("shown.html", "\n".join(part._repr_html_() for part in (SCENES[2], Numerics())))
-
-
-# Swims at their limits

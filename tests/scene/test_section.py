@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.special import ellipe, ellipk, ellipkm1
 
-import oracle
 from exact.solutions import let_pass, pause
 from seastar_gym import (
     Disc,
@@ -25,7 +24,7 @@ from seastar_gym import (
 )
 from seastar_gym.model import make_mesh, make_rods
 from seastar_gym.scene.section import BROADSIDE, broadside
-from unlike import DIFFERENT, robot_and_star
+from unlike import robot_and_star
 
 WIDTH, HEIGHT, E = 2e-3, 8e-3, 1e6
 STRIP, TUBE = Strip(WIDTH, HEIGHT), Tube(2e-3, 1.2e-3)
@@ -159,16 +158,6 @@ def test_a_limb_sinks_or_rises_with_the_speed_at_which_drag_holds_its_weight(sec
 
 CLAMP = (0, 1)
 """Held nodes: the limb is then clamped in the middle of its root edge, see tests/exact/test_exact.py."""
-
-
-@pytest.mark.parametrize("name", DIFFERENT)
-def test_a_robot_of_any_shape_rests_without_energy(name):
-    robot, star = robot_and_star(name)
-    np.testing.assert_allclose(robot.nodes(), star.rest, atol=1e-15)
-    assert oracle.elastic_energy(star, star.rest, np.zeros(star.n_limbs)) < 1e-25
-    simulator = Simulator(Scene(robot, actuator=SmaPulse(0.0), numerics=Numerics(step=0.1)))
-    simulator.stroke(np.zeros((1, robot.n_limbs)))
-    np.testing.assert_allclose(simulator.positions[0], robot.nodes(), atol=1e-12)
 
 
 def numbers(bundle) -> list:

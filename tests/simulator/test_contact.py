@@ -11,6 +11,7 @@ import pytest
 import oracle
 from currents import NONE
 from hubs import TEN
+from momenta import cross
 from seastar_gym import (
     Attachment,
     Body,
@@ -50,10 +51,6 @@ def images(command: np.ndarray) -> list[tuple[float, ...]]:
 
 DISTINCT = CLOSING[[tuple(command) == min(images(command)) for command in CLOSING]]
 """One of each class of closing commands that are the same but for a rotation or a mirror."""
-
-
-def cross(a, b):
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 def crossings(positions: np.ndarray, n_limbs: int = 5, pairs: list[tuple[int, int]] | None = None) -> np.ndarray:

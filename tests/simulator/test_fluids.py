@@ -1,25 +1,19 @@
 """Whole scenes with fluids, gravity and material damping, in their limits and against closed forms."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
 from seastar_gym import (
-    Contact,
     Numerics,
     Scene,
     Seastar,
     Simulator,
     SmaPulse,
-    State,
     UniformCurrent,
     Water,
     relaxation_time,
 )
-from seastar_gym.lanes.registers import N_LANES
-from strokes import finished
 
 # Closed forms
 
@@ -95,65 +89,5 @@ def test_added_mass_lowers_the_frequency_as_a_heavier_limb_would():
     assert loaded / plain == pytest.approx(np.sqrt(1200.0 / (1200.0 + 0.7 * 900.0)), rel=2e-3)
 
 
-# A robot that is seen from a moving frame, in a current that moves likewise, moves as it does at home.
-
-
-NUMERICS = {
-    **{name: Numerics.preset(name) for name in ("fast", "balanced", "accurate", "chapter")},
-    "sdirk2": Numerics("sdirk2", 10e-3),
-    "loose": Numerics("implicit-midpoint", 5e-3, newton_tolerance=5e-4),
-}
 STILL = Water(1000.0, 1.0, 0.1, UniformCurrent(), 1.0)
 """Water with drag along limbs and added mass of its own."""
-NEEDED = {"fast", "balanced", "sdirk2", "loose"}
-"""Those with steps so long that some are halved or cut."""
-LOADS = (9, 2e-4, -1e-4), (20, 0.0, 3e-4)
-PARTS, FORESEEABLE = 100, 10
-"""Pauses of a stroke, and those until which rounding has not grown to what is seen."""
-
-
-def seen_from(boost: np.ndarray, scene: Scene, noise: float, shake: float = 0.0) -> tuple[np.ndarray, int]:
-    """Positions during a stroke, seen from the frame [m], and the number of steps that were halved or cut.
-
-    Positions have the shape (PARTS, n_robots, n_nodes, 2). boost: Velocity added to all motion [m/s]. noise, shake:
-    Sizes of two random displacements of the nodes [m].
-    """
-    if scene.fluid is not None:
-        scene = replace(scene, fluid=replace(scene.fluid, current=UniformCurrent(*boost)))
-    simulator, rng = Simulator(scene, N_LANES), np.random.default_rng(0)
-    moved, velocities, shaken = rng.standard_normal((3, N_LANES, scene.robot.n_nodes, 2))
-    positions = scene.robot.nodes() + noise * moved + shake * shaken
-    simulator.set_state(State(positions, 50.0 * noise * velocities + boost, np.zeros(N_LANES)))
-    stroke = simulator.stroke_in_parts(rng.integers(-1, 2, (N_LANES, scene.robot.n_limbs)).astype(float), PARTS)
-    way, report = finished(stroke, lambda time: -boost * time + simulator.positions)
-    assert np.median(report.status) == 0
-    return np.array(way), int(report.halvings.sum() + report.energy_cuts.sum())
-
-
-FRAMES = {
-    # Terms of NONE, of which a relaxation time of 0 shows nothing, either.
-    **{f"water, {name}": (Scene(Seastar(relaxation_time=0.0), STILL, numerics=each), 1e-3, name in NEEDED)
-       for name, each in NUMERICS.items()},
-    # With a rigid hub no step of "fast" and "sdirk2" needs to be halved or cut in vacuum.
-    **{f"vacuum, {name}": (Scene(Seastar(), None, numerics=each), 1e-3, name in NEEDED - {"fast", "sdirk2"})
-       for name, each in NUMERICS.items()},
-    # Dead loads do work on the frame's way, too.
-    **{f"loaded limbs that touch, {name}": (
-        Scene(Seastar(relaxation_time=1e-4), STILL, numerics=NUMERICS[name], loads=LOADS, contact=Contact()),
-        1e-4, False,
-    ) for name in ("fast", "balanced", "chapter")},
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("scene, noise, needs", FRAMES.values(), ids=FRAMES)
-def test_a_robot_moves_alike_in_every_frame(scene, noise, needs):
-    """Another frame moves robots no farther than shaking them by rounding does, in the median.
-
-    Robots that ring wildly are chaotic. needs: Whether some steps are halved or cut.
-    """
-    home, needed = seen_from(np.zeros(2), scene, noise)
-    moving, _ = seen_from(np.array([0.31, -0.17]), scene, noise)
-    shaken, _ = seen_from(np.zeros(2), scene, noise, 1e-15)
-    by_rounding, by_frame = (np.median(np.abs(other - home).max(axis=(2, 3)), axis=1) for other in (shaken, moving))
-    assert np.all(by_frame[:FORESEEABLE] < 1e-13 + 1e3 * by_rounding[:FORESEEABLE])
-    assert needed > 0 or not needs

@@ -410,7 +410,7 @@ def passes_in_a_fork(promise: Callable[[], None]) -> bool:
         signal.alarm(60)
         try:
             promise()
-        except BaseException:
+        except BaseException:  # the child must not go on to the parent's other tests
             os._exit(1)
         os._exit(0)
     return os.waitpid(child, 0)[1] == 0

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from own_terms import Trap
+from refusals import assert_refused
 from seastar_gym import Body, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, register_scheme, register_term
 from seastar_gym.envs.symmetry import require_symmetry
 from seastar_gym.gradients import differentiate
@@ -99,11 +100,6 @@ def test_the_guard_knows_an_own_energy():
     assert after.sum() <= before.sum() + 1e-8 * after[1]
 
 
-def test_scenes_with_own_terms_and_schemes_come_back_from_plain_data():
-    scene = trapped(Trap(k=1 / 3, c=np.array([0.1, 1 / 7])))
-    assert Scene.from_dict(scene.to_dict()) == scene
-
-
 SOURCE = """
 from constants import RATE
 from seastar_gym.lanes.compile import kernel
@@ -177,7 +173,7 @@ REFUSED = {
     "a list": (
         swims(wrong(None, lambda c, x, y: (0.5 * c * x * x, [c * x, 0.0 * y], (c, 0.0, 0.0)))), "does not compile: ",
     ),
-    "a power": (swims(wrong(lambda c, x, y: (0.5 * c * x**2, (c * x, 0.0), (c, 0.0, 0.0)))), "for \\*\\* or pow"),
+    "a power": (swims(wrong(lambda c, x, y: (0.5 * c * x**2, (c * x, 0.0), (c, 0.0, 0.0)))), "for ** or pow"),
     "an infinite one": (
         swims(wrong(lambda c, x, y: (c / x, (-c / (x * x), 0.0 * y), (2.0 * c / (x * x * x), 0.0 * c, 0.0 * c)))),
         "is not finite where both",
@@ -207,10 +203,8 @@ REFUSED = {
 
 @pytest.mark.parametrize(("call", "sentence"), REFUSED.values(), ids=REFUSED)
 def test_what_cannot_be_done_is_said_in_a_sentence(call, sentence):
-    with pytest.raises(ValueError, match=sentence) as refused:
+    with assert_refused(sentence):
         call()
-    assert str(refused.value).endswith(".")
-    assert "\n" not in str(refused.value)
 
 
 def test_error_bars_know_own_terms():

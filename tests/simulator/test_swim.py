@@ -6,13 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hubs import HUBS, TEN, robot_with
+from hubs import TEN
 from seastar_gym import AlongLimb, Numerics, Scene, Seastar, Simulator, SmaPulse, Stiffening, Vortex, Water
+from slopes import rotated
 
 CHAPTER = Seastar(discretisation="chapter")
 SCHEMES = ["implicit-euler", "sdirk2", "implicit-midpoint"]
 STRAIGHT = np.array([[0.0, 1.0, 0.0, 0.0, -1.0]])
-FIFTH_OF_TURN = 2.0 * np.pi / 5.0
 
 
 def swimmer(scheme, step, n_robots=1, robot=TEN) -> Simulator:
@@ -57,63 +57,6 @@ def test_schemes_agree_on_the_converged_distance_and_fidelities_are_as_far_off_a
     assert error > 5e-5 or path[0, 0, 0] == pytest.approx(one, rel=2e-5)
 
 
-# The pairs of Fig. 13.8
-
-PAIRS = np.array(
-    [[-1.0, 1.0, 0.0, 0.0, 0.0], [-1.0, 0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0, 1.0]]
-)
-BISECTORS = [36.0, 72.0, 108.0, 144.0]
-
-
-@pytest.mark.parametrize("robot, third_goes_farther", [(CHAPTER, False), (TEN, True)], ids=["chapter", "new"])
-def test_every_pair_of_figure_13_8_moves_along_its_bisector_and_1_4_goes_farthest(robot, third_goes_farther):
-    """That {1-,5+} goes farther than {1-,3+} is the chapter's discretisation, not mechanics."""
-    hub = swim(swimmer("implicit-midpoint", 0.5e-3, 4, robot=robot), PAIRS)[-1]
-    np.testing.assert_allclose(np.degrees(np.arctan2(hub[:, 1], hub[:, 0])), BISECTORS, rtol=0.0, atol=0.01)
-    minus_1_plus_2, minus_1_plus_3, minus_1_plus_4, minus_1_plus_5 = np.hypot(*hub.T)
-    assert minus_1_plus_4 > max(minus_1_plus_5, minus_1_plus_3) > min(minus_1_plus_5, minus_1_plus_3) > minus_1_plus_2
-    assert (minus_1_plus_3 > minus_1_plus_5) == third_goes_farther
-
-
-# Symmetry
-
-
-def random_commands(n_robots: int, n_limbs: int = 5) -> np.ndarray:
-    return np.random.default_rng(4).uniform(-1.0, 1.0, (2, n_robots, n_limbs))
-
-
-def turned(vectors: np.ndarray, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return vectors @ np.array([[c, s], [-s, c]])
-
-
-BENT = Seastar(nodes_per_limb=6, along=AlongLimb(0.8, (1.0, 0.5)), stiffening=Stiffening())
-PENTAGONS = {
-    **{f"{scheme}, {hub}": (scheme, robot_with(hub), 1e-13) for scheme in SCHEMES for hub in HUBS},
-    "bent along": ("implicit-midpoint", BENT, 1e-9),
-}
-
-
-@pytest.mark.parametrize("scheme, robot, rounding", PENTAGONS.values(), ids=PENTAGONS)
-def test_commanding_the_next_limb_turns_the_swim_by_72_degrees_and_mirrored_commands_mirror_it(scheme, robot, rounding):
-    mirror = [0, 4, 3, 2, 1]
-    simulators = [Simulator(Scene(robot, actuator=SmaPulse(0.5), numerics=Numerics(scheme, 0.01)), 8) for _ in range(3)]
-    for commands in random_commands(8):
-        carried = commands, np.roll(commands, 1, axis=1), -commands[:, mirror]
-        for simulator, its_commands in zip(simulators, carried, strict=True):
-            simulator.stroke(its_commands)
-    plain, next_limb, mirrored = (simulator.positions for simulator in simulators)
-
-    def moved(order):
-        limbs = plain[:, 1:].reshape(8, 5, -1, 2)[:, order]
-        return np.concatenate([plain[:, :1], limbs.reshape(8, -1, 2)], axis=1)
-
-    assert np.abs(plain - robot.nodes()).max() > 1e-3
-    expected = turned(moved([4, 0, 1, 2, 3]), FIFTH_OF_TURN)
-    np.testing.assert_allclose(next_limb, expected, rtol=0.0, atol=rounding)
-    np.testing.assert_allclose(mirrored, moved(mirror) * [1.0, -1.0], rtol=0.0, atol=rounding)
-
-
 # Convergence
 
 BENDING = Scene(Seastar(3, 4, youngs_modulus=1e4), Water(), SmaPulse(0.1, 0.02, 0.02))
@@ -144,7 +87,7 @@ def end_of_a_stroke(scene: Scene, scheme: str, commands: tuple[float, ...], n_st
     if scene is BENDING:
         nodes, arc = robot.nodes(), np.arange(1, 4) * robot.edge_length
         bent = np.stack([np.sin(3.0 * arc) / 3.0, (1.0 - np.cos(3.0 * arc)) / 3.0], axis=1)
-        nodes[1:] = np.concatenate([turned(bent, limb * robot.opening_angle) for limb in range(3)])
+        nodes[1:] = np.concatenate([rotated(bent, limb * robot.opening_angle) for limb in range(3)])
         simulator.set_state((nodes[None], np.tile([0.3, 0.1], (1, robot.n_nodes, 1)), np.zeros(1)))
     report = simulator.stroke([commands])
     assert report.status[0] == 0 and report.halvings[0] == 0
@@ -166,11 +109,6 @@ def test_error_falls_with_the_order_of_the_scheme(scene, scheme, commands, count
 PEAK, HEATING = 0.3, 0.1
 COMMAND = [[1.0, -1.0, 0.0, 0.5, 0.0]]
 EI = 1e6 * np.pi * 1.6e-3**4 / 4.0
-
-
-def powered(step: float) -> Simulator:
-    numerics = Numerics("implicit-midpoint", step)
-    return Simulator(Scene(Seastar(5, 8), actuator=SmaPulse(PEAK), numerics=numerics), effort=True)
 
 
 CLAMP = EI / (5.0 / 12.0 * 0.1 / 5)
@@ -206,12 +144,3 @@ def test_in_vacuum_work_becomes_elastic_and_kinetic_energy_to_second_order_of_th
         lacking.append(work - (simulator.elastic_energy() + simulator.kinetic_energy())[0])
     assert abs(lacking[1]) < share * work
     assert lacking[0] / lacking[1] == pytest.approx(4.0, rel=0.1)
-
-
-def test_work_in_water_converges_and_most_of_it_is_lost_to_drag():
-    coarse, middle, fine = powered(4e-3), powered(2e-3), powered(1e-3)
-    work = [simulator.stroke(COMMAND).work[0] for simulator in (coarse, middle, fine)]
-    assert abs(work[1] - work[2]) < 0.5 * abs(work[0] - work[1]) < 0.01 * work[2]
-    assert 0.0 < (fine.elastic_energy() + fine.kinetic_energy())[0] < 0.1 * work[2]
-    untold = Simulator(fine.scene).stroke(COMMAND)
-    assert np.isnan(untold.work).all() and np.isnan(untold.peak_moment).all()

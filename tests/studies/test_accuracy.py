@@ -24,9 +24,7 @@ TINY = {
 
 
 def test_the_chapters_swims_and_what_policies_do_are_classes():
-    ten, pentagon = study.of_strokes(2, 0, (2, 1))
-    heated = [tuple(np.flatnonzero(side) + 1) for side in pentagon.commands["chapter's"][::3, 0]]
-    assert heated == [(2, 5), (1, 3), (2, 4), (3, 5), (1, 4)]  # (13.15)
+    ten, _ = study.of_strokes(2, 0, (2, 1))
     np.testing.assert_array_equal(ten.commands["chapter's"][:, 0], [STRAIGHT] * 10)
     np.testing.assert_array_equal(ten.commands["repeated ternary"][-1], study.every_command())
     timed = study.in_time(3, 0, 0.2).commands

@@ -37,10 +37,8 @@ SHORTEST = {
         "studies.ids": {"IDS": {"SeastarPrey-v0": TASKS["SeastarPrey-v0"]}, "SECONDS": 2, "SHOWN": 1},
     }),
     "robustness": ({"robustness.json"}, {
-        "studies.robustness": {"N_PATHS": 1, "SEEDS": range(1), "OF_SEEDS": ("soft",),
-                               "PERIODS": {robustness.CAMERA: 0.2},
+        "studies.robustness": {"N_PATHS": 1, "PERIODS": {robustness.CAMERA: 0.2},
                                "CONDITIONS": {"soft": robustness.Condition(modulus=0.5)}},
-        "agents.distillation": {"ENOUGH": 2048},
     }),
     "swim_page": ({""}, {"studies.swim_page": {"record": partial(swim_page.record, "fast", 1)}}),
     "tasks --tasks SeastarPrizes-v0": (set(), {"studies.tasks": {"held_out": partial(tasks.held_out, n=2)}}),

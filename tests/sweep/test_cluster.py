@@ -46,7 +46,6 @@ def test_a_node_that_is_killed_in_mid_sweep_costs_its_cells(cluster, tmp_path):
     tally = run(sweep.batches(), tmp_path, RayTasks(cluster.address), kill_a_node, works.slow)
     parts = ResultFiles(tmp_path)
     nodes = Counter(read_result_file(parts.file(name))["text"][0].as_py() for name in parts.names())
-    print(f"{tally.done} batches done, {tally.losses} lost with their node and run again; by nodes: {nodes.values()}")
     assert tally.done == 24 and not tally.problems
     assert 1 <= tally.losses <= 4
     assert set(parts.names()) == {batch.name for batch in sweep.batches()}
@@ -72,7 +71,6 @@ def test_a_full_disk_on_a_node_costs_cells_that_need_it(cluster, tmp_path, small
     sweep = Sweep(Scene.preset("fast"), (axis,), settling=0, measured=1, robots=1)
     executor = RayTasks(cluster.address)
     tally = run(sweep.batches(), tmp_path / "out", executor, work=works.scratching)
-    print(f"{tally.done} batches done, {tally.losses} attempts refused, {len(tally.problems)} batches without result")
     assert tally.losses >= 1 and tally.done + len(tally.problems) == 30 and tally.done >= 15
     assert all("no space left on device" in problem for problem in tally.problems.values())
     grow()

@@ -13,7 +13,7 @@ from seastar_gym.command import INTERRUPTED
 from seastar_gym.scene import Scene, Seastar
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.scene.serial import to_dict
-from seastar_gym.sweep.command import as_text, axis_of, main
+from seastar_gym.sweep.command import axis_of, main
 from seastar_gym.sweep.designs import Choices, Range
 from seastar_gym.sweep.run import Progress, ResultFiles, read_results
 
@@ -81,28 +81,6 @@ def test_a_search_from_words_to_its_best(tmp_path, capsys):
     assert (tmp_path / "somebody's").read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    "words, sentence",
-    [
-        (["robot.colour=1,2"], "nothing that a sweep can vary"),
-        (["robot.n_limbs="], "NAME=VALUES"),
-        (["robot=@nowhere.json"], "nowhere.json"),
-        (["--workers", "0"], "workers"),
-    ],
-)
-def test_bad_input_is_one_sentence(words, sentence, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    try:
-        code = main([*words, "--out", str(tmp_path / "out"), "--settling", "0", "--measured", "1"])
-        told = capsys.readouterr().err
-    except OSError as refused:  # of which `run_command` makes a sentence
-        code, told = 2, str(refused)
-    assert code == 2
-    last = told.strip().splitlines()[-1]
-    assert sentence in last
-    assert not list((tmp_path / "out").glob("parts/*/*"))
-
-
 def command(tmp_path, *words):
     seastar = "from seastar_gym.cli.main import run; run()"
     arguments = [sys.executable, "-c", seastar, "sweep", *words, "--out", str(tmp_path)]
@@ -140,12 +118,6 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path, monkeypatch):
     monkeypatch.setattr("seastar_gym.sweep.command.bar_of", lambda *_: interrupt)
     assert main([*words[:-2], "--executor", "here", "--out", str(tmp_path)]) == INTERRUPTED
     assert {*kept} == {len(names)} and len(names | {*ResultFiles(tmp_path).names()}) == len(names) + 3
-
-
-def test_what_was_done_is_told_with_what_was_not(golden):
-    told = {"kept": 2, "done": 1, "designs": 1234}
-    some = Progress(**told, problems={"0123456789": "Lost."}), Progress(**told, damaged=[Path("a"), Path("b")])
-    golden("told.txt", "\n".join(as_text(tally, Path("out")) for tally in some))
 
 
 @pytest.mark.parametrize("problems, code", [({}, 0), ({"cell": "Lost."}, 1)])

@@ -27,6 +27,3 @@ def test_a_row_is_trained_after_a_stop_evaluated_and_merged(story):
     assert [one["measure"] for one in mine] == [one["measure"] for one in trained]
     story.types(f"seastar evaluate --merge runs/mine/benchmark.json {files[0].relative_to(story.folder)}")
     assert "mine" in story.told and "PPO" in story.told and "(2)" in story.told
-    story.has("other.json", json.dumps({"cells": [trained[0] | {"contract": "of yesterday"}]}))
-    story.types("seastar evaluate --merge runs/mine/benchmark.json other.json", ends=2)
-    assert "different contracts of SeastarStation-v0" in story.told

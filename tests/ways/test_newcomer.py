@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from ways.story import block, command
+from ways.story import command
 
 
 @pytest.mark.parametrize("options, slowest", [("", 155.0), ("--seed 1 --decision-period 0.5 --strokes 65536", 120.0)])
@@ -15,8 +15,3 @@ def test_the_first_command_ends_with_a_lap_and_a_report(story, options, slowest)
     assert float(laps["learned"]) <= slowest, story.told
     assert float(laps["script"]) == pytest.approx(114.5 if "0.5" in options else 241.0, rel=0.01)
     assert (story.folder / "run/evaluation/report.html").stat().st_size > 10_000
-
-
-def test_the_ten_lines_open_a_window(story):
-    code = block("README.md", 'render_mode="human"')
-    story.runs(code.replace("gym.make(", "gym.make(max_episode_steps=10, id="))

@@ -56,10 +56,3 @@ def test_an_edited_force_is_another_force(story):
     code = (story.folder / "drag.py").read_text("utf-8")
     story.has("drag.py", code.replace("return 0.5 * c *", "c = 2.0 * c\n        return 0.5 * c *"))
     assert swum(0.01) == pytest.approx(twice, rel=1e-9) != pytest.approx(once, rel=1e-3)
-
-
-def test_who_did_not_import_the_force_is_told(story):
-    story.has("drag.py", block(PAGE, "class LinearDrag").partition("\nscene = ")[0])
-    story.runs(f"{SCENE.format(3, 0.01)}\nimport json\nopen('scene.json', 'w').write(json.dumps(scene.to_dict()))")
-    story.types("seastar evaluate --scene scene.json --agents greedy", ends=2)
-    assert "LinearDrag" in story.told and "has to be registered" in story.told

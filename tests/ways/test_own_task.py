@@ -52,8 +52,3 @@ def test_a_task_of_ones_own_is_an_id_that_is_promised_trained_on_and_compared(st
     rows = json.loads((story.folder / "runs/away.json").read_text("utf-8"))
     far = {row["agent"]: sum(row["scores"]) / 5 for row in rows}
     assert far["mine"] > 1.2 * far["random"] and set(far) == {gait, "mine", "random"}, far
-
-
-def test_a_task_that_is_not_there_is_told(story):
-    story.types("seastar evaluate --task nowhere:SeastarAway-v0 --agents rest", ends=2)
-    assert story.told.strip().endswith("No module named 'nowhere'.")

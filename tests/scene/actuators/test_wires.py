@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-import oracle
-from seastar_gym import AlongLimb, Scene, Seastar, SmaLimb, SmaPulse, SmaWires, ThermalSma
+from seastar_gym import AlongLimb, Scene, Seastar, SmaLimb, SmaWires, ThermalSma
 from seastar_gym.scene.actuators.base import check_actuator
 from seastar_gym.scene.actuators.sma_limb import MEASURED
 from studies.fit import curvature
@@ -32,17 +31,6 @@ def march(wires: SmaWires, given: list[tuple[float, float]], dt: float = 1e-4):
             left, seconds = np.maximum(left - dt, 0.0), seconds + dt * heated.sum()
             marched.append(x)
         yield marched[n // 2], x, left, seconds
-
-
-@pytest.mark.parametrize("heating, cooling", [(0.1, 0.9), (1 / 7, 6 / 7), (0.3, 0.1)])
-def test_a_full_command_from_rest_is_the_pulse_to_the_bit(heating, cooling):
-    wires, pulse = SmaWires(0.6, heating, cooling), SmaPulse(0.6, heating, cooling)
-    t = np.linspace(0.0, 1.1 * pulse.period, 1001)
-    assert wires.period == pulse.period and wires.corners == pulse.corners
-    np.testing.assert_array_equal(wires.delta_psi(t), pulse.delta_psi(t))
-    turned, after = wires.respond(t, np.array([1.0, 0.0, -1.0]), np.zeros((3, 4)))
-    np.testing.assert_array_equal(turned, np.multiply.outer(pulse.delta_psi(t), [1.0, 0.0, -1.0]))
-    assert not after.any()
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -219,17 +207,3 @@ def test_presets_bend_by_what_was_measured_and_nearly_reach_their_peak_in_every_
     assert SmaLimb.preset(liquid_metal, limb_length=0.03).peak_angle == pytest.approx(change * 0.03, rel=1e-15)
     each = SmaLimb.preset(liquid_metal, limb_length=np.array([0.01, 0.03]))
     assert Scene(Seastar(along=AlongLimb()), actuator=each).n_robots == 2
-
-
-# The pulse is the ramp of Fig. 13.5b.
-
-
-CHAPTER = (0.0, 0.1, 1.0)
-
-
-def test_pulse_is_exact_at_its_corners_and_that_of_the_oracle_between_them():
-    actuator = SmaPulse()
-    assert actuator.corners == CHAPTER and actuator.period == 1.0
-    assert actuator.delta_psi(CHAPTER).tolist() == [0.0, np.pi / 5, 0.0]
-    times = np.linspace(0.0, 0.999, 1000)
-    np.testing.assert_allclose(actuator.delta_psi(times), [oracle.pulse(t) for t in times], rtol=0.0, atol=1e-15)
