@@ -9,7 +9,7 @@ often as it decides, where options name none.
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 import gymnasium as gym
 
@@ -25,10 +25,6 @@ from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene import load_scene
-
-if TYPE_CHECKING:
-    import gymnasium as gym
-
 
 LEARNED_PERIOD = 0.2
 """Time between decisions of the learned policy on a path, where no option says another [s]."""
