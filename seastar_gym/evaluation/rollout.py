@@ -164,27 +164,17 @@ def seconds_to_success(episodes: Episodes) -> Floats:
     return np.where(episodes.success, episodes.last("time"), episodes.limit)
 
 
-def catches(episodes: Episodes) -> Floats:
-    """Prey caught."""
-    return episodes.last("catches").astype(float)
-
-
 def mean_distance(episodes: Episodes) -> Floats:
     """Mean distance from the station [mm] once SETTLED has passed."""
     settled = np.where(episodes.of("time") > SETTLED, episodes.of("distance"), np.nan)
     return np.asarray(1000.0 * np.nanmean(settled, axis=0))
 
 
-def prizes(episodes: Episodes) -> Floats:
-    """Worth of the prizes taken."""
-    return episodes.last("taken").astype(float)
-
-
 SECONDS = Measure("time until done", "s", "less", seconds_to_success)
 MEASURES: dict[type[Any], Measure] = {
-    Prey: Measure("prey caught", "1", "more", catches),
+    Prey: Measure("prey caught", "1", "more", lambda episodes: episodes.last("catches").astype(float)),
     Station: Measure("mean distance", "mm", "less", mean_distance),
-    Prizes: Measure("worth of prizes", "1", "more", prizes),
+    Prizes: Measure("worth of prizes", "1", "more", lambda episodes: episodes.last("taken").astype(float)),
 }
 """Measures of tasks that are not done at some time; those of one's own join them."""
 
