@@ -102,11 +102,6 @@ class Efficiency:
         return ResultsTable("Sample efficiency", columns, [asdict(self)])
 
 
-def write(found: Efficiency, folder: Path) -> None:
-    """Write the figures into the folder of a run."""
-    write_json(folder / FILE, asdict(found))
-
-
 def read(folder: Path) -> Efficiency:
     """Figures in the folder of a run; those of a beginning where there are none."""
     file = folder / FILE
@@ -223,7 +218,7 @@ def record(folder: Path, strokes: int, seconds: float, pentagon: Swim) -> Effici
     rows.append([strokes, pentagon.strokes, pentagon.waypoints_reached])
     write_lines(folder / "progress.csv", rows)
     found = read(folder).after(strokes, seconds, pentagon)
-    write(found, folder)
+    write_json(folder / FILE, asdict(found))
     return found
 
 
