@@ -127,7 +127,7 @@ class Lines:
         data = sealed(line)
         try:
             if os.write(self._file.fileno(), data) != len(data):
-                raise PlantError("The plant takes no more lines: its other end does not read them.")
+                raise BlockingIOError
         except BlockingIOError:
             raise PlantError("The plant takes no more lines: its other end does not read them.") from None
         except OSError as broken:
