@@ -147,7 +147,8 @@ def held(folder: Path, new: bool) -> Iterator[None]:
     try:
         _lock(descriptor, folder)
         require_empty(folder) if new else require_own_files(folder)
-        _clear(folder)
+        for file in filter(is_left_behind, [*folder.rglob(f".*{PART}")]):
+            file.unlink()
         yield
     finally:
         os.close(descriptor)
@@ -182,12 +183,6 @@ def require_own_files(folder: Path) -> None:
             file = Path(place, name)
             if file.is_symlink() or not (file.is_file() or file.is_dir()):
                 raise ValueError(f"{file} is a link or a device, which no run has in its folder: take it out.")
-
-
-def _clear(folder: Path) -> None:
-    """Remove what a process that was killed was writing."""
-    for file in filter(is_left_behind, [*folder.rglob(f".*{PART}")]):
-        file.unlink()
 
 
 def export(model: PPO, folder: Path) -> None:

@@ -97,8 +97,9 @@ def rollout(
     """
     is_batch = isinstance(env, gym.vector.VectorEnv)
     require_kind("env", env, gym.Env | gym.vector.VectorEnv, "an environment or a batch")
-    if is_batch:
-        require_next_step("A rollout", env)
+    if is_batch and (mode := env.metadata.get("autoreset_mode")) is not AutoresetMode.NEXT_STEP:
+        # Elsewhere info at the end of an episode is that of the next one.
+        raise ValueError(f"A rollout needs autoreset_mode=AutoresetMode.NEXT_STEP, not {mode}.")
     require_policy(policy)
     require_texts("record", record)
     if until is not None:
@@ -132,13 +133,6 @@ def rollout(
         is_over = look(info)
     entries = {name: np.array(values) for name, values in kept.items()}
     return Episodes(entries, success, returns, decisions, waypoints if is_batch else (waypoints,))
-
-
-def require_next_step(who: str, batch: Any) -> None:
-    """ValueError where a batch begins episodes otherwise than with the step after an end, so that info is another's."""
-    mode = batch.metadata.get("autoreset_mode")
-    if mode is not AutoresetMode.NEXT_STEP:
-        raise ValueError(f"{who} needs autoreset_mode=AutoresetMode.NEXT_STEP, not {mode}.")
 
 
 SETTLED = 30.0
