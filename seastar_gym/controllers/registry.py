@@ -215,6 +215,7 @@ def load_agents(
     decision_period: Time between decisions [s]. None means strokes. scene: Scene that agents know, with its numerics.
     None means the chapter's at `fidelity`.
     """
+    require_texts("Agents", names)
     _, makers = _makers(names, seed, fidelity, decision_period, scene)
     return {label: make() for label, make in makers.items()}
 
