@@ -95,7 +95,8 @@ def filmed_beside(agent: str | None, options: Options, folder: Path) -> Iterator
         yield lambda: None
         return
     with tempfile.TemporaryDirectory(prefix="seastar-film-", ignore_cleanup_errors=True) as place:
-        process = _begun(["--agents", agent, *physics(options, folder.resolve()), "--video", "--out", place])
+        words = ["--agents", agent, *physics(options, folder.resolve()), "--seconds", str(options.seconds)]
+        process = _begun([*words, "--video", "--out", place])
 
         def film() -> Path | None:
             file = Path(place, f"{agent}.mp4")

@@ -112,12 +112,17 @@ class Options:
             return self.strokes
         return ENOUGH if self.ppo.decision_period is None else ENOUGH_IN_TIME
 
+    @property
+    def seconds(self) -> float:
+        """Time limit of an evaluated swim [s]."""
+        return TIME_LIMIT
+
     def limit(self, scene: Scene | None = None) -> int:
         """Time limit of an evaluated swim [decisions]; the scripted gait takes 241 s round the pentagon.
 
         scene: Of the robot. None means the chapter's.
         """
-        return decisions_in(TIME_LIMIT, self.ppo.decision_period, scene)
+        return decisions_in(self.seconds, self.ppo.decision_period, scene)
 
 
 CHANGEABLE = {
