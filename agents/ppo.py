@@ -47,6 +47,7 @@ from seastar_gym.scene.checks import (
     require_flag,
     require_kind,
     require_number,
+    require_period,
     shown,
 )
 from seastar_gym.simulator import Simulator
@@ -111,8 +112,7 @@ class Hyperparameters:
         for name in ("num_envs", "rollout", "batch_size", "epochs"):
             require_count(name, getattr(self, name), 1, 2**31)
         require_number("max_episode_time", self.max_episode_time, "s")
-        if self.decision_period is not None:
-            require_number("decision_period", self.decision_period, "s")
+        require_period(self.decision_period)
         for name in ("learning_rate", "discount", "gae_lambda", "clip_range", "entropy"):
             require_finite(name, getattr(self, name), "1")
         require_flag("symmetry", self.symmetry)

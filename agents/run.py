@@ -102,11 +102,6 @@ class Efficiency:
         return ResultsTable("Sample efficiency", columns, [asdict(self)])
 
 
-def write(found: Efficiency, folder: Path) -> None:
-    """Write the figures into the folder of a run."""
-    write_json(folder / FILE, asdict(found))
-
-
 def read(folder: Path) -> Efficiency:
     """Figures in the folder of a run; those of a beginning where there are none."""
     file = folder / FILE
@@ -152,7 +147,8 @@ def held(folder: Path, new: bool) -> Iterator[None]:
     try:
         _lock(descriptor, folder)
         require_empty(folder) if new else require_own_files(folder)
-        _clear(folder)
+        for file in filter(is_left_behind, [*folder.rglob(f".*{PART}")]):
+            file.unlink()
         yield
     finally:
         os.close(descriptor)
@@ -189,12 +185,6 @@ def require_own_files(folder: Path) -> None:
                 raise ValueError(f"{file} is a link or a device, which no run has in its folder: take it out.")
 
 
-def _clear(folder: Path) -> None:
-    """Remove what a process that was killed was writing."""
-    for file in filter(is_left_behind, [*folder.rglob(f".*{PART}")]):
-        file.unlink()
-
-
 def export(model: PPO, folder: Path) -> None:
     """Write policy.safetensors and policy.json: the trained policy without the learner."""
     config = config_of(folder)
@@ -223,7 +213,7 @@ def record(folder: Path, strokes: int, seconds: float, pentagon: Swim) -> Effici
     rows.append([strokes, pentagon.strokes, pentagon.waypoints_reached])
     write_lines(folder / "progress.csv", rows)
     found = read(folder).after(strokes, seconds, pentagon)
-    write(found, folder)
+    write_json(folder / FILE, asdict(found))
     return found
 
 

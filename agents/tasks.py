@@ -148,19 +148,13 @@ def swims(policy: LearnedPolicy, id: str) -> LearnedPolicy:
     return LearnedPolicy(policy.description._replace(task=TASKS[id].task), policy.weights, policy.training)
 
 
-def validated(id: str, policy: LearnedPolicy, options: Options) -> float:
-    """Mean return of a policy in episodes of the split "train"."""
-    seeds = list(range(FAR_SEED, FAR_SEED + VALIDATION))
-    swum = swim_episodes(id, policy, seeds, fidelity=options.fidelity, split="train", threads=options.num_threads)
-    return float(np.mean(swum.returns))
-
-
 def publish(id: str, options: Options, command: str) -> Path:
     """Train the seeds of a task, and keep the best; returns the policy's file."""
-    found = []
+    found, far = [], list(range(FAR_SEED, FAR_SEED + VALIDATION))
     for seed in options.seeds:
         policy, facts = trained(id, seed, options)
-        score = validated(id, policy, options)
+        swum = swim_episodes(id, policy, far, fidelity=options.fidelity, split="train", threads=options.num_threads)
+        score = float(np.mean(swum.returns))
         print(f"{id}, seed {seed}: mean return {score:.1f} after {facts['seconds']:.0f} s of training", flush=True)
         found.append((score, policy, facts))
     score, policy, facts = max(found, key=lambda one: one[0])

@@ -4,7 +4,7 @@ import argparse
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NoReturn
 
 INTERRUPTED = 130
@@ -47,6 +47,23 @@ def answered(work: Callable[[], int | None]) -> int:
     except (ValueError, ImportError) as refusal:
         print(refusal, file=sys.stderr)
         return 2
+
+
+def main_of(
+    parser: Callable[[], argparse.ArgumentParser], work: Callable[[argparse.Namespace], str | int | None]
+) -> Callable[[Sequence[str] | None], int]:
+    """Command line: from words to the exit code of the work that a parser's options ask for; texts are printed."""
+
+    def main(arguments: Sequence[str] | None = None) -> int:
+        options = parser().parse_args(arguments)
+
+        def done() -> int | None:
+            answer = work(options)
+            return print(answer) if isinstance(answer, str) else answer
+
+        return answered(done)
+
+    return main
 
 
 def run_command(main: Callable[[], int | None]) -> NoReturn:

@@ -60,7 +60,8 @@ def make_mesh(limbs: Sequence[LimbShape], nodes_per_limb: int, density: float) -
     root_edges = np.array([limb.length / n_edges for limb in limbs])
     l = np.repeat(root_edges, n_edges)  # noqa: E741
     edges_at_node = np.where(np.arange(n_edges) < n_edges - 1, 1.0, 0.5)
-    at_edges, at_nodes = edges_along(nodes_per_limb), nodes_along(nodes_per_limb)
+    # Middles of edges, and nodes, as fractions of the length from hub to tip.
+    at_edges, at_nodes = (np.arange(n_edges) + 0.5) / n_edges, np.arange(nodes_per_limb) / n_edges
     return Mesh(
         n_limbs=n_limbs,
         nodes_per_limb=int(nodes_per_limb),
@@ -82,16 +83,6 @@ def sections(limbs: Sequence[LimbShape], density: float, share: Floats, shape: t
     found = {each: limb.cuts(density, share) for each, limb in unlike.items()}
     columns = np.array([cut for limb in limbs for cut in found[limb.section, limb.youngs_modulus]]).T
     return Sections(*columns.reshape(len(columns), *shape))
-
-
-def nodes_along(nodes_per_limb: int) -> Floats:
-    """Positions of a limb's nodes as fractions of its length from hub to tip, shape (nodes_per_limb,)."""
-    return np.arange(nodes_per_limb) / (nodes_per_limb - 1)
-
-
-def edges_along(nodes_per_limb: int) -> Floats:
-    """Positions of the middles of a limb's edges as fractions of its length, shape (nodes_per_limb - 1,)."""
-    return (np.arange(nodes_per_limb - 1) + 0.5) / (nodes_per_limb - 1)
 
 
 GAUSS = np.polynomial.legendre.leggauss(4)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from seastar_gym import Numerics, SymmetryReduction
-from seastar_gym.envs.group import n_limbs_of
+from seastar_gym.envs.group import is_mirror, n_limbs_of, n_turns_of
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import Symmetry
@@ -30,6 +30,19 @@ def matrix(element, group):
         return turn
     c, s = np.cos(2 * axis), np.sin(2 * axis)
     return np.array([[c, s], [s, -c]]) @ turn
+
+
+def compose(second, first, group):
+    """Elements of doing `first` and then `second`."""
+    k_first, k_second = (np.asarray(first) + 1) // 2, (np.asarray(second) + 1) // 2
+    k = k_first + np.where(is_mirror(first), -k_second, k_second)
+    return (2 * k - (np.asarray(first) + second) % 2) % (2 * n_turns_of(group))
+
+
+def mirrored(actuator, numbers):
+    """Numbers of `state` or `observe` of limbs, shape (..., k), as a mirror shows them."""
+    index, sign = np.array((actuator.mirror or ())[: numbers.shape[-1]], dtype=int).reshape(-1, 2).T
+    return numbers[..., index] * sign
 
 
 def elements_of(group):

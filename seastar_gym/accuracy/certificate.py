@@ -348,9 +348,11 @@ class Certificate:
 
     def save(self, file: Path | str) -> None:
         """Write the certificate as JSON, all at once."""
+        settings = map(asdict, self.settings)
         data = {
             "format": FORMAT, **{name: getattr(self, name) for name in self.__dataclass_fields__},
-            "scene": self.scene.to_dict(), "settings": [_as_data(each) for each in self.settings],
+            "scene": self.scene.to_dict(),
+            "settings": [{name: one for name, one in each.items() if is_measured(one)} for each in settings],
         }  # fmt: skip
         signed = {"digest": _digest(data), **data}
         write_atomically(file, (json.dumps(signed, indent=1) + "\n").encode())
@@ -389,11 +391,6 @@ def _read(data: dict[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {"scene": Scene.from_dict(data.pop("scene"))}
     found |= {name: tuple(data.pop(name)) for name in ("promised", "actions")}
     return {**found, "settings": tuple(Setting(**each) for each in data.pop("settings")), **data}
-
-
-def _as_data(setting: Setting) -> dict[str, Any]:
-    """A setting as plain data, without what was not measured."""
-    return {name: value for name, value in asdict(setting).items() if is_measured(value)}
 
 
 def _digest(data: dict[str, Any]) -> str:

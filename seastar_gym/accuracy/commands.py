@@ -175,8 +175,3 @@ def draw_batch(n: int, n_limbs: int, seed: int, period: float | None = None) -> 
         return Batch({name: draw(rng, n, n_limbs) for name, draw in CLASSES.items()})
     rng = np.random.default_rng([seed, round(1000 * period)])
     return Batch({name: draw(rng, n, n_limbs, period) for name, draw in DECISIONS.items()}, period)
-
-
-def draw_classes(n: int, n_limbs: int, seed: int) -> Floats:
-    """n sequences of every class of strokes, one class after another, shape (STROKES, len(CLASSES) n, n_limbs)."""
-    return draw_batch(n, n_limbs, seed).joined

@@ -26,7 +26,6 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -282,14 +281,18 @@ def measure_settings(
     report = (lambda share: None) if progress is None else progress
     found, done, whole = list[Measured](), 0, sum(each.joined.size for each in batches)
     for batch in batches:
-        told = partial(_part, report, SHARE_OF_SWIMS * done / whole, SHARE_OF_SWIMS * batch.joined.size / whole)
+
+        def told(share: float, before: int = done, own: int = batch.joined.size) -> None:
+            report(SHARE_OF_SWIMS * (before + own * share) / whole)
+
         shortest = SHORTEST_PATH if batch.period is None else SLOWEST * SECONDS
         found.append(measure(scene, resolutions, limit, short, batch.joined, told, batch.period, shortest))
         done += batch.joined.size
 
     def by_class(numbers: Iterable[Floats]) -> dict[str, Floats]:
         parts = [batch.of_classes(each) for batch, each in zip(batches, numbers, strict=True)]
-        return {name: np.concatenate([part[name] for part in parts if name in part]) for name in _names(batches)}
+        names = dict.fromkeys(name for part in parts for name in part)  # none twice
+        return {name: np.concatenate([part[name] for part in parts if name in part]) for name in names}
 
     scenes, period, settings = [at(scene, each) for each in resolutions], batches[0].period, []
     for k, (each, factor) in enumerate(
@@ -313,16 +316,6 @@ def measure_settings(
         )  # fmt: skip
         report(SHARE_OF_SWIMS + (1.0 - SHARE_OF_SWIMS) * (k + 1) / len(resolutions))
     return settings, _largest(by_class(swum.of_limit for swum in found))
-
-
-def _names(batches: Sequence[Batch]) -> list[str]:
-    """Classes of some batches, none twice."""
-    return list(dict.fromkeys(name for batch in batches for name in batch.commands))
-
-
-def _part(report: Progress, before: float, own: float, share: float) -> None:
-    """Report a share of a part of the work."""
-    report(before + own * share)
 
 
 def _largest(errors: Mapping[str, Floats]) -> float:

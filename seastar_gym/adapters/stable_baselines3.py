@@ -183,14 +183,12 @@ def _warn_of_long_rollouts(n_robots: int) -> None:
             return
 
 
-def _names(info: Info) -> list[str]:
-    """Names of an info that describe robots, without the masks and the final values, which the adapter uses itself."""
-    return [name for name in info if not name.startswith("_") and name not in ("final_obs", "final_info")]
-
-
 def _one_per_robot(info: Info, n_robots: int) -> list[Info]:
-    """A batch's info as one per robot: plain numbers, and an array for a vector."""
-    names = _names(info)
+    """A batch's info as one per robot: plain numbers, and an array for a vector.
+
+    Masks and final values, which the adapter uses itself, are left out.
+    """
+    names = [name for name in info if not name.startswith("_") and name not in ("final_obs", "final_info")]
     if not names:
         return [{} for _ in range(n_robots)]
     columns = [info[name].tolist() if info[name].ndim == 1 else list(info[name]) for name in names]

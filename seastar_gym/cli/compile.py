@@ -7,14 +7,13 @@ share it, whatever their numbers.
 
 import argparse
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, get_args
 
 import gymnasium as gym
 import numpy as np
 
-from seastar_gym.command import answered, command_parser
+from seastar_gym.command import command_parser, main_of
 from seastar_gym.evaluation.rollout import make_task
 from seastar_gym.rods.potential import energies
 from seastar_gym.scene import Scene
@@ -71,7 +70,4 @@ def compile_all(options: argparse.Namespace) -> None:
     print(f"Machine code: {folder}")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
-    options = parser().parse_args(arguments)
-    return answered(lambda: compile_all(options))
+main = main_of(parser, compile_all)

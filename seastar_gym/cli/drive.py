@@ -37,7 +37,7 @@ from seastar_gym.plant.lines import LinePlant, open_serial
 from seastar_gym.plant.plant import Plant, PlantError, SimulatedPlant, with_wires
 from seastar_gym.plant.swim import PlantSwim
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.checks import require_number, require_period
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator
 
@@ -75,8 +75,7 @@ def parser() -> argparse.ArgumentParser:
 def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
     """Arguments of the environment that the options, or else the policy, ask for, but for the plant."""
     require_number("--seconds", options.seconds, "s")
-    if options.decision_period is not None:
-        require_number("--decision-period", options.decision_period, "s")
+    require_period(options.decision_period, "--decision-period")
     policy = learned_policy(options.policy, options.decision_period)
     fidelity: Fidelity = options.fidelity or "fast"
     own: dict[str, Any] = {"decision_period": period_of(options.policy) or 0.5, "sight": Sight(), "path": "pentagon"}

@@ -9,10 +9,9 @@ the policy's scene. ONNX begins with the observation, and remembers nothing: pas
 """
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 
-from seastar_gym.command import answered, command_parser
+from seastar_gym.command import command_parser, main_of
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.export import to_c, to_onnx
 from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy
@@ -56,7 +55,4 @@ def export(options: argparse.Namespace) -> str:
     return f"{out}: {len(data) / 1000:.0f} kB, {policy.description.observation_size} numbers seen."
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
-    options = parser().parse_args(arguments)
-    return answered(lambda: print(export(options)))
+main = main_of(parser, export)

@@ -7,7 +7,7 @@ word per decision, and --film writes what is seen.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.cli.screen import Show, outcome, rate, screen, show_all, wait
-from seastar_gym.command import DEFAULT, answered, command_parser
+from seastar_gym.command import DEFAULT, command_parser, main_of
 from seastar_gym.envs.canvas import import_pygame
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.paths import PATH_HELP, load_path
@@ -218,7 +218,4 @@ def play(options: argparse.Namespace) -> str:
     return f"You reached {said}." if options.film is None else f"{said[0].upper()}{said[1:]}. Written: {options.film}."
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
-    options = parser().parse_args(arguments)
-    return answered(lambda: print(play(options)))
+main = main_of(parser, play)

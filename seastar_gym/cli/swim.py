@@ -7,14 +7,13 @@ often as it decides, where options name none.
 """
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 import gymnasium as gym
 
 from seastar_gym.cli.screen import Show, outcome, rate, screen, show_all
-from seastar_gym.command import DEFAULT, answered, command_parser
+from seastar_gym.command import DEFAULT, command_parser, main_of
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.registry import HELP, is_file, learned_policy, load_agent, period_of
 from seastar_gym.envs.commands import decisions_in
@@ -25,10 +24,6 @@ from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene import load_scene
-
-if TYPE_CHECKING:
-    import gymnasium as gym
-
 
 LEARNED_PERIOD = 0.2
 """Time between decisions of the learned policy on a path, where no option says another [s]."""
@@ -143,7 +138,4 @@ def show_episode(
     return last
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
-    options = parser().parse_args(arguments)
-    return answered(lambda: print(watch(options)))
+main = main_of(parser, watch)

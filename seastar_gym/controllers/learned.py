@@ -79,7 +79,8 @@ class LearnedPolicy:
     ):
         require_kind("description", description, Description, "a Description")
         description.check()
-        _require_weights(weights)
+        if not isinstance(weights, dict) or not all(isinstance(array, np.ndarray) for array in weights.values()):
+            raise ValueError(f"weights must be arrays by name, not {shown(weights)}.")
         require_kind("training", training, Mapping | None, "entries by name, or None")
         require_kind("rng", rng, np.random.Generator | None, "a numpy Generator, or None")
         shapes = {name: array.shape for name, array in weights.items()}
@@ -245,12 +246,6 @@ def camera_of(policy: Policy) -> dict[str, Any]:
     """Options of an environment by which a policy sees the robot as it was trained to; none for full sight."""
     about = policy.description if isinstance(policy, LearnedPolicy) else None
     return {} if about is None or about.sight is None else {"sight": about.sight, "action_delay": about.action_delay}
-
-
-def _require_weights(weights: object) -> None:
-    """ValueError unless weights are arrays by name."""
-    if not isinstance(weights, dict) or not all(isinstance(array, np.ndarray) for array in weights.values()):
-        raise ValueError(f"weights must be arrays by name, not {shown(weights)}.")
 
 
 def _flat(facts: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -154,7 +154,7 @@ def load_model(path: str | Path) -> Policy:
         if data is None:
             raise ValueError("it has no data")
         policy = data["policy_class"](
-            data["observation_space"], data["action_space"], _no_learning, **data["policy_kwargs"]
+            data["observation_space"], data["action_space"], lambda progress: 0.0, **data["policy_kwargs"]
         )
         policy.load_state_dict(parameters["policy"])
     except (
@@ -181,11 +181,6 @@ def _warn_of_normalised(path: str | Path, data: dict[str, Any]) -> None:
             "loads its statistics, too.",
             stacklevel=2,
         )
-
-
-def _no_learning(progress: float) -> Any:
-    """A learning rate for a policy that has learned."""
-    return 0.0
 
 
 AGENTS: dict[str, Callable[[Scene, float | None, str | None], Policy]] = {

@@ -217,10 +217,8 @@ class Budget:
 
 OF_GAITS = Budget(4, 8)
 """Budget of `gait_planner`: 250 seconds of one robot or fewer for every second."""
-SHARE = 0.2
-"""Share of the time between decisions in which the planner is to answer, on two processors."""
 TIMED_BUDGETS = {0.5: Budget(3, 8, 0.5), 0.2: Budget(3, 4, 0.8), 0.1: Budget(2, 3, 0.9)}
-"""Budgets that keep SHARE, by time between decisions [s]."""
+"""Budgets by time between decisions [s], a fifth of which the planner takes to answer on two processors."""
 
 
 def budget_for(decision_period: float | None) -> Budget:

@@ -9,19 +9,13 @@ from __future__ import annotations
 import functools
 import itertools
 import os
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.process import held_back
-
-if TYPE_CHECKING:
-    import pygame
-
-
-import warnings
-from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import pygame

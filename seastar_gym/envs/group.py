@@ -62,14 +62,6 @@ def inverse(elements: ArrayLike, group: Group) -> Elements:
     return np.where(is_mirror(elements), elements, -elements % (2 * n_turns_of(group)))
 
 
-def compose(second: ArrayLike, first: ArrayLike, group: Group) -> Elements:
-    """Elements, shape (...), of doing `first` and then `second`."""
-    second, first = np.asarray(second), np.asarray(first)
-    k_first, k_second = (first + 1) // 2, (second + 1) // 2
-    k = k_first + np.where(is_mirror(first), -k_second, k_second)
-    return (2 * k - (first + second) % 2) % (2 * n_turns_of(group))
-
-
 @cache
 def turns(group: Group) -> NDArray[np.complex128]:
     """Factors by which elements turn a vector x + iy, shape (2 n_turns,); exactly 1 for element 0."""

@@ -83,11 +83,6 @@ class SwimOptions:
         """Time between decisions [s]: that of the actuator if none is given. ValueError for one that it cannot take."""
         return checked_decision_period(self.decision_period, self.modelled)
 
-    @property
-    def fidelity_of_scene(self) -> Fidelity | None:
-        """Fidelity that is asked for of a scene; None without a scene."""
-        return None if self.scene is None else self.fidelity
-
 
 def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None, decision_period: float | None = None) -> Scene:
     """Scene with the nodes and numerics that it names, otherwise with those of `fidelity`, see `Scene.at`.

@@ -130,7 +130,8 @@ class DomainRandomization:
     @property
     def late(self) -> dict[str, Distribution]:
         """Distributions of what is no number of a scene: of a sight, and of the delay of actions."""
-        return {name: one for name, one in self.distributions.items() if name == ACTION_DELAY or _is_of_sight(name)}
+        drawn = self.distributions.items()
+        return {name: one for name, one in drawn if name == ACTION_DELAY or str(name).startswith("sight.")}
 
     def first_values(self, scene: Scene, n_robots: int) -> dict[str, NDArray[np.float64]]:
         """The numbers before the first draw, shape (n_robots,), that of limbs (n_robots, n_limbs): their upper bounds.
@@ -161,10 +162,6 @@ class DomainRandomization:
         for name in (name for name in self.distributions if name in values):
             for place in np.ndindex(values[name].shape[1:]):
                 values[name][(robot, *place)] = self.distributions[name].draw(rng)
-
-
-def _is_of_sight(name: object) -> bool:
-    return isinstance(name, str) and name.startswith("sight.")
 
 
 def _why_not(scene: Scene, name: str, known: Sequence[str]) -> str:

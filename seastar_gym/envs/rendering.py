@@ -249,7 +249,8 @@ class Renderer:
             if points is not None and len(points) and not self.camera.sees(points):
                 self.camera = self.camera.widened(points, REFIT_MARGIN * self._robot.limb_length)
         self._paint_background(frame)
-        self._paint_trail(frame.trail)
+        if len(frame.trail) > 1:
+            self._canvas.polyline(self.camera.to_pixels(frame.trail), TRAIL, width=2)
         self._number_waypoints(frame.waypoint_index)
         self._paint_robot(frame)
         self._mark_limb_1(frame)
@@ -365,10 +366,6 @@ class Renderer:
 
     def _ring_radius(self) -> float:
         return max(4.0, self._waypoint_radius * self.camera.scale)
-
-    def _paint_trail(self, trail: FloatArray) -> None:
-        if len(trail) > 1:
-            self._canvas.polyline(self.camera.to_pixels(trail), TRAIL, width=2)
 
     def _paint_robot(self, frame: Frame) -> None:
         nodes = frame.positions[self._limb_nodes]

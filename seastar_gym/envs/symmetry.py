@@ -435,10 +435,6 @@ class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstru
         self.observation_space = ReducedBox.of(env.observation_space)
         self._element = np.zeros((), np.intp)
 
-    def _reduced(self, observation: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
-        reduced, self._element = self._symmetry.reduce(observation)
-        return reduced
-
     def action_masks(self) -> NDArray[np.bool_]:
         """Actions on the last reduced observation that the wires can follow, shape (k,)."""
         inner: Any = self.unwrapped
@@ -451,14 +447,14 @@ class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstru
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; the observation is reduced."""
         observation, info = self.env.reset(seed=seed, options=options)
-        reduced = self._reduced(observation)
+        reduced, self._element = self._symmetry.reduce(observation)
         return reduced, self._symmetry.carry_info(info, self._element)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Swim for one decision by an action that was chosen on the last reduced observation."""
         action = self._symmetry.restore(action, self._element)
         observation, reward, terminated, truncated, info = self.env.step(action)
-        reduced = self._reduced(observation)
+        reduced, self._element = self._symmetry.reduce(observation)
         return reduced, reward, terminated, truncated, self._symmetry.carry_info(info, self._element)
 
 
@@ -480,10 +476,6 @@ class VectorSymmetryReduction(_VectorWrapper):
         """Elements that brought the last observations into sector 0, shape (num_envs,), a copy."""
         return self._elements.copy()
 
-    def _reduced(self, observations: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
-        reduced, self._elements = self._symmetry.reduce(observations)
-        return reduced
-
     def action_masks(self) -> NDArray[np.bool_]:
         """Actions on the last reduced observations that the wires can follow, shape (num_envs, k)."""
         inner: Any = self.unwrapped
@@ -498,7 +490,7 @@ class VectorSymmetryReduction(_VectorWrapper):
     ) -> tuple[Any, dict[str, Any]]:
         """Begin episodes; the observations are reduced."""
         observations, info = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
-        reduced = self._reduced(observations)
+        reduced, self._elements = self._symmetry.reduce(observations)
         return reduced, self._symmetry.carry_info(info, self._elements)
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
@@ -507,7 +499,7 @@ class VectorSymmetryReduction(_VectorWrapper):
         observations, rewards, terminated, truncated, info = self.env.step(actions)
         if "final_obs" in info:
             info = {**info, **self._reduced_final(info)}
-        reduced = self._reduced(observations)
+        reduced, self._elements = self._symmetry.reduce(observations)
         return reduced, rewards, terminated, truncated, self._symmetry.carry_info(info, self._elements)
 
     def _reduced_final(self, info: dict[str, Any]) -> dict[str, Any]:

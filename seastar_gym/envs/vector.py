@@ -457,7 +457,8 @@ def swimmers(
     robots = Robots(chosen_task(task, split, **arguments), options, n_robots, threads, split=split)
     if robots.task.tells_errors:
         warn_undamped(robots.scene, robots.timed)
-        warn_uncertified(robots.scene, robots.options.fidelity_of_scene, robots.certificate, robots.timed)
+        asked = None if robots.options.scene is None else robots.options.fidelity
+        warn_uncertified(robots.scene, asked, robots.certificate, robots.timed)
     return robots
 
 

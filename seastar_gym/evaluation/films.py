@@ -53,19 +53,17 @@ def film(file: str | os.PathLike[str], fps: float) -> Iterator[Callable[[Picture
         last: list[Picture] = []
 
         def keep(picture: Picture) -> None:
-            _require_picture(picture)
+            is_array = isinstance(picture, np.ndarray) and picture.dtype == np.uint8
+            if not is_array or picture.ndim != 3 or picture.shape[2] != 3 or not picture.size:
+                raise ValueError(
+                    "A picture must be an array of red, green and blue from 0 to 255, shape (height, width, 3)."
+                )
             last[:] = [picture]
             add(picture)
 
         yield keep
         for picture in last * round(CLOSING_SECONDS * fps):
             add(picture)
-
-
-def _require_picture(picture: object) -> None:
-    is_array = isinstance(picture, np.ndarray) and picture.dtype == np.uint8
-    if not is_array or picture.ndim != 3 or picture.shape[2] != 3 or not picture.size:  # type: ignore[attr-defined]
-        raise ValueError("A picture must be an array of red, green and blue from 0 to 255, shape (height, width, 3).")
 
 
 @contextmanager

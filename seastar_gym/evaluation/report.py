@@ -74,8 +74,9 @@ def paths_figure(swims: Sequence[Swim], waypoint_radius: float, current: AnyCurr
         x=_rounded(path[:, 0]), y=_rounded(path[:, 1]), mode="lines", name="path", hoverinfo="skip",
         line={"color": PLANNED, "dash": "dash", "width": 1.5},
     )  # fmt: skip
-    for x, y in path[1:]:
-        figure.add_shape(type="circle", **_circle(x, y, MM * waypoint_radius), line_color=PLANNED, layer="below")
+    for place in path[1:]:
+        (x0, y0), (x1, y1) = place - MM * waypoint_radius, place + MM * waypoint_radius
+        figure.add_shape(type="circle", x0=x0, y0=y0, x1=x1, y1=y1, line_color=PLANNED, layer="below")
     for k, done in reversed(list(enumerate(swims))):  # the first swim comes on top
         figure.add_trace(_trace(done, k))
     figure.update_layout(
@@ -98,10 +99,6 @@ def _trace(done: Swim, number: int) -> go.Scatter:
         text=[f"{done.counted_in[:-1]} {stroke}, {time:g} s" for stroke, time in enumerate(done.time.round(6))],
         hovertemplate="%{text}: %{x:.0f}, %{y:.0f} mm",
     )  # fmt: skip
-
-
-def _circle(x: float, y: float, radius: float) -> dict[str, float]:
-    return {"x0": x - radius, "x1": x + radius, "y0": y - radius, "y1": y + radius}
 
 
 def _rounded(values: Floats) -> list[float]:
@@ -151,8 +148,9 @@ def curves_figure(curves: Sequence[Curve], baselines: Mapping[str, int]) -> go.F
     if len(curves) > 2:
         _add_band(figure, curves)
     for k, curve in enumerate(curves):
+        with_gaps = [None if np.isnan(strokes) else strokes for strokes in curve.pentagon.tolist()]
         figure.add_scatter(
-            x=curve.trained.tolist(), y=_with_gaps(curve.pentagon), name=html.escape(curve.name), mode="lines+markers",
+            x=curve.trained.tolist(), y=with_gaps, name=html.escape(curve.name), mode="lines+markers",
             line={"color": COLOURS[k % len(COLOURS)], "width": 1 if len(curves) > 2 else 2}, marker={"size": 5},
         )  # fmt: skip
     _add_unfinished(figure, curves)
@@ -199,10 +197,6 @@ def _add_band(figure: go.Figure, curves: Sequence[Curve]) -> None:
 
 def _at(curve: Curve, trained: float) -> float:
     return float(curve.pentagon[curve.trained == trained][0])
-
-
-def _with_gaps(values: Floats) -> list[float | None]:
-    return [None if np.isnan(value) else float(value) for value in values]
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +257,8 @@ def write_report(
         "title": html.escape(remarks.title),
         "plotly": plotly.offline.get_plotlyjs(),
         "sections": "\n".join(sections),
-        "swims": _script_safe(_recorded(playbacks, swims[0].waypoints, waypoint_radius, current)),
+        # Within a script element, whatever its strings say.
+        "swims": _recorded(playbacks, swims[0].waypoints, waypoint_radius, current).replace("<", "\\u003c"),
     }
     page = re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], PAGE.read_text(encoding="utf-8"))
     write_atomically(file, page)
@@ -374,8 +369,3 @@ def _recorded(playbacks: Sequence[Playback], waypoints: Any, waypoint_radius: fl
         },
         separators=(",", ":"),
     )
-
-
-def _script_safe(text: str) -> str:
-    """JSON that may stand within a script element, whatever its strings say."""
-    return text.replace("<", "\\u003c")

@@ -97,8 +97,9 @@ def rollout(
     """
     is_batch = isinstance(env, gym.vector.VectorEnv)
     require_kind("env", env, gym.Env | gym.vector.VectorEnv, "an environment or a batch")
-    if is_batch:
-        require_next_step("A rollout", env)
+    if is_batch and (mode := env.metadata.get("autoreset_mode")) is not AutoresetMode.NEXT_STEP:
+        # Elsewhere info at the end of an episode is that of the next one.
+        raise ValueError(f"A rollout needs autoreset_mode=AutoresetMode.NEXT_STEP, not {mode}.")
     require_policy(policy)
     require_texts("record", record)
     if until is not None:
@@ -134,13 +135,6 @@ def rollout(
     return Episodes(entries, success, returns, decisions, waypoints if is_batch else (waypoints,))
 
 
-def require_next_step(who: str, batch: Any) -> None:
-    """ValueError where a batch begins episodes otherwise than with the step after an end, so that info is another's."""
-    mode = batch.metadata.get("autoreset_mode")
-    if mode is not AutoresetMode.NEXT_STEP:
-        raise ValueError(f"{who} needs autoreset_mode=AutoresetMode.NEXT_STEP, not {mode}.")
-
-
 SETTLED = 30.0
 """Time after which distances from a station count [s]."""
 
@@ -164,27 +158,17 @@ def seconds_to_success(episodes: Episodes) -> Floats:
     return np.where(episodes.success, episodes.last("time"), episodes.limit)
 
 
-def catches(episodes: Episodes) -> Floats:
-    """Prey caught."""
-    return episodes.last("catches").astype(float)
-
-
 def mean_distance(episodes: Episodes) -> Floats:
     """Mean distance from the station [mm] once SETTLED has passed."""
     settled = np.where(episodes.of("time") > SETTLED, episodes.of("distance"), np.nan)
     return np.asarray(1000.0 * np.nanmean(settled, axis=0))
 
 
-def prizes(episodes: Episodes) -> Floats:
-    """Worth of the prizes taken."""
-    return episodes.last("taken").astype(float)
-
-
 SECONDS = Measure("time until done", "s", "less", seconds_to_success)
 MEASURES: dict[type[Any], Measure] = {
-    Prey: Measure("prey caught", "1", "more", catches),
+    Prey: Measure("prey caught", "1", "more", lambda episodes: episodes.last("catches").astype(float)),
     Station: Measure("mean distance", "mm", "less", mean_distance),
-    Prizes: Measure("worth of prizes", "1", "more", prizes),
+    Prizes: Measure("worth of prizes", "1", "more", lambda episodes: episodes.last("taken").astype(float)),
 }
 """Measures of tasks that are not done at some time; those of one's own join them."""
 

@@ -268,7 +268,8 @@ def uncertainty_of(jacobian: Floats, residuals: Floats, times: Floats) -> Uncert
     error = np.linalg.norm(residuals) / np.sqrt(n - p)
     left, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
     products = left * (residuals / max(error, SMALLEST))[:, None]
-    sizes, axes = np.linalg.eigh(FEW_PARTS * _middle(*_sums_of_pictures(products, times)))
+    pictures, first = np.unique(times, return_index=True)
+    sizes, axes = np.linalg.eigh(FEW_PARTS * _middle(np.add.reduceat(products, first, axis=0), pictures))
     unit_errors = 1.0 / np.maximum(singular, SMALLEST)
     root = directions.T * unit_errors @ axes
     unit = (root * np.maximum(sizes, 1.0)) @ root.T  # sizes of independent errors are one
@@ -276,14 +277,11 @@ def uncertainty_of(jacobian: Floats, residuals: Floats, times: Floats) -> Uncert
     return Uncertainty(error**2 * unit, unit / scale[:, None] / scale, directions, error * unit_errors)
 
 
-def _sums_of_pictures(gradients: Floats, times: Floats) -> tuple[Floats, Floats]:
-    """Sums over the coordinates of every picture, shape (n_pictures, p), and times of the pictures [s]."""
-    pictures, first = np.unique(times, return_index=True)
-    return np.add.reduceat(gradients, first, axis=0), pictures
-
-
 def _middle(gradients: Floats, times: Floats) -> Floats:
-    """Sum of products of gradients at times t and u with the weight w(t - u), shape (p, p)."""
+    """Sum of products of gradients at times t and u with the weight w(t - u), shape (p, p).
+
+    gradients: Sums over the coordinates of every picture, shape (n_pictures, p). times: Of the pictures [s].
+    """
     total = gradients.T @ gradients
     remembered = REMEMBERED * (times[-1] - times[0])
     for apart in range(1, len(times)):

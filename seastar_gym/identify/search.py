@@ -81,7 +81,8 @@ class Residuals:
         self._changes = DIFFERENCE * np.vstack([np.zeros(n_fitted), np.eye(n_fitted)])
         per_node = np.nan_to_num(noise_of(measurement.positions)) / math.sqrt(len(measurement.nodes))
         self._frame = np.array([per_node, per_node, per_node / robot.limb_length])  # its errors [m, m, rad]
-        self._simulate = lru_cache(maxsize=1)(self._trajectories)  # for residuals and Jacobian at once
+        simulated = lru_cache(maxsize=1)  # for residuals and Jacobian at once
+        self._simulate = simulated(lambda *x: trajectories(self.scenes(x), measurement, self._delays(x)))
 
     def scenes(self, fitted: ArrayLike) -> list[Scene]:
         """Scene with these parameters, and scenes in which one of what is fitted is changed a little."""
@@ -92,9 +93,6 @@ class Residuals:
     def _delays(self, fitted: ArrayLike) -> Floats:
         """Delays of these scenes [s]."""
         return (np.asarray(fitted) - self._changes)[:, -1] if self.delayed else np.zeros(len(self._changes))
-
-    def _trajectories(self, *fitted: float) -> Floats:
-        return trajectories(self.scenes(fitted), self.measurement, self._delays(fitted))
 
     def trajectory(self, fitted: Floats) -> Floats:
         """Simulated positions [m], shape (n, n_nodes_seen, 2)."""

@@ -379,7 +379,7 @@ class Guard:
         while True:
             seen, now = self._ask()
             if seen is not None and not now - seen.captured_at > self.limits.oldest:
-                self._take(seen, now)
+                self._judge(seen, now)
             if self.newest is not None:
                 return self.newest
             if now > until:
@@ -405,28 +405,24 @@ class Guard:
             raise PlantError(self.held_back)
         seen, now = self._ask()
         if seen is not None:
-            self._take(seen, now)
+            self._judge(seen, now)
         if self.newest is not None and now - self._changed_at > self.limits.patience:
             raise self.refuse(f"No new picture for {self.limits.patience:g} s: all wires are stopped.")
         return self.newest
 
-    def _take(self, seen: Sighting, now: float) -> None:
-        """Take a new sighting; drop or refuse one that cannot be."""
-        with self.stops():
-            self._judge(seen, now)
-
     def _judge(self, seen: Sighting, now: float) -> None:
+        """Take a new sighting; drop or refuse one that cannot be."""
         if seen.captured_at == self._judged_at:
             return
-        if seen.captured_at < self._judged_at:
-            raise PlantError("The tracker's clock has gone back: all wires are stopped.")
-        if seen.captured_at > now + POLL:
-            raise PlantError("A picture was taken in the future: the tracker's clock is not that of the plant.")
-        if now - seen.captured_at > self.limits.oldest:
-            age = now - seen.captured_at
-            raise PlantError(f"The newest picture is {age:.3g} s old: all wires are stopped.")
-        self._judged_at = seen.captured_at
-        can_be = self.plausibility.take(seen)
+        with self.stops():
+            if seen.captured_at < self._judged_at:
+                raise PlantError("The tracker's clock has gone back: all wires are stopped.")
+            if seen.captured_at > now + POLL:
+                raise PlantError("A picture was taken in the future: the tracker's clock is not that of the plant.")
+            if (age := now - seen.captured_at) > self.limits.oldest:
+                raise PlantError(f"The newest picture is {age:.3g} s old: all wires are stopped.")
+            self._judged_at = seen.captured_at
+            can_be = self.plausibility.take(seen)
         if can_be:
             self.newest = seen
         if can_be or self.plausibility.is_first_dropped:

@@ -127,7 +127,7 @@ class Lines:
         data = sealed(line)
         try:
             if os.write(self._file.fileno(), data) != len(data):
-                raise PlantError("The plant takes no more lines: its other end does not read them.")
+                raise BlockingIOError
         except BlockingIOError:
             raise PlantError("The plant takes no more lines: its other end does not read them.") from None
         except OSError as broken:
@@ -265,10 +265,10 @@ class LinePlant:
 
     def _understand(self, words: list[str]) -> None:
         match words:
-            case ["hello", version, count] if version == VERSION and self._is_count(count):
+            case ["hello", version, n] if version == VERSION and COUNT.fullmatch(n) and 0 < int(n) <= MOST_LIMBS:
                 if self._is_greeted:
                     raise PlantError("The plant has restarted, as after a drop of its voltage: all wires are stopped.")
-                self.n_limbs = int(count)
+                self.n_limbs = int(n)
             case ["hello", version, *_]:
                 raise PlantError(f"The plant speaks version {version[:20]} of the lines, this is version {VERSION}.")
             case ["error", *words]:
@@ -277,10 +277,6 @@ class LinePlant:
                 self._seen = sighting_of(words, self.now(), self.n_limbs)
             case _:
                 raise LineError(f"A plant says no {' '.join(words)[:60]!r}.")
-
-    @staticmethod
-    def _is_count(word: str) -> bool:
-        return bool(COUNT.fullmatch(word)) and 0 < int(word) <= MOST_LIMBS
 
     def heat(self, limbs: Sequence[int], seconds: float) -> None:
         """Heat wires, see `Plant`; for whole milliseconds. ValueError: no board is asked for 10 s or more."""

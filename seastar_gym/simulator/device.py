@@ -26,11 +26,6 @@ SHARE = device.N_LANES // N_LANES
 """Lane groups of the processor in one of a device."""
 
 
-def program_of(scene: Scene) -> Program:
-    """The code of a scene for devices, for limbs that all turn alike: to be looked at, without a device."""
-    return DeviceBatch(scene, scene.n_robots or 1, "scalar", effort=False).program(0)
-
-
 class DeviceBatch(Batch):
     """A batch whose robots are advanced by a device, to the bits of the processor's.
 

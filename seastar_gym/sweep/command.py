@@ -84,7 +84,7 @@ def _number(word: str) -> Any:
 
 def _value(name: str, word: str) -> Any:
     if word.startswith("@"):
-        return _part_of_file(Path(word[1:]))
+        return from_dict(read_json(Path(word[1:])), object)
     if name in PARTS:
         if word == "None":
             return None
@@ -96,10 +96,6 @@ def _value(name: str, word: str) -> Any:
 
 def _label(word: str) -> Any:
     return Path(word[1:]).stem if word.startswith("@") else _number(word)
-
-
-def _part_of_file(file: Path) -> Any:
-    return from_dict(read_json(file), object)
 
 
 def make_parser() -> argparse.ArgumentParser:

@@ -192,19 +192,15 @@ def result_file_of(batch: Batch, device: str = "cpu") -> bytes:
         [_field(name, array, batch.configuration.scene) for name, array in zip(columns, arrays, strict=True)],
         {"seastar_gym": batch.configuration.text, "cell": batch.name},
     )
-    return to_parquet(pa.Table.from_arrays(arrays, schema=schema))
+    sink = pa.BufferOutputStream()
+    table = pa.Table.from_arrays(arrays, schema=schema)
+    pa.parquet.write_table(table, sink, compression="zstd", write_page_checksum=True)
+    return sink.getvalue().to_pybytes()
 
 
 def _field(name: str, array: Any, scene: Scene) -> Any:
     unit = (UNITS | OF_CONTROLLERS).get(name) or unit_of(scene, name)
     return pa.field(name, array.type, metadata={"unit": unit} if unit else None)
-
-
-def to_parquet(table: Any) -> bytes:
-    """A table as a Parquet file."""
-    sink = pa.BufferOutputStream()
-    pa.parquet.write_table(table, sink, compression="zstd", write_page_checksum=True)
-    return sink.getvalue().to_pybytes()
 
 
 def read_result_file(file: Path) -> Any:

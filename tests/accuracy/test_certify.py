@@ -61,7 +61,7 @@ def file(certificate, tmp_path):
 
 def test_errors_of_every_class_bound_those_of_its_sequences_and_fall_with_the_nodes(certificate):
     assert [each.nodes_per_limb for each in certificate.settings] == [5, 5, 9, 9]
-    drawn = commands.draw_classes(SAMPLES, 5, 0)
+    drawn = commands.draw_batch(SAMPLES, 5, 0).joined
     limit = measure.swim(resolved(SCENE, 33, measure.SHORT), drawn)
     lengths = measure.path_lengths(SCENE, limit.hub)
     for each in certificate.settings:

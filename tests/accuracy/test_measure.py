@@ -20,10 +20,10 @@ SCENE = Scene(Seastar(limb_length=0.08))
 
 @pytest.mark.parametrize("n_limbs", [1, 2, 3, 5, 12])
 def test_classes_are_drawn_for_any_number_of_limbs(n_limbs):
-    drawn = commands.draw_classes(4, n_limbs, 0)
+    drawn = commands.draw_batch(4, n_limbs, 0).joined
     assert drawn.shape == (commands.STROKES, 4 * len(commands.CLASSES), n_limbs)
     assert np.abs(drawn).max() <= 1.0
-    np.testing.assert_array_equal(drawn, commands.draw_classes(4, n_limbs, 0))
+    np.testing.assert_array_equal(drawn, commands.draw_batch(4, n_limbs, 0).joined)
     classes = dict(zip(commands.CLASSES, np.split(drawn, len(commands.CLASSES), axis=1), strict=True))
     assert np.isin(classes["random ternary"], (-1, 0, 1)).all()
     assert classes["random ternary"].any(axis=-1).all()
@@ -54,7 +54,7 @@ def test_decisions_are_what_their_classes_say(n_limbs, period):
 
 def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):
     monkeypatch.setattr(measure, "GROUP", 5)
-    drawn, scene = commands.draw_classes(2, 5, 1), resolved(SCENE, 5, Numerics("sdirk2", 2e-2, 1e-6))
+    drawn, scene = commands.draw_batch(2, 5, 1).joined, resolved(SCENE, 5, Numerics("sdirk2", 2e-2, 1e-6))
     shares = []
     (swum,) = measure.swim_all([scene], drawn, shares.append)
     alone = measure.swim(scene, drawn)
@@ -92,7 +92,7 @@ def test_space_and_time_are_errors_against_many_nodes_and_short_steps():
     """Settings with one mesh have one error of space; that of the limit is what half its edges tell, and is in all."""
     short, coarse = Numerics("implicit-midpoint", 5e-3, 1e-8), Numerics("sdirk2", 2e-2, 1e-6)
     some = [Resolution("continuum", n, each) for n, each in ((5, coarse), (9, coarse), (5, short))]
-    drawn = commands.draw_classes(1, 5, 3)
+    drawn = commands.draw_batch(1, 5, 3).joined
     found = measure.measure(SCENE, some, Resolution("continuum", 9, short), lambda *_: short, drawn)
     np.testing.assert_array_equal(found.space[0].path, found.space[2].path)
     lengths = measure.path_lengths(SCENE, found.limit.hub)
@@ -175,7 +175,7 @@ def test_a_uniform_current_is_a_translation(body):
     current = UniformCurrent(0.05, -0.02)
     still = Scene(Seastar(nodes_per_limb=5, discretisation="continuum", body=body), numerics=EULER)
     moving = in_water(current, still)
-    drawn = commands.draw_classes(1, 5, 0)
+    drawn = commands.draw_batch(1, 5, 0).joined
     hub, in_current = (measure.swim(scene, drawn).hub for scene in (still, moving))
     np.testing.assert_allclose(in_current - np.arange(1, 11)[:, None, None] * [0.05, -0.02], hub, atol=1e-7)
     lengths = measure.path_lengths(moving, in_current)

@@ -37,12 +37,12 @@ from seastar_gym import (
 )
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table, to_commands
-from seastar_gym.envs.group import compose, inverse, limb_order, transform_commands
+from seastar_gym.envs.group import inverse, limb_order, transform_commands
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from symmetries import elements_of, matrix, reduced_swim, symmetry_for, turns_and_axis
+from symmetries import compose, elements_of, matrix, reduced_swim, symmetry_for, turns_and_axis
 
 N_LIMBS = (3, 4, 5, 7, 8)
 MODES = ("limbs", "joint", "pairs", "continuous")

@@ -8,7 +8,8 @@ import numpy as np
 
 from fuzz.scenes import Case
 from seastar_gym import Attachment, Body, GridCurrent, Limb, Scene, ShearCurrent, State, UniformCurrent, Vortex, Water
-from seastar_gym.scene.actuators.base import complete, mirrored
+from seastar_gym.scene.actuators.base import complete
+from symmetries import mirrored
 
 Floats = np.ndarray
 

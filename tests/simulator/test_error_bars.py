@@ -7,7 +7,7 @@ import pytest
 
 from seastar_gym import Scene, Simulator
 from seastar_gym.accuracy.certificate import resolved
-from seastar_gym.accuracy.commands import STROKES, draw_classes
+from seastar_gym.accuracy.commands import STROKES, draw_batch
 from seastar_gym.accuracy.measure import SHORT, swim
 from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.simulator import watches as error_bars
@@ -27,7 +27,7 @@ def swimmers(scene: Scene = FAST, n_strokes: int = 1) -> Simulator:
 
 @pytest.mark.parametrize("fidelity", ["fast", "balanced"])
 def test_the_estimate_covers_the_true_error_is_not_vacuous_and_never_falls(fidelity):
-    scene, commands = Scene.preset(fidelity), draw_classes(2, 5, seed=77)
+    scene, commands = Scene.preset(fidelity), draw_batch(2, 5, seed=77).joined
     exact = swim(resolved(scene, 37, replace(SHORT, step=0.5e-3)), commands).hub
     simulator, ratios, estimates = Simulator(scene, commands.shape[1], 1, error_bars=True), [], []
     for k in range(STROKES):

@@ -38,7 +38,7 @@ from pathlib import Path
 
 import numpy as np
 
-from seastar_gym.command import DEFAULT, answered, command_parser
+from seastar_gym.command import DEFAULT, command_parser, main_of
 from seastar_gym.files import UNITS
 from seastar_gym.identify.measurement import write_trajectory
 from seastar_gym.identify.tracks.table import LENGTHS, read_motive, read_table
@@ -151,7 +151,4 @@ def convert(options: Options) -> str:
     return told if options.aligned else f"{told} At rest they are within {1e3 * seen.off:.2g} mm of the robot's shape."
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
-    options = parser().parse_args(arguments)
-    return answered(lambda: print(convert(options)))
+main = main_of(parser, convert)

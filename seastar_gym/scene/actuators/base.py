@@ -145,12 +145,6 @@ def complete(actuator: Actuator) -> ActuatorBase:
     return actuator if isinstance(actuator, ActuatorBase) else Adapted(actuator)  # type: ignore[abstract]
 
 
-def mirrored(actuator: ActuatorBase, numbers: Floats) -> Floats:
-    """Numbers of `state` or `observe` of limbs, shape (..., k), as a mirror shows them."""
-    index, sign = np.array((actuator.mirror or ())[: numbers.shape[-1]], dtype=int).reshape(-1, 2).T
-    return numbers[..., index] * sign
-
-
 def stroke_at(actuator: Actuator, t: Floats) -> Floats:
     """Rotation by command 1 at times t [s] since it was given [rad], of an actuator that rests after its period."""
     return np.asarray(actuator.delta_psi(np.minimum(t, actuator.period)))
@@ -221,7 +215,7 @@ class WirePair(ActuatorBase):
 
     @property
     def mirror(self) -> Mirror:
-        """What a mirror does to the state: the wires change places, see `mirrored`."""
+        """What a mirror does to the state: the wires change places."""
         return tuple((k ^ 1, 1) for k in range(self.rest.shape[-1]))
 
     def delta_psi(self, t: ArrayLike) -> Floats:

@@ -279,7 +279,7 @@ class Limited(ActuatorBase):
 
     @property
     def mirror(self) -> Mirror:
-        """What a mirror does to the state: the rotation changes its sign, see `base.mirrored`."""
+        """What a mirror does to the state: the rotation changes its sign."""
         return ((0, -1),)
 
     @property

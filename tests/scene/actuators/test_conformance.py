@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from every_part import ACTUATORS
 from seastar_gym import Limited, Scene, SmaLimb, SmaPulse, SmaWires, ThermalSma
-from seastar_gym.scene.actuators.base import complete, mirrored
+from seastar_gym.scene.actuators.base import complete
+from symmetries import mirrored
 
 SINGLE = {name: actuator for name, actuator in ACTUATORS.items() if Scene(actuator=actuator).n_robots is None} | {
     "wires": SmaWires(),
