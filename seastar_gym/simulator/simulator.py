@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.lanes.registers import N_LANES
-from seastar_gym.model import Coefficients
+from seastar_gym.model import Coefficients, scheme_for
 from seastar_gym.process import held_back, processors
 from seastar_gym.rods.bundles import Work
 from seastar_gym.rods.step import COVERED
@@ -114,7 +114,7 @@ class Simulator:
         self._may_warn_of_overlap = scene.contact is not None
         self._watches: dict[str, Watch] = {}  # by the field of a report that each tells
         if is_watched(scene) and device == "cpu":
-            self._watches["energy_growth"] = EnergyGrowth(self.n_robots, scene.actuator.period)
+            self._watches["energy_growth"] = EnergyGrowth(self.n_robots, scene.actuator.period, scheme_for(scene))
         if error_bars:
             twin = Simulator(twin_scene(scene), self.n_robots, self.threads, device=device)
             twin._watches, twin._may_warn_of_overlap = {}, False

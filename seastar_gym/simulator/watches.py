@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.rods.step import Scheme
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
 from seastar_gym.scene.number import column
@@ -97,14 +98,25 @@ def is_watched(scene: Scene) -> bool:
     )
 
 
+def may_gather(scheme: Scheme) -> bool:
+    """Whether a step leaves oscillations that are too fast for it more of their amplitude than DAMPING does."""
+    n = scheme.n_stages
+    kept = abs(1.0 - scheme.b @ np.linalg.solve(scheme.a.reshape(n, n), np.ones(n)))
+    return bool(kept > (1.0 - DAMPING) / (1.0 + DAMPING) * (1.0 + 1e-9))
+
+
 class EnergyGrowth(Watch):
     """Growth of the kinetic energy of a batch of robots.
+
+    It warns of a scheme that may gather energy. Otherwise growth is of commands: a robot that held one of them in its
+    first strokes, and then swims, has 25.
 
     period: Of the actuator [s]. Energies are taken once in a period while any robot swims its first strokes.
     """
 
-    def __init__(self, n_robots: int, period: float):
-        self._period, self._elapsed, self._duration, self._warned = period, 0.0, 0.0, False
+    def __init__(self, n_robots: int, period: float, scheme: Scheme):
+        self._period, self._elapsed, self._duration = period, 0.0, 0.0
+        self._may_warn = may_gather(scheme)
         self._commands = np.zeros(n_robots)  # largest of the present interval
         self._begin = np.full(n_robots, np.nan)  # time of the first command [s], NaN before
         self._early, self._largest = np.zeros((2, n_robots))  # energy per squared command [J], command
@@ -151,9 +163,9 @@ class EnergyGrowth(Watch):
 
     def _warn(self) -> None:
         robot = int(self._growth.argmax())
-        if self._warned or self._growth[robot] < ENOUGH:
+        if not self._may_warn or self._growth[robot] < ENOUGH:
             return
-        self._warned = True
+        self._may_warn = False
         warnings.warn(
             f"The kinetic energy of robot {robot} is {self._growth[robot]:.0f} times that of its first {WINDOW} "
             f"strokes: these numerics seem to gather energy. Use Numerics(..., damping={DAMPING:g}), shorter steps "

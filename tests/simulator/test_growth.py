@@ -20,7 +20,9 @@ from seastar_gym import (
 )
 from seastar_gym import model as module
 from seastar_gym.accuracy.measure import long_swims
-from seastar_gym.simulator.watches import ENOUGH, EVERY, WINDOW
+from seastar_gym.rods.step import scheme_of, tableau
+from seastar_gym.scene.numerics import DAMPING
+from seastar_gym.simulator.watches import ENOUGH, EVERY, WINDOW, may_gather
 from strokes import finished
 
 RESONANT = Scene(Seastar(nodes_per_limb=12), numerics=Numerics("implicit-midpoint", 10e-3, 1e-5))
@@ -44,6 +46,15 @@ def test_numerics_that_gather_energy_are_told_once():
     assert growth.max() >= ENOUGH
     np.testing.assert_array_equal(simulator.energy_growth, growth[-1])
     assert np.flatnonzero(np.diff(growth, axis=0).any(axis=1)).tolist() == [*range(WINDOW - 1, 79, EVERY)]
+
+
+@pytest.mark.parametrize("scheme, blamed", [
+    (scheme_of("implicit-midpoint", 0.0), True), (scheme_of("implicit-midpoint", 0.002), True),
+    (scheme_of("implicit-midpoint", DAMPING), False), (scheme_of("implicit-euler", 0.0), False),
+    (scheme_of("sdirk2", 0.0), False), (tableau([[0.25, 0.0], [0.5, 0.25]], [0.5, 0.5]), True),
+])  # fmt: skip
+def test_only_schemes_that_keep_what_is_too_fast_for_a_step_are_blamed(scheme, blamed):
+    assert may_gather(scheme) is blamed
 
 
 U_X = np.array([0.5, -0.2, 0.0, 0.1, 0.3, 0.0, 0.0, 0.2, 0.7])
