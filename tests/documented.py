@@ -132,6 +132,18 @@ def tracked(text: str) -> Path:
     return file
 
 
+NO_NUMBER = "fluid.viscosity"
+
+
+def identified(**arguments: Any) -> None:
+    """The checks of a fit, which take turns: the last finds that there is no such number, before anything swims."""
+    try:
+        named("identify")(**arguments)
+    except ValueError as refused:
+        if NO_NUMBER not in str(refused):
+            raise
+
+
 def filmed(file: Any, fps: Any) -> None:
     with named("film")(file, fps) as add:
         add(np.zeros((4, 4, 3), np.uint8))
@@ -241,9 +253,8 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     about = learned().description
     yield "Description", lambda **entries: named("Description")(**entries).check(), {**about._asdict(), "scene": FAST}
     yield "Description", about.from_json, dict(text=about.to_json())
-    yield "identify", partial(named("identify"), FAST), dict(
-        parameters=["x"], measurement=measurement(), confidence=0.9, largest_delay=None)  # fmt: skip
-    yield "identify", lambda scene: named("identify")(scene, ["x"], measurement()), dict(scene=FAST)
+    yield "identify", identified, dict(
+        scene=FAST, parameters=[NO_NUMBER], measurement=measurement(), confidence=0.9, largest_delay=None)  # fmt: skip
     swum = dict(scene=FAST, commands=np.zeros((1, 5)), state=None, duration=0.1)
     yield "differentiate", named("differentiate"), swum | dict(by=["commands"])
     yield "gradient", partial(named("gradient"), objective=of_work), swum | dict(by=["commands"])
