@@ -419,6 +419,31 @@ def test_a_simulated_drive_is_planned_driven_and_reported(tmp_path, capsys):
     assert measured.commands.tolist() == [[0, 1, 0, 0, -1], [0] * 5] * 2 and len(measured.nodes) == 6
 
 
+@pytest.mark.parametrize("plant", ["sim", "serial:/dev/null"])
+def test_logs_are_never_written_over(plant, tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "poses.csv").write_text("somebody's")
+    assert drive(tmp_path, "--yes", "--plant", plant) == 2
+    assert capsys.readouterr().err == f"{tmp_path / 'out'} has the logs of another drive: give another --out.\n"
+
+
+@pytest.mark.parametrize(
+    "plant, code, words",
+    [
+        (["sim", "--tracker", "serial:/dev/null"], 2, "has a tracker of its own"),
+        (["serial:/dev/ttyNone"], 1, "cannot be opened"),
+        (["{tank}", "--tracker", "serial:/dev/ttyNone"], 1, "cannot be opened"),
+        (["{tank}", "--scene", "three.json"], 2, "The plant has 5 limbs, the scene's robot 3."),
+    ],
+)
+def test_a_plant_that_cannot_be_driven_is_told_before_the_plan(plant, code, words, tank, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    files.write_json(Path("three.json"), Scene(Seastar(3), actuator=SmaWires()).to_dict())
+    assert drive(tmp_path, "--yes", "--plant", *(word.replace("{tank}", tank[1]) for word in plant)) == code
+    said = capsys.readouterr()
+    assert words in said.err and said.err.endswith(".\n") and not said.out and not (tmp_path / "out").exists()
+
+
 def test_an_interrupted_drive_stops_the_wires(tmp_path, monkeypatch):
     plants, make = [], drive_command.simulated
 
