@@ -164,7 +164,7 @@ def train_and_compare(options: Options, robot: Robot, folder: Path, film: Callab
     export(model, folder)
     if stop.is_set():
         print(
-            f"Stopped after {model.num_timesteps} strokes; {folder / 'model.zip'} is the policy so far. Continue with"
+            f"Stopped after {model.num_timesteps} decisions; {folder / 'model.zip'} is the policy so far. Continue with"
         )
         asked = ["--publish"] * options.publish + ["--publish-anyway"] * options.publish_anyway
         print(" ".join(["   ", resume_command(folder), *asked]))
@@ -207,7 +207,10 @@ def main(arguments: Sequence[str]) -> int:
         print(wrong, file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("Stopped at once: what was written until then is in the run's folder.", file=sys.stderr)
+        print(
+            "Stopped at once: what was written until then is in the run's folder, which --resume continues.",
+            file=sys.stderr,
+        )
         return 130
 
 

@@ -14,35 +14,48 @@ import time
 import tty
 from argparse import ArgumentParser
 from contextlib import suppress
+from typing import NoReturn
 
 import cv2
 
+from seastar_gym.command import run_command
 from seastar_gym.plant.lines import Lines, line_of
 from seastar_gym.plant.plant import PlantError, Sighting
 
-parser = ArgumentParser(description=__doc__)
+parser = ArgumentParser(description=__doc__.splitlines()[0])
 parser.add_argument("--camera", default="0", help="number of the camera, or a film")
-parser.add_argument("--tag", type=int, default=0, help="number of the tag")
+parser.add_argument("--tag", type=int, default=0, help="number of the tag (default: 0)")
 parser.add_argument("--metres-per-pixel", type=float, required=True, help="size of a pixel at the tag [m]")
-options = parser.parse_args()
 
-ours, theirs = os.openpty()  # the two ends of a serial line within this computer
-tty.setraw(theirs)
-print(f"--tracker serial:{os.ttyname(theirs)}", flush=True)
-line, family = (
-    Lines(os.fdopen(ours, "rb+", buffering=0)),
-    cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11),
-)
-camera = cv2.VideoCapture(int(options.camera) if options.camera.isdigit() else options.camera)
-detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11))
-while (taken := camera.read())[0]:
-    captured = time.monotonic()
-    squares, numbers, _ = detector.detectMarkers(taken[1])
-    for square, number in zip(squares, [] if numbers is None else numbers.ravel(), strict=True):
-        if number == options.tag:
-            height, width = taken[1].shape[:2]
-            x, y = options.metres_per_pixel * (square[0].mean(axis=0) - [width / 2, height / 2])
-            along = square[0][1] - square[0][0]  # from the tag's upper left corner to its upper right one
-            pose = float(x), -float(y), math.atan2(-along[1], along[0])
-            with suppress(PlantError):  # while nobody reads
-                line.send(line_of(Sighting(captured, time.monotonic(), pose)))
+
+def main() -> NoReturn:
+    """Send what the camera sees until it ends, or Ctrl-C."""
+    options = parser.parse_args()
+    pixel = options.metres_per_pixel
+    if not 0.0 < pixel < math.inf:
+        parser.error(f"--metres-per-pixel must be positive, not {pixel:g}.")
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what is wrong is said here, in a sentence
+    camera = cv2.VideoCapture(int(options.camera) if options.camera.isdigit() else options.camera)
+    if not camera.isOpened():
+        raise SystemExit(f"There is no camera {options.camera}: give another --camera.")
+    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11))
+    ours, theirs = os.openpty()  # the two ends of a serial line within this computer
+    tty.setraw(theirs)
+    line = Lines(os.fdopen(ours, "rb+", buffering=0))
+    print(f"--tracker serial:{os.ttyname(theirs)}", flush=True)
+    while (taken := camera.read())[0]:
+        captured = time.monotonic()
+        squares, numbers, _ = detector.detectMarkers(taken[1])
+        for square, number in zip(squares, [] if numbers is None else numbers.ravel(), strict=True):
+            if number == options.tag:
+                height, width = taken[1].shape[:2]
+                x, y = pixel * (square[0].mean(axis=0) - [width / 2, height / 2])
+                along = square[0][1] - square[0][0]  # from the tag's upper left corner to its upper right one
+                pose = float(x), -float(y), math.atan2(-along[1], along[0])
+                with suppress(PlantError):  # while nobody reads
+                    line.send(line_of(Sighting(captured, time.monotonic(), pose)))
+    raise SystemExit(f"Camera {options.camera} gives no more pictures.")
+
+
+if __name__ == "__main__":
+    run_command(main)

@@ -221,7 +221,7 @@ def test_a_training_that_is_asked_to_end_leaves_a_usable_model_and_says_how_to_g
     policy = policies.load(folder / "policy.safetensors")
     assert policy.predict(np.zeros(186, np.float32), deterministic=True)[0].shape == ()
     trained = int((folder / "progress.csv").read_text().splitlines()[-1].split(",")[0])
-    assert f"Stopped after {trained} strokes" in output
+    assert f"Stopped after {trained} decisions" in output
     assert train.main(["--resume", str(folder), "--strokes", str(trained + 128)]) == 0
     assert "Learned against scripted" in (folder / "evaluation" / "report.html").read_text()
 

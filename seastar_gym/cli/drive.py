@@ -2,7 +2,8 @@
 
 First the policy swims in a simulation, as it would in the tank: a dry run, drawn in plan.png. Then the command asks
 before any wire is heated. While the robot swims, a window shows it. Logs, a picture and a report are in the folder
---out. A guard stops all wires when a pulse is too long, when sight is lost, or when a line is bad, and says so.
+--out, where logs of another drive are never written over. A guard stops all wires when a pulse is too long, when sight
+is lost, or when a line is bad, and says so.
 
 Decision period, camera, scene and path are those of the policy, as `train.py --for-camera` writes it, unless options
 say otherwise. Policies that see all nodes cannot drive.
@@ -24,18 +25,19 @@ from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.registry import HELP, learned_policy, load_agent, period_of
-from seastar_gym.envs.commands import decisions_in
+from seastar_gym.envs.commands import Actions, decisions_in
 from seastar_gym.envs.options import make_scene, scene_at
 from seastar_gym.envs.paths import PATH_HELP, WAYPOINT_RADIUS, load_path
+from seastar_gym.envs.seastar_swim import RenderMode
 from seastar_gym.envs.sight import FOR_CAMERA, Sight, told
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.rollout import require_seen
 from seastar_gym.evaluation.swim import Swim, swim
-from seastar_gym.files import require_extra, write_atomically
+from seastar_gym.files import write_atomically
 from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.lines import LinePlant, open_serial
 from seastar_gym.plant.plant import Plant, PlantError, SimulatedPlant, with_wires
-from seastar_gym.plant.swim import PlantSwim
+from seastar_gym.plant.swim import LOGS, PlantSwim, require_limbs
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number, require_period
 from seastar_gym.scene.numerics import Fidelity
@@ -63,7 +65,7 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--scene", type=Path, help=f"file of the robot's scene, .py or .json ({own} the chapter's)")
     found.add_argument("--fidelity", choices=get_args(Fidelity), help=f"of the simulation ({own} fast)")
     found.add_argument("--seconds", type=float, default=200.0, help=f"time after which the swim ends {DEFAULT}")
-    found.add_argument("--out", type=Path, default=Path("runs/drive"), help=f"folder of all files {DEFAULT}")
+    found.add_argument("--out", type=Path, help="folder of all files (default: a folder in runs/ named by the time)")
     found.add_argument("--no-window", action="store_true", help="show no picture while the robot swims")
     found.add_argument("--dry", action="store_true", help="end after the dry run")
     found.add_argument("--unpaced", action="store_true", help="have a simulated plant not keep to real time")
@@ -131,6 +133,8 @@ def opened(options: argparse.Namespace, arguments: dict[str, Any], scene: Scene 
 def _devices(options: argparse.Namespace) -> list[str]:
     """Serial ports of the wires and of the tracker, where it has one of its own; none of a simulated plant."""
     if _is_simulated(options):
+        if options.tracker is not None:
+            raise ValueError(f"A simulated plant has a tracker of its own: leave out --tracker {options.tracker}.")
         return []
     ports = [options.plant] if options.tracker is None else [options.plant, options.tracker]
     for port in ports:
@@ -171,20 +175,19 @@ def progress(what: str) -> Iterator[None]:
             print("\r", end="")
 
 
-def plan(options: argparse.Namespace) -> tuple[Policy, Swim, dict[str, Any]]:
-    """The policy, its swim in simulation, and the arguments of the environment in which it drives."""
-    arguments = arguments_of(options)
+def plan(options: argparse.Namespace, arguments: dict[str, Any]) -> tuple[Policy, Swim, Actions]:
+    """The policy, its swim in simulation, and its action mode. arguments: Of the environment in which it drives."""
     env = PlantSwim(simulated(options, arguments, paced=False), **arguments)
     policy = load_agent(options.policy, env, options.seed)
-    arguments["actions"] = require_seen(policy, env)
-    env = PlantSwim(simulated(options, arguments, paced=False), **arguments)
+    actions = require_seen(policy, env)
+    env = PlantSwim(simulated(options, arguments, paced=False), actions=actions, **arguments)
     with progress("The plan is swum in simulation; a new kind of robot is compiled before, for up to a minute."):
         swum = _swim("plan", policy, env, options)
     if env.stopped:
         raise PlantError(
             f"The dry run was stopped: {env.stopped} It was seen through {arguments['sight']}; --sight names another."
         )
-    return policy, swum, arguments
+    return policy, swum, actions
 
 
 def _swim(name: str, policy: Policy, env: PlantSwim, options: argparse.Namespace) -> Swim:
@@ -194,10 +197,15 @@ def _swim(name: str, policy: Policy, env: PlantSwim, options: argparse.Namespace
 
 def drive(options: argparse.Namespace) -> int:
     """Plan, ask, drive, and write what came of it; returns the exit code."""
-    if _devices(options) and not options.dry:
-        require_extra("Serial ports", "plant", "serial")
+    devices = _devices(options)
+    options.out = options.out or Path("runs") / time.strftime("drive_%Y-%m-%d_%H-%M-%S")
+    require_no_logs(options.out)
     robot = scene_at(_scene_of_plant(options), options.fidelity or "fast")
-    policy, planned, arguments = plan(options)
+    arguments = arguments_of(options)
+    if devices and not options.dry:
+        with opened(options, arguments, robot) as plant:  # which heats nothing
+            require_limbs(plant, arguments["scene"])
+    policy, planned, actions = plan(options, arguments)
     options.out.mkdir(parents=True, exist_ok=True)
     picture = options.out / "plan.png"
     fluid = arguments["scene"].fluid
@@ -209,7 +217,8 @@ def drive(options: argparse.Namespace) -> int:
         print("No wire was heated.")
         return 0
     with opened(options, arguments, robot) as plant:
-        env = PlantSwim(plant, Limits(), options.out, None if options.no_window else "human", **arguments)
+        window: RenderMode | None = None if options.no_window else "human"
+        env = PlantSwim(plant, Limits(), options.out, window, actions=actions, **arguments)
         try:
             swum = _swim("driven", policy, env, options)
         finally:
@@ -221,6 +230,12 @@ def drive(options: argparse.Namespace) -> int:
     dropped = f" {env.dropped_pictures} pictures were dropped, where no robot can be." if env.dropped_pictures else ""
     print(f"Driven: {swum.result}. {guarded}{dropped} Written: {options.out}.")
     return STOPPED if env.stopped else 0
+
+
+def require_no_logs(folder: Path) -> None:
+    """ValueError where a folder has the logs of a drive."""
+    if any((folder / f"{name}.csv").exists() for name in LOGS):
+        raise ValueError(f"{folder} has the logs of another drive: give another --out.")
 
 
 def agreed() -> bool:

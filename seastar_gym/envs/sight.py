@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -107,6 +107,10 @@ def read_camera(file: str | os.PathLike[str]) -> Camera:
     try:
         if not isinstance(data, dict):
             raise ValueError(f"it must be such as {TEMPLATE}, not {shown(data)}")
+        names = [*(field.name for field in fields(Sight)), ACTION_DELAY]
+        for name in data:
+            if name not in (*names, "version", "kind"):
+                raise ValueError(f"it says {shown(name)}, a camera is written with {', '.join(names)}")
         late: Any = data.pop("action_delay", 0.0)
         sight = from_dict({"version": VERSION, "kind": Sight.__name__, **data}, Sight)
         late = from_dict({"version": VERSION, **late}, object) if isinstance(late, dict) else as_float(late)

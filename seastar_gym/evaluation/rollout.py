@@ -254,8 +254,9 @@ def require_seen(policy: Policy, env: Any) -> Actions:
     """Action mode in which an agent swims a task; ValueError where it cannot know what the task shows, or drive it."""
     n_seen, n_known = env.observation_space.shape[0], Layout.of(env.scene).size
     if isinstance(policy, Searcher) and n_seen != n_known:
-        shown_by = "" if env.sight is None else f", by {told(env.sight)}"
-        raise ValueError(f"It reads observations of {n_known} numbers, the task shows {n_seen}{shown_by}.")
+        shown_by = "the task" if env.sight is None else told(env.sight)
+        who = type(policy).__name__
+        raise ValueError(f"A {who} needs full sight: it reads {n_known} numbers, {shown_by} shows {n_seen}.")
     actions = actions_in(policy, env.actions, env.scene.robot.n_limbs)
     require_fit(policy, env.scene, actions, env.decision_period, n_seen, getattr(env, "task", None), env.sight)
     return actions

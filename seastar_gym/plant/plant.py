@@ -91,8 +91,12 @@ class SimulatedPlant:
         require_kind("sight", sight, Sight, "a Sight")
         require_seed(seed)
         require_flag("paced", paced)
-        if simulator.n_robots != 1 or not isinstance(simulator.scene.actuator, WirePair):
-            raise ValueError("A SimulatedPlant is one robot with wires, such as SmaWires.")
+        actuator = simulator.scene.actuator
+        if simulator.n_robots != 1:
+            raise ValueError(f"A simulated plant is one robot with wires, not {simulator.n_robots}.")
+        if not isinstance(actuator, WirePair):
+            kind = type(actuator).__name__
+            raise ValueError(f"A simulated plant is one robot with wires: use ThermalSma or SmaWires, not {kind}.")
         if sight.sees == "nodes":
             raise ValueError('A tracker sees no nodes: use sees="pose", or markers.')
         self.simulator, self.n_limbs = simulator, simulator.scene.robot.n_limbs

@@ -33,11 +33,14 @@ from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.files import LineFile
 from seastar_gym.plant.guard import NOISES, Guard, Heat, Limits
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
-from seastar_gym.scene import Seastar
+from seastar_gym.scene import Scene, Seastar
 from seastar_gym.scene.actuators.wires import ThermalSma
 from seastar_gym.scene.checks import require_file, require_kind, shown
 from seastar_gym.simulator import StrokeReport
 from seastar_gym.simulator.simulator import pausing
+
+LOGS = ("tracking", "commands", "poses")
+"""Names of the logs, without .csv."""
 
 
 class Logs:
@@ -54,7 +57,7 @@ class Logs:
         self._files: dict[str, LineFile] = {}
         with self._told_in_a_sentence():
             folder.mkdir(parents=True, exist_ok=True)
-            for name in ("tracking", "commands", "poses"):
+            for name in LOGS:
                 self._files[name] = LineFile(folder / f"{name}.csv")
         places = [f"{axis}{node}" for node in [0, *self._nodes.values()] for axis in "xy"]
         self._write("tracking", ["time", *places, *(["theta"] if self._has_body else [])])
@@ -136,6 +139,12 @@ def limits_for(limits: Limits, sight: Sight) -> Limits:
     return replace(limits, blur=max(limits.blur, blur), turn_blur=max(limits.turn_blur, turn_blur))
 
 
+def require_limbs(plant: Plant, scene: Scene) -> None:
+    """ValueError where a plant has not as many limbs as the robot of a scene."""
+    if plant.n_limbs != (n_limbs := scene.robot.n_limbs):
+        raise ValueError(f"The plant has {plant.n_limbs} limbs, the scene's robot {n_limbs}.")
+
+
 class PlantRobot(Robots):
     """Robot in a tank. Its simulator swims along, and is put where the robot was seen after every decision.
 
@@ -154,17 +163,17 @@ class PlantRobot(Robots):
         if not self.pulse <= limits.longest_pulse:
             raise ValueError(
                 f"A full command heats a wire for {self.pulse:g} s, the guard allows {limits.longest_pulse:g} s: use "
-                "an actuator with a shorter heating_time, such as SmaWires(heating_time=0.08), or other Limits."
+                "an actuator with a shorter heating_time, such as SmaWires(heating_time=0.08), or, in Python, other "
+                "Limits."
             )
-        if plant.n_limbs != self.scene.robot.n_limbs:
-            raise ValueError(f"The plant has {plant.n_limbs} limbs, the scene's robot {self.scene.robot.n_limbs}.")
+        require_limbs(plant, self.scene)
         self.can_be_masked = True
         if limits.wire is None and isinstance(self.scene.actuator, ThermalSma):
             limits = replace(limits, wire=self.scene.actuator)
         if (reached := Heat(1, limits).from_cold(self.pulse)) > limits.hottest:
             raise ValueError(
                 f"A full command heats a cold wire to {reached:.0f} deg C, the guard allows {limits.hottest:g} deg C: "
-                "use an actuator with a shorter heating_time, or other Limits."
+                "use an actuator with a shorter heating_time, or, in Python, other Limits."
             )
         span = float(np.linalg.norm(self.simulator.positions[0] - self.simulator.hub_position()[0], axis=-1).max())
         self.guard = Guard(plant, limits_for(limits, sight), self.pulse, span)

@@ -265,6 +265,7 @@ def test_resets_that_are_refused_before_the_first_success_cost_nothing():
         ("{", "is no JSON that can be read"),
         ("[30]", "it must be such as"),
         ('{"fps": 30}', "'fps'"),
+        ('{"action_dely": 0.1}', "sees, action_delay"),
         ('{"rate": -30}', "Sight.rate must be"),
         ('{"delay": {"kind": "Uniform", "low": 0.1}}', "'high'"),
         ('{"action_delay": 99}', "action_delay must be at most"),

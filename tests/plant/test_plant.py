@@ -9,6 +9,7 @@ import threading
 import time
 import tty
 from collections import deque
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from unittest.mock import Mock
@@ -417,6 +418,33 @@ def test_a_simulated_drive_is_planned_driven_and_reported(tmp_path, capsys):
     assert {file.name for file in out.iterdir()} == names
     measured = Measurement.from_csv(out / "tracking.csv", out / "commands.csv")
     assert measured.commands.tolist() == [[0, 1, 0, 0, -1], [0] * 5] * 2 and len(measured.nodes) == 6
+
+
+@pytest.mark.parametrize("plant", ["sim", "serial:/dev/null"])
+def test_logs_are_never_written_over(plant, tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "poses.csv").write_text("somebody's")
+    assert drive(tmp_path, "--yes", "--plant", plant) == 2
+    assert capsys.readouterr().err == f"{tmp_path / 'out'} has the logs of another drive: give another --out.\n"
+
+
+@pytest.mark.parametrize(
+    "plant, code, words",
+    [
+        (["sim", "--tracker", "serial:/dev/null"], 2, "has a tracker of its own"),
+        (["serial:/dev/ttyNone"], 1, "cannot be opened"),
+        (["serial:a board"], 2, "The plant has 5 limbs, the scene's robot 3."),
+    ],
+)
+def test_a_plant_that_cannot_be_driven_is_told_before_the_plan(plant, code, words, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    files.write_json(Path("three.json"), Scene(Seastar(3), actuator=SmaWires()).to_dict())
+    if "serial:a board" in plant:
+        monkeypatch.setattr(drive_command, "open_serial", nullcontext)
+        monkeypatch.setattr(drive_command, "LinePlant", lambda _: Tank())
+    assert drive(tmp_path, "--yes", "--scene", "three.json", "--plant", *plant) == code
+    said = capsys.readouterr()
+    assert words in said.err and said.err.endswith(".\n") and not said.out and not (tmp_path / "out").exists()
 
 
 def test_an_interrupted_drive_stops_the_wires(tmp_path, monkeypatch):
