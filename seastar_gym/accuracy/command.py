@@ -126,7 +126,9 @@ def certify_as_asked(options: argparse.Namespace) -> None:
         try:
             chosen = certificate.for_error(options.error)
         except ValueError as none:
-            raise ValueError(f"{none}{'' if options.chosen is None else f' {options.chosen} is not written.'}") from none
+            raise ValueError(
+                f"{none}{'' if options.chosen is None else f' {options.chosen} is not written.'}"
+            ) from none
         print(f"{100 * options.error:g} %: nodes_per_limb={chosen.robot.nodes_per_limb}, {chosen.numerics}")
         if options.chosen is not None:
             write_json(options.chosen, chosen.to_dict())

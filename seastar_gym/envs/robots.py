@@ -102,8 +102,7 @@ class Task(ABC):
     sight: Sight | None = None
     """Camera through which robots are seen, unless the environment is given another."""
     tells_errors = True
-    """Whether measured errors, which are of whole robots in still water, hold for the task's; if not, those in `info` are
-    NaN."""
+    """Whether measured errors, which are of whole robots in still water, hold; if not, those in `info` are NaN."""
     goals_are_waypoints = False
     """Whether an episode is about reaching waypoints, in an observation that tells of them in their places only."""
     option = "instance"
@@ -567,7 +566,7 @@ class Robots:
         return errors_in_info(scene, self.certificate, self.timed)
 
     def _errors(self) -> dict[str, Floats]:
-        """Measured errors and speed, shape (n_robots,) each, not copies; NaN for weak limbs, and where a task tells none."""
+        """Measured errors and speed, shape (n_robots,) each, not copies; NaN for weak limbs and where none hold."""
         scene, strengths = self.simulator.scene, self.simulator.limb_strengths
         if scene is not self._known[0] or strengths.tobytes() != self._known[1]:
             known = self._errors_of(scene) if self.task.tells_errors else {}
