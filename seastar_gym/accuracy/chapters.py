@@ -224,7 +224,7 @@ def warn_of_task(name: str) -> None:
     Called two calls below where an environment is made, which the warning names.
     """
     warnings.warn(
-        f"{name} draws its robot or its water, so that errors in info are NaN in spite of the certificate: "
-        "error_bars=True estimates them.",
+        f"{name} draws its robot or its water, so info has none of the certificate's errors: error_bars=True estimates "
+        "them.",
         stacklevel=4,
     )

@@ -102,7 +102,7 @@ class Task(ABC):
     sight: Sight | None = None
     """Camera through which robots are seen, unless the environment is given another."""
     tells_errors = True
-    """Whether measured errors, which are of whole robots in still water, hold; if not, those in `info` are NaN."""
+    """Whether `info` has entries of measured errors, which are of whole robots in still water."""
     goals_are_waypoints = False
     """Whether an episode is about reaching waypoints, in an observation that tells of them in their places only."""
     option = "instance"
@@ -549,7 +549,7 @@ class Robots:
             "hub_position": hub,
             **self.task.info(self, hub),
             **({"action_mask": self.action_masks().astype(np.int8)} if self.can_be_masked else {}),
-            **self._errors(),
+            **(self._errors() if self.task.tells_errors else {}),
             **({"error_estimate": self.simulator.error_estimate} if self.options.error_bars else {}),
             **({"energy_growth": self.simulator.energy_growth} if self._tells_growth else {}),
             **({} if self.tracker is None else {"sight_age": self.tracker.age(self.simulator.time)}),
@@ -566,11 +566,10 @@ class Robots:
         return errors_in_info(scene, self.certificate, self.timed)
 
     def _errors(self) -> dict[str, Floats]:
-        """Measured errors and speed, shape (n_robots,) each, not copies; NaN for weak limbs and where none hold."""
+        """Measured errors and speed, shape (n_robots,) each, not copies; NaN for robots with weak limbs."""
         scene, strengths = self.simulator.scene, self.simulator.limb_strengths
         if scene is not self._known[0] or strengths.tobytes() != self._known[1]:
-            known = self._errors_of(scene) if self.task.tells_errors else {}
-            strong = (strengths == 1.0).all(axis=1)
+            known, strong = self._errors_of(scene), (strengths == 1.0).all(axis=1)
             errors = {name: np.where(strong, known.get(name, np.nan), np.nan) for name in self._names_of_errors}
             self._known = scene, strengths.tobytes(), errors
         return self._known[2]

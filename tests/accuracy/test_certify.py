@@ -272,7 +272,7 @@ def test_where_nothing_is_promised_a_warning_says_what_to_do(certificate):
     with pytest.warns(UserWarning, match=r"errors in info are NaN.* certify") as told:
         SeastarSwimEnv(scene=SCENE, fidelity="fast")
     assert told[0].filename == __file__  # where the environment is made
-    with pytest.warns(UserWarning, match=r"Station draws .* NaN in spite of the certificate: error_bars=True") as told:
+    with pytest.warns(UserWarning, match=r"Station draws .* none of the certificate's errors: error_bars=True") as told:
         SeastarSwimEnv(scene=SCENE, certificate=certificate, task="station", actions="joint")
     assert told[0].filename == __file__
     timed = {"fidelity": "fast", "decision_period": 0.2}

@@ -137,7 +137,7 @@ REFUSED = [
     ("evaluate --agents own_agents:missing", "the module own_agents has no function missing"),
     ("evaluate --agents own_agents:number", "the module own_agents has no function number"),
     ("evaluate --agents own_agents:nothing", "is a int, which has no predict"),
-    ("evaluate --agents own_agents:of_nothing", "must be a function of one argument, the environment: of_nothing(env)."),
+    ("evaluate --agents own_agents:of_nothing", "a function of one argument, the environment: of_nothing(env)."),
     ("evaluate --agents own_agents:OfOneArgument", "needs predict(observation, state, episode_start, deterministic)."),
     ("evaluate --agents own_agents:Stateless", "predict must return an action and the state for its next call, not 8"),
     ("evaluate --agents own_agents:StatelessRobot", "predict must return an action and the state for its next call"),

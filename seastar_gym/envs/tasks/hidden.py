@@ -162,7 +162,7 @@ class FailBlind(Waypoints):
     Robots that arrive are compared by their time, the task's measure.
 
     ## Info
-    That of `SeastarSwim-v0`, whose measured errors are NaN, as they are those of whole robots; besides,
+    That of `SeastarSwim-v0` without the measured errors, which are those of whole robots; besides,
 
     | name             | type       | unit | meaning                                       |
     |------------------|------------|------|-----------------------------------------------|
@@ -274,7 +274,7 @@ class SimToReal(Waypoints):
     Robots that arrive are compared by their time, the task's measure.
 
     ## Info
-    That of `SeastarSwim-v0`, whose measured errors are NaN, as they are those of equally strong limbs; besides,
+    That of `SeastarSwim-v0` without the measured errors, which are those of robots with equally strong limbs; besides,
 
     | name                     | type       | unit | meaning                                |
     |--------------------------|------------|------|----------------------------------------|

@@ -75,9 +75,9 @@ class Station(Task):
     The task's measure is the mean distance from the 31st second on.
 
     ## Info
-    That of `SeastarSwim-v0` without `waypoint_index`, `cross_track_error`, `energy_per_metre`, `reward_waypoint` and
-    `reward_time`; measured errors are NaN, as they are those of still water, and `is_success` says whether the hub is
-    within `tolerance` of the station. Besides,
+    That of `SeastarSwim-v0` without `waypoint_index`, `cross_track_error`, `energy_per_metre`, `reward_waypoint`,
+    `reward_time` and the measured errors, which are those of still water; `is_success` says whether the hub is within
+    `tolerance` of the station. Besides,
 
     | name                | type       | unit | meaning                                        |
     |---------------------|------------|------|------------------------------------------------|
