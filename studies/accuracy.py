@@ -351,13 +351,13 @@ def robots_table(results: Mapping[str, Any]) -> str:
 # median
 
 PURPOSES: dict[Fidelity, str] = {
-    "rapid": "searching through many designs", "fast": "searching, training",
-    "balanced": "doing anything else; it is the default",
+    "rapid": "searching many designs", "fast": "searching, training",
+    "balanced": "doing anything else (default)",
     "accurate": "measuring a difference of a few per cent", "reference": "checking one of the above",
     "chapter": "repeating the chapter's figures",
 }  # fmt: skip
 ERRORS = ["random strokes [%]", "repeated strokes [%]", "random decisions [%]", "held or repeated decisions [%]"]
-TO_QUOTE = ["quote for strokes [%]", "quote for decisions [%]"]
+TO_QUOTE = ["quote: strokes [%]", "quote: decisions [%]"]
 SAID = (("wires", "silicone"), ("undamped", "none"))
 """Tables of decisions, and the damping of their limbs."""
 DETAILED: tuple[Fidelity, ...] = ("fast", "balanced", "accurate")
