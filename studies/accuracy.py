@@ -351,12 +351,13 @@ def robots_table(results: Mapping[str, Any]) -> str:
 # median
 
 PURPOSES: dict[Fidelity, str] = {
-    "rapid": "searching through many designs", "fast": "searching, training",
-    "balanced": "doing anything else; it is the default",
+    "rapid": "searching many designs", "fast": "searching, training",
+    "balanced": "doing anything else (default)",
     "accurate": "measuring a difference of a few per cent", "reference": "checking one of the above",
     "chapter": "repeating the chapter's figures",
 }  # fmt: skip
-ERRORS = ["random strokes", "repeated strokes", "random decisions", "held or repeated decisions"]
+ERRORS = ["random strokes [%]", "repeated strokes [%]", "random decisions [%]", "held or repeated decisions [%]"]
+TO_QUOTE = ["quote: strokes [%]", "quote: decisions [%]"]
 SAID = (("wires", "silicone"), ("undamped", "none"))
 """Tables of decisions, and the damping of their limbs."""
 DETAILED: tuple[Fidelity, ...] = ("fast", "balanced", "accurate")
@@ -391,8 +392,11 @@ def cells(fidelity: Fidelity, name: str) -> list[str]:
 
 
 def row_of(fidelity: Fidelity) -> list[str]:
-    """Errors of strokes and of decisions, and the speed."""
-    return [*cells(fidelity, "strokes"), *cells(fidelity, "wires"), f"{in_table(fidelity).speed:,.0f}"]
+    """Errors of strokes and of decisions, what is promised of both, and the speed."""
+    errors = [each.replace(" %", "") for name in ("strokes", "wires") for each in cells(fidelity, name)]
+    known = [(in_table(fidelity, name), certificate_of(name)) for name in ("strokes", "wires")]
+    promised = [f"{100 * each.promise(of.repeated(of.actions)):g}" for each, of in known]
+    return [*errors, *promised, f"{in_table(fidelity).speed:,.0f}"]
 
 
 def readme(_: object) -> str:
@@ -409,7 +413,7 @@ def readme(_: object) -> str:
 def choosing(_: object) -> str:
     """All presets, by what they are for."""
     rows = [[why, f'`fidelity="{name}"`', *row_of(name)] for name, why in PURPOSES.items()]
-    return markdown(["you are", "take", *ERRORS, "× real time"], rows, (0, 1))
+    return markdown(["you are", "take", *ERRORS, *TO_QUOTE, "× real time"], rows, (0, 1))
 
 
 def presets(_: object) -> str:

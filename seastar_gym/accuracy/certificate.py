@@ -327,7 +327,7 @@ class Certificate:
         best = min(enduring, key=lambda each: each.promise(asked))
         raise ValueError(
             f"No measured setting keeps the path error below {100 * error:g} %: the best, {best}, keeps "
-            f"{100 * best.promise(asked):g} %."
+            f"{100 * best.promise(asked):g} %, so ask for {best.promise(asked):g} or more."
         )
 
     def _of_resolution(self, robot: Seastar | None) -> tuple[Setting, ...]:

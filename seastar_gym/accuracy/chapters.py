@@ -216,3 +216,15 @@ def warn_uncertified(
             f"info are NaN: {remedy}."
         )
     warnings.warn(told, stacklevel=4)
+
+
+def warn_of_task(name: str) -> None:
+    """Warn of a certificate for a task that draws its robot or its water, which none is of.
+
+    Called two calls below where an environment is made, which the warning names.
+    """
+    warnings.warn(
+        f"{name} draws its robot or its water, so info has none of the certificate's errors: error_bars=True estimates "
+        "them.",
+        stacklevel=4,
+    )

@@ -9,6 +9,8 @@ given several times a stroke, and the modes of limbs that they drive are named.
 Writes a certificate (JSON), and a picture of error over speed where matplotlib is installed. `Certificate.load(file)`
 reads it, `certificate.for_error(0.01)` is the scene at the fastest setting that keeps 1 %, and
 `gym.make("SeastarSwim-v0", scene=..., certificate=file)` tells its errors in `info`.
+
+With --chosen, that scene is written, too. An older file of its name is moved away first, to one that ends with .old.
 """
 
 import argparse
@@ -106,6 +108,10 @@ def certify_as_asked(options: argparse.Namespace) -> None:
         require_file(name, getattr(options, name))
     if options.out.suffix == ".png":
         raise ValueError(f"{options.out} is where the picture goes: give --out a file such as certificate.json.")
+    if options.chosen is not None and options.chosen.exists():
+        before = options.chosen.with_name(f"{options.chosen.name}.old")
+        options.chosen.replace(before)  # now: no training takes it for this scene's, whatever happens
+        print(f"Moved: {options.chosen}, of before, to {before}", flush=True)
     with progress_bar() as progress:
         certificate = certify(scene, options.samples, options.seed, progress, options.decision_period)
     certificate.save(options.out)
@@ -117,7 +123,12 @@ def certify_as_asked(options: argparse.Namespace) -> None:
     except ModuleNotFoundError:
         print('No picture: that needs matplotlib, pip install "seastar-gym[studies]".')
     if options.error is not None:
-        chosen = certificate.for_error(options.error)
+        try:
+            chosen = certificate.for_error(options.error)
+        except ValueError as none:
+            raise ValueError(
+                f"{none}{'' if options.chosen is None else f' {options.chosen} is not written.'}"
+            ) from none
         print(f"{100 * options.error:g} %: nodes_per_limb={chosen.robot.nodes_per_limb}, {chosen.numerics}")
         if options.chosen is not None:
             write_json(options.chosen, chosen.to_dict())

@@ -36,6 +36,13 @@ def require_policy(policy: object) -> None:
         raise ValueError(f"A policy must have predict(observation, ...), which {shown(policy)} has not.")
 
 
+def answer_of(answer: object) -> tuple[Any, Any]:
+    """Action and state that a call of `predict` returned; ValueError where it is no pair."""
+    if not isinstance(answer, tuple) or len(answer) != 2:
+        raise ValueError(f"predict must return an action and the state for its next call, not {shown(answer)}.")
+    return answer
+
+
 def is_batched(policy: Any) -> bool:
     """Whether a policy answers for many robots at once."""
     third_party = {each.__module__.partition(".")[0] for each in type(policy).__mro__}

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import inspect
 import pickle
 import re
 import warnings
@@ -33,7 +34,7 @@ from typing import Any, get_args
 import numpy as np
 
 from seastar_gym.controllers import learned
-from seastar_gym.controllers.contract import Policy, actions_of, is_batched, require_fit
+from seastar_gym.controllers.contract import Policy, actions_of, answer_of, is_batched, require_fit
 from seastar_gym.controllers.learned import reason_of
 from seastar_gym.controllers.open_loop import GAITS, scripted
 from seastar_gym.controllers.reduced import as_it_learned
@@ -81,11 +82,26 @@ def call_function(name: str, env: OneRobotEnv) -> Policy:
         raise ValueError(f"There is no agent {name!r}: {missing}.") from missing
     if not callable(make):
         raise ValueError(f"There is no agent {name!r}: the module {module} has no function {function}.")
+    if not takes(make, env):
+        raise ValueError(f"The agent {name!r} must be a function of one argument, the environment: {function}(env).")
     policy = make(env)
     if not callable(getattr(policy, "predict", None)):
         raise ValueError(f"The agent {name!r} is a {type(policy).__name__}, which has no predict(observation, ...).")
+    if not takes(policy.predict, None, state=None, episode_start=None, deterministic=True):
+        raise ValueError(f"The agent {name!r} needs predict(observation, state, episode_start, deterministic).")
     policy = as_it_learned(policy, lambda: env)
     return policy if is_batched(policy) else RobotByRobot(policy)
+
+
+def takes(function: Callable[..., Any], *arguments: Any, **named: Any) -> bool:
+    """Whether a function can be called with these arguments, as far as it tells."""
+    try:
+        inspect.signature(function).bind(*arguments, **named)
+    except TypeError:
+        return False
+    except ValueError:  # it has no signature
+        return True
+    return True
 
 
 class RobotByRobot:
@@ -110,13 +126,15 @@ class RobotByRobot:
     ) -> tuple[Any, Any]:
         """Action and state of one robot, or actions, shape (n, ...), and a list of states of n robots."""
         if np.ndim(observation) == 1:
-            return self._policy.predict(observation, state, episode_start, deterministic)
+            return answer_of(self._policy.predict(observation, state, episode_start, deterministic))
         n = len(observation)
         begins = np.full(n, state is None) if episode_start is None else np.asarray(episode_start, bool)
         states = [None] * n if state is None else list(state)
         answers = [
-            self._of(k, begins[k]).predict(
-                observation[k], None if begins[k] else states[k], begins[k : k + 1], deterministic
+            answer_of(
+                self._of(k, begins[k]).predict(
+                    observation[k], None if begins[k] else states[k], begins[k : k + 1], deterministic
+                )
             )
             for k in range(n)
         ]

@@ -102,7 +102,7 @@ class Task(ABC):
     sight: Sight | None = None
     """Camera through which robots are seen, unless the environment is given another."""
     tells_errors = True
-    """Whether `info` has measured errors, which are of whole robots in still water."""
+    """Whether `info` has entries of measured errors, which are of whole robots in still water."""
     goals_are_waypoints = False
     """Whether an episode is about reaching waypoints, in an observation that tells of them in their places only."""
     option = "instance"

@@ -328,9 +328,9 @@ class SeastarSwimEnv(OneRobotEnv):
     `energy_per_metre` is infinite where the route has not become shorter; heat and energy are NaN for actuators without
     a heating power.
     Errors from `path_error` to `time_error` are those of docs/accuracy.md for the chapter's robot at a fidelity. They
-    are NaN for other robots and scenes, unless a `certificate` has them, and for what was not measured. Decisions
-    within a stroke have errors every 0.1 to 0.5 s, and no `batch_real_time_factor`. One robot alone is slower than a
-    batch (docs/speed.md).
+    are NaN for other robots and scenes, unless a `certificate` has them, and for what was not measured. `Station`,
+    `FailBlind` and `SimToReal`, which draw the robot or the water, have no such entries. Decisions within a stroke have
+    errors every 0.1 to 0.5 s, and no `batch_real_time_factor`. One robot alone is slower than a batch (docs/speed.md).
     `error_estimate` is of the current run, of any robot: the true error since the reset, of space and time, lies below
     it in about 95 % of strokes (docs/numerics.md); NaN after a failure.
     `energy_growth` is 1 in the first 20 strokes; a value well above 1 means that the time stepping adds energy
@@ -359,7 +359,7 @@ class SeastarSwimEnv(OneRobotEnv):
     random_heading: Whether the robot is turned at random at the start of every episode.
     randomization: Distributions of numbers of the scene that are drawn at the start of every episode.
     certificate: Measured errors of the scene for `info`: a `Certificate`, or a file of `seastar certify`. Refused if it
-        belongs to another scene or version, or if decisions are not strokes.
+        belongs to another scene, version or time between decisions.
     error_bars: Whether `info` has `error_estimate`, from a finer copy of the robot that is simulated alongside. The
         trajectory stays bit-identical; a step takes three to five times as long.
     decision_period: Time between decisions [s]. None means a stroke, the period of the actuator. If no `scene` is given

@@ -15,7 +15,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from seastar_gym.accuracy.chapters import warn_uncertified, warn_undamped
+from seastar_gym.accuracy.chapters import warn_of_task, warn_uncertified, warn_undamped
 from seastar_gym.envs.attributes import RobotsEnv, arguments_of, checked_options
 from seastar_gym.envs.commands import as_array, sampling_mask, to_commands
 from seastar_gym.envs.instances import Split
@@ -449,7 +449,7 @@ class SeastarSwimVectorEnv(ManyRobotsEnv):
 def swimmers(
     n_robots: int, threads: int | None, /, task: Any = None, split: Split = "train", **arguments: Any
 ) -> Robots:  # fmt: skip
-    """Robots of an environment, with a warning if the task tells errors that nobody has measured of the scene.
+    """Robots of an environment, with a warning where errors were asked for that nobody has measured.
 
     arguments: Of the environment, those in `OF_ROBOTS`.
     """
@@ -459,6 +459,8 @@ def swimmers(
         warn_undamped(robots.scene, robots.timed)
         asked = None if robots.options.scene is None else robots.options.fidelity
         warn_uncertified(robots.scene, asked, robots.certificate, robots.timed)
+    elif robots.certificate is not None:
+        warn_of_task(type(robots.task).__name__)
     return robots
 
 

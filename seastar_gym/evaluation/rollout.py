@@ -23,7 +23,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.contract import Policy, actions_in, require_fit, require_policy
+from seastar_gym.controllers.contract import Policy, actions_in, answer_of, require_fit, require_policy
 from seastar_gym.controllers.search import Searcher
 from seastar_gym.envs import IDS
 from seastar_gym.envs.commands import Actions
@@ -120,7 +120,8 @@ def rollout(
     state, begins, swimming = None, np.ones(n, bool), np.ones(n, bool)
     is_over = look(info)
     while not is_over and swimming.any() and (until is None or decisions.max() < until):
-        actions, state = policy.predict(observations, state=state, episode_start=begins, deterministic=True)
+        answer = policy.predict(observations, state=state, episode_start=begins, deterministic=True)
+        actions, state = answer_of(answer)
         if not swimming.all():
             actions = np.array(actions)
             actions[~swimming] = 0  # rest, in every action mode

@@ -272,6 +272,9 @@ def test_where_nothing_is_promised_a_warning_says_what_to_do(certificate):
     with pytest.warns(UserWarning, match=r"errors in info are NaN.* certify") as told:
         SeastarSwimEnv(scene=SCENE, fidelity="fast")
     assert told[0].filename == __file__  # where the environment is made
+    with pytest.warns(UserWarning, match=r"Station draws .* none of the certificate's errors: error_bars=True") as told:
+        SeastarSwimEnv(scene=SCENE, certificate=certificate, task="station", actions="joint")
+    assert told[0].filename == __file__
     timed = {"fidelity": "fast", "decision_period": 0.2}
     with pytest.warns(UserWarning, match=r"errors in info are NaN: error_bars=True"):
         gym.make("SeastarSwim-v0", scene=replace(SCENE, actuator=SmaWires()), **timed)
@@ -293,6 +296,18 @@ def test_the_command_writes_certificate_picture_and_the_chosen_scene(few_setting
     assert out.with_suffix(".png").stat().st_size > 10_000
     assert "90 %: nodes_per_limb=5" in capsys.readouterr().out
     assert load_scene(chosen) == Certificate.load(out).for_error(0.9) and load_scene(None) == Scene()
+
+
+def test_a_scene_that_was_chosen_before_is_moved_away_where_none_is_chosen(made, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(command, "certify", lambda *arguments: made)
+    out, chosen = tmp_path / "certificate.json", tmp_path / "chosen.json"
+    chosen.write_text("of another robot")
+    assert command.main(["--error", "0.01", "--out", str(out), "--chosen", str(chosen)]) == 2
+    assert not chosen.exists() and (tmp_path / "chosen.json.old").read_text() == "of another robot"
+    told = capsys.readouterr()
+    assert "Moved: " in told.out and "so ask for 0.075 or more." in told.err and "json is not written." in told.err
+    assert command.main(["--error", "0.075", "--out", str(out), "--chosen", str(chosen)]) == 0
+    assert load_scene(chosen) == made.for_error(0.075)
 
 
 OWN = "from seastar_gym import Scene, SmaPulse\nclass Own(SmaPulse):\n    pass\nscene = Scene(actuator=Own())\n"

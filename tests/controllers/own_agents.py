@@ -22,4 +22,28 @@ def nothing(env):
     return 3
 
 
+def of_nothing():
+    """A function that takes no environment."""
+
+
+class OfOneArgument(Towards):
+    """Takes the observation alone."""
+
+    def predict(self, observation):
+        return self.action, None
+
+
+class Stateless(Towards):
+    """Returns the action alone."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        return self.action
+
+
+class StatelessRobot(Stateless):
+    """The same for one robot at a time."""
+
+    batched = False
+
+
 number = 3
