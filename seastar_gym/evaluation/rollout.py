@@ -160,8 +160,11 @@ def seconds_to_success(episodes: Episodes) -> Floats:
 
 
 def mean_distance(episodes: Episodes) -> Floats:
-    """Mean distance from the station [mm] once SETTLED has passed."""
-    settled = np.where(episodes.of("time") > SETTLED, episodes.of("distance"), np.nan)
+    """Mean distance from the station [mm] once SETTLED has passed. ValueError where no episode is as long."""
+    counts = episodes.of("time") > SETTLED
+    if not counts.any():
+        raise ValueError(f"Distances from a station count after {SETTLED:g} s: swim longer.")
+    settled = np.where(counts, episodes.of("distance"), np.nan)
     return np.asarray(1000.0 * np.nanmean(settled, axis=0))
 
 

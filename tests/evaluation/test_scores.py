@@ -121,6 +121,7 @@ def test_an_agent_that_does_not_fit_costs_the_others_nothing(tasks, tmp_path, ca
         (["--task", SWIM, "--agents", "rest", "rest"], "Two agents are called rest: name them with LABEL=AGENT."),
         (["--task", SWIM, "--seeds", "0"], "--seeds must be"),
         (["--task", SWIM, "--sets", "nominal"], "leave out --sets"),
+        (["--task", "SeastarStation-v0", "--agents", "rest", "--seeds", "1", "--decisions", "2"], "count after 30 s"),
     ],
 )
 def test_what_cannot_be_measured_is_said_in_a_sentence(arguments, words, capsys):
