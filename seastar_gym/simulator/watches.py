@@ -108,8 +108,8 @@ def may_gather(scheme: Scheme) -> bool:
 class EnergyGrowth(Watch):
     """Growth of the kinetic energy of a batch of robots.
 
-    It warns of a scheme that may gather energy. Otherwise growth is of commands: a robot that held one of them in its
-    first strokes, and then swims, has 25.
+    It warns of a scheme that may gather energy. Otherwise growth is of commands, such as one that was held in the first
+    strokes.
 
     period: Of the actuator [s]. Energies are taken once in a period while any robot swims its first strokes.
     """
