@@ -1,12 +1,11 @@
-"""Speed: throughput of strokes and environments, cold start, and what ten fixed things took before.
+"""Speed: throughput of strokes and environments, cold start, and eleven things beside another checkout.
 
-    python -m studies.benchmark                          # ten fixed things, a row of the history
-    python -m studies.benchmark --also throughput start  # with the numbers of docs/speed.md
+    git worktree add ../before 055100c4
+    python -m studies.benchmark --beside ../before  # a row of the history: eleven things here and there
+    python -m studies.benchmark                     # the numbers of docs/speed.md
 
-A run adds a row with its date to `speed_history.json`. The fixed things are processor times, as multiples of that of
-one fixed loop, which is timed just before and just after: runs on machines of one kind, as busy as they please, can be
-compared; another processor has other ratios. Caches and memory are shared with other work of a machine, however, so
-what differs by less than 20 % is the same. Other numbers are medians, with the range of the middle half.
+A run adds a row with its date to `speed_history.json`. Both checkouts take turns, and the least processor time of each
+counts: what else a machine does slows either. Other numbers are medians, with the range of the middle half.
 """
 
 import gc
@@ -17,7 +16,7 @@ import sys
 import tempfile
 import time
 import tracemalloc
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
@@ -31,23 +30,19 @@ import numpy as np
 from seastar_gym.envs import observation
 from seastar_gym.files import save_figure
 from seastar_gym.gaits import STRAIGHT
-from seastar_gym.lanes.compile import entry_point
 from seastar_gym.lanes.dispatch import code_for
-from seastar_gym.lanes.registers import N_LANES, add_product, borrow, load, store
+from seastar_gym.lanes.registers import N_LANES
 from seastar_gym.rods import interval as stroke
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator, StrokeReport, batch
 from studies.frame import Results, Study, require_known, rounded
-from studies.gpu import EVERYTHING, scenes
 from studies.operations import count_operations, flops
 from studies.pages import markdown
 from studies.provenance import provenance
 from studies.style import INK, subplots
 
 ROOT = Path(__file__).resolve().parents[1]
-UNIT = {"unit": "20 million times 8 fused products of one robot per lane"}
-"""What ratios are multiples of."""
 FIDELITIES: tuple[Fidelity, ...] = ("fast", "balanced", "accurate", "reference")
 NODES_PER_LIMB = (5, 10, 20, 40, 80, 160, 320, 640)
 """Nodes per limb over which the cost is measured."""
@@ -56,7 +51,6 @@ BATCH = 512
 ENVIRONMENTS = {"SeastarSwim-v0": "strokes of 1 s", "SeastarSwimTimedModerate-v0": "decisions of 0.2 s"}
 NEIGHBOURS = {"Swimmer-v5": "0.04 s", "HalfCheetah-v5": "0.05 s"}
 """Environments of MuJoCo, timed where it is installed, and how long a decision is."""
-Clock = Callable[[], float]
 Row = tuple[str, str, float, float, float]
 """What a number is, its unit, its median, and the range of the middle half of its repeats."""
 
@@ -216,13 +210,20 @@ FIRST_SCENES = {
 """Scenes whose first strokes are timed, in Python."""
 
 
-def process_seconds(before: str, timed: str, cache: str) -> float:
-    """Processor time of code in a fresh interpreter [s]. cache: Folder of machine code, the user's own if empty."""
-    code = f"import time; {before}; start = time.process_time(); {timed}; print(time.process_time() - start)"
-    environment = {**os.environ, "NUMBA_CACHE_DIR": cache}
-    words = [sys.executable, "-c", code]
-    done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)
-    return float(done.stdout)
+def run_in(checkout: Path, words: Sequence[str], cache: str) -> str:
+    """What Python prints in a checkout. cache: Folder of machine code, the user's own if empty."""
+    where = {**os.environ, "NUMBA_CACHE_DIR": cache, "PYTHONPATH": str(checkout)}
+    done = subprocess.run([sys.executable, *words], cwd=checkout, env=where, capture_output=True, text=True, check=True)
+    return done.stdout
+
+
+def process_seconds(before: str, timed: str, cache: str, repeats: int = 1, checkout: Path = ROOT) -> float:
+    """Least processor time of code, of some repeats in one fresh interpreter [s]. before: Code that is not timed."""
+    code = f"""import time; found = []; {before}
+for _ in range({repeats}):
+    start = time.process_time(); {timed}; found.append(time.process_time() - start)
+print(min(found))"""
+    return float(run_in(checkout, ["-c", code], cache).split()[-1])
 
 
 def cold_start(seconds: float) -> Iterator[Row]:
@@ -236,92 +237,73 @@ def cold_start(seconds: float) -> Iterator[Row]:
         yield row(f"first stroke of a process, {name}, warm cache", "s", later)
 
 
-# Ten fixed things
+# History
 
 
-@entry_point
-def fused_products(values, n):  # type: ignore[no-untyped-def]
-    """Compute n fused products in each of eight independent chains; values: Start and factors, shape (18, N_LANES)."""
-    rows = borrow(values)
-    c, d = load(rows, 16), load(rows, 17)
-    x0, x1, x2, x3 = load(rows, 0), load(rows, 1), load(rows, 2), load(rows, 3)
-    x4, x5, x6, x7 = load(rows, 4), load(rows, 5), load(rows, 6), load(rows, 7)
-    for _ in range(n):
-        x0, x1, x2, x3 = add_product(c, x0, d), add_product(c, x1, d), add_product(c, x2, d), add_product(c, x3, d)
-        x4, x5, x6, x7 = add_product(c, x4, d), add_product(c, x5, d), add_product(c, x6, d), add_product(c, x7, d)
-    store(rows, 0, x0 + x1 + x2 + x3 + x4 + x5 + x6 + x7)
+SWIM_OF = "swim = s.Simulator({0}, {1}, threads=1).stroke; commands = [[0.0, 1.0, 0.0, 0.0, -1.0]] * {1}"
+STEP_OF = (
+    "import gymnasium as gym; env = gym.make('{}', fidelity='fast', max_episode_steps=10**9, path=[[10.0, 0.0], "
+    "[10.0, 10.0]]); env.reset(seed=0); env.action_space.seed(0)"
+)
+TRAINING = "train.py --strokes 4096 --no-video --num-threads 1 --out {}"
+ROUNDS = 5
+"""Times that two checkouts take turns."""
+SWIMS: dict[str, tuple[Fidelity, int, int]] = {
+    "one robot, fast": ("fast", 1, 100),
+    "9 robots, fast": ("fast", 9, 30),
+    **{f"{BATCH} robots, {name}": (name, BATCH, n) for name, n in zip(FIDELITIES, (4, 3, 1, 1), strict=True)},
+}
+"""Strokes that are timed in two checkouts: fidelity, robots, and how many after a first one."""
 
 
-def unit() -> float:
-    """Processor time of the fixed loop [s]."""
-    chains = np.full((18, N_LANES), 0.5)
-    start = time.process_time()
-    fused_products(chains, 20_000_000)
-    return time.process_time() - start
+def things() -> dict[str, tuple[int, str, str]]:
+    """What is timed in two checkouts: how often after a first time, or 0 for the first time, before it, and what."""
+    strokes = {
+        name: (repeats, SWIM_OF.format(f"s.Scene.preset('{fidelity}')", n_robots), "swim(commands)")
+        for name, (fidelity, n_robots, repeats) in SWIMS.items()
+    }
+    steps = {
+        f"one environment, {what}": (200, STEP_OF.format(id), "env.step(env.action_space.sample())")
+        for id, what in ENVIRONMENTS.items()
+    }
+    return {"import": (0, "pass", "import seastar_gym"), **strokes, **steps}
 
 
-def stroke_of(scene: Scene, n_robots: int) -> Clock:
-    """Clock of a stroke of the straight swim on one core; one stroke has gone before."""
-    swim = straight(scene, n_robots)
-    swim()
-
-    def seconds() -> float:
-        start = time.process_time()
-        swim()
-        return time.process_time() - start
-
-    return seconds
-
-
-def training() -> float:
-    """Processor time of a training of 4,096 strokes with its comparison [s]."""
+def training(checkout: Path, cache: str) -> float:
+    """Processor time of a training of 4,096 strokes with its comparison in a checkout [s]."""
     with tempfile.TemporaryDirectory() as folder:
-        words = ["--strokes", "4096", "--no-video", "--num-threads", "1", "--out", str(Path(folder, "run"))]
         before = os.times()
-        subprocess.run([sys.executable, "train.py", *words], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+        run_in(checkout, TRAINING.format(Path(folder, "run")).split(), cache)
         after = os.times()
     return after.children_user + after.children_system - before.children_user - before.children_system
 
 
-def first_stroke() -> float:
-    """Processor time of the first stroke ever, with import and compilation [s]."""
-    scene = "s.Scene(s.Seastar(nodes_per_limb=10), numerics=s.Numerics())"
-    with tempfile.TemporaryDirectory() as cache:
-        return process_seconds("pass", f"import seastar_gym as s; {SWIM.format(scene)}", cache)
+def first_stroke(checkout: Path, cache: str) -> float:
+    """Processor time of the first stroke ever in a checkout, with import and compilation [s]."""
+    swim = SWIM.format("s.Scene(s.Seastar(nodes_per_limb=10), numerics=s.Numerics())")
+    with tempfile.TemporaryDirectory() as empty:
+        return process_seconds("pass", f"import seastar_gym as s; {swim}", empty, checkout=checkout)
 
 
-def things() -> dict[str, tuple[int, Callable[[], Clock]]]:
-    """What is timed, by name: how often, and how a clock of it is made."""
-    cache = os.environ.get("NUMBA_CACHE_DIR", "")
-    return {
-        "first stroke ever": (1, lambda: first_stroke),
-        "import": (5, lambda: lambda: process_seconds("pass", "import seastar_gym", cache)),
-        "one robot, fast": (9, lambda: stroke_of(Scene.preset("fast"), 1)),
-        **{f"512 robots, {name}": (5, partial(stroke_of, Scene.preset(name), BATCH)) for name in FIDELITIES},
-        "all terms, 64 robots": (5, lambda: stroke_of(scenes()[EVERYTHING], 64)),
-        "step of one environment, 0.2 s": (
-            9, lambda: lambda: sum(step_of(environment("SeastarSwimTimedModerate-v0"), 100)),
-        ),
-        "training of 4,096 strokes": (1, lambda: training),
-    }  # fmt: skip
+def of_thing(repeats: int, before: str, timed: str) -> Callable[[Path, str], float]:
+    """Least processor time of one of `things` in a checkout [s]."""
+    setup = f"import seastar_gym as s; {before}; {timed}" if repeats else before
+    return lambda checkout, cache: process_seconds(setup, timed, cache, max(1, repeats), checkout)
 
 
-def ratio(clock: Clock, rounds: int) -> float:
-    """Median of a clock over the fixed loop just before and after it."""
-    found = []
-    for _ in range(rounds):
-        before, seconds, after = unit(), clock(), unit()
-        found.append(2.0 * seconds / (before + after))
-    return rounded(statistics.median(found), 3)
-
-
-def history() -> dict[str, float]:
-    """Ratios of all things."""
-    unit()
+def history(beside: Path) -> dict[str, list[float]]:
+    """Least processor times in another checkout and in this one [s], by what is timed."""
+    clocks = {
+        "first stroke ever": first_stroke,
+        **{name: of_thing(*how) for name, how in things().items()},
+        "training of 4,096 strokes": training,
+    }
     found = {}
-    for name, (rounds, clock) in things().items():
-        found[name] = ratio(clock(), rounds)
-        print(f"{name}: {found[name]:,.3g}", flush=True)
+    with tempfile.TemporaryDirectory() as other, tempfile.TemporaryDirectory() as own:
+        for name, clock in clocks.items():
+            turns = [(clock(beside, other), clock(ROOT, own)) for _ in range(1 if name.startswith("first") else ROUNDS)]
+            found[name] = [rounded(min(times)) for times in zip(*turns, strict=True)]
+            print(f"{name}: {found[name][0]:,.3g} and {found[name][1]:,.3g} s", flush=True)
     return found
 
 
@@ -335,23 +317,34 @@ PARTS: dict[str, Callable[[float], Iterator[Row]]] = {"throughput": throughput, 
 class Options:
     """Speed of the simulator on this machine."""
 
-    also: tuple[str, ...] = ()
-    """"throughput" and "start", the numbers of the page beside the history."""
+    beside: Path | None = None
+    """Another checkout, beside which eleven things are timed, instead of the numbers of the page."""
+    parts: tuple[str, ...] = tuple(PARTS)
+    """Which numbers of the page are measured."""
     seconds: float = 1.0
     """For which a number of the throughput is measured, about."""
 
     def __post_init__(self) -> None:
-        require_known("part", self.also, PARTS)
+        require_known("part", self.parts, PARTS)
+        if self.beside is not None and not (self.beside / "train.py").is_file():
+            raise ValueError(f"{self.beside} is no checkout of the project: it has no train.py.")
+
+
+def commit_of(checkout: Path) -> str:
+    """Short name of the commit in a folder; empty outside a checkout."""
+    words = ["git", "rev-parse", "--short=8", "HEAD"]
+    return subprocess.run(words, cwd=checkout, capture_output=True, text=True, check=False).stdout.strip()
 
 
 def run(options: Options, results: Results) -> None:
-    """Time everything, and add a row."""
+    """Time what is asked for, and add a row."""
     found: dict[str, Any] = {name: value for name, value in provenance("").items() if name != "command"}
-    words = ["git", "rev-parse", "--short", "HEAD"]  # says nothing outside a checkout
-    found["commit"] = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
-    found["ratios"] = history()
-    rows = [each for part in options.also for each in PARTS[part](options.seconds)]
-    found["figures"] = {what: [unit, *(rounded(each) for each in numbers)] for what, unit, *numbers in rows}
+    found["commit"] = commit_of(ROOT)
+    if options.beside is not None:
+        found["beside"], found["seconds"] = commit_of(options.beside), history(options.beside.resolve())
+    else:
+        rows = [each for part in options.parts for each in PARTS[part](options.seconds)]
+        found["figures"] = {what: [unit, *(rounded(each) for each in numbers)] for what, unit, *numbers in rows}
     results.read()
     results.update(results.about)
     results.row(["runs"])[time.strftime("%Y-%m-%d %H:%M")] = found
@@ -360,7 +353,7 @@ def run(options: Options, results: Results) -> None:
 
 def figures(results: Mapping[str, Any]) -> str:
     """Table in Markdown of throughput and start in the last run."""
-    last = list(results["runs"].values())[-1].get("figures", {})
+    last = ([{}] + [run["figures"] for run in results["runs"].values() if "figures" in run])[-1]
     rows = [
         (what, f"{middle:,.4g}", unit, f"{low:,.3g} to {high:,.3g}") for what, (unit, middle, low, high) in last.items()
     ]
@@ -368,22 +361,24 @@ def figures(results: Mapping[str, Any]) -> str:
 
 
 def draw(results: Mapping[str, Any], path: Path) -> None:
-    """Draw every thing as a bar: its time in the last run over that in the first."""
-    runs = list(results["runs"].items())
-    (first, before), (last, now) = runs[0], runs[-1]
-    ratios = {name: now["ratios"][name] / value for name, value in before["ratios"].items() if name in now["ratios"]}
+    """Draw every thing as a bar: its time in the last row of the history over that in the other checkout."""
+    paired = [(date, one) for date, one in results["runs"].items() if "beside" in one]
+    if not paired:
+        return
+    date, last = paired[-1]
+    ratios = {name: here / there for name, (there, here) in last["seconds"].items()}
     figure, axes = subplots(1, 1, figsize=(7.2, 3.8))
     bars = axes.barh(list(ratios), list(ratios.values()), height=0.6)
     axes.bar_label(bars, fmt="%.2f", label_type="center", color="white", fontsize="small")
     axes.axvline(1.0, color=INK, lw=1.0)
     axes.grid(False, axis="y")
     axes.invert_yaxis()
-    ends = (f"commit {run['commit']} of {date.split()[0]}" for date, run in ((last, now), (first, before)))
-    axes.set(xlabel=" over ".join(ends), title="processor time, over that of the first run")
+    title = f"processor time of commit {last['commit']} over that of {last['beside']}"
+    axes.set(xlabel=f"ratio, {date.split()[0]}", title=title)
     save_figure(figure, path)
 
 
 STUDY = Study(
-    "benchmark", run, Options, "speed/speed_history.json", settings=lambda _: UNIT,
-    pictures={"speed_history.png": draw}, tables={"speed figures": figures},
+    "benchmark", run, Options, "speed/speed_history.json", pictures={"speed_history.png": draw},
+    tables={"speed figures": figures},
 )  # fmt: skip

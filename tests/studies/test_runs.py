@@ -19,9 +19,12 @@ from studies.pages import numbers
 
 CURVES = fit.read_curves()
 SHORTEST = {
-    "benchmark --also throughput --seconds 0": ({"speed_history.json", "speed_history.png"}, {
-        "studies.benchmark": {"things": lambda: {"a": (1, lambda: lambda: 2.0)}, "unit": lambda: 0.5,
-                              "NODES_PER_LIMB": (5, 10), "BATCH": 8},
+    "benchmark --parts throughput --seconds 0": ({"speed_history.json"}, {
+        "studies.benchmark": {"NODES_PER_LIMB": (5, 10), "BATCH": 8},
+    }),
+    "benchmark --beside .": ({"speed_history.json", "speed_history.png"}, {
+        "studies.benchmark": {"SWIMS": {"one robot": ("fast", 1, 1)}, "ENVIRONMENTS": {}, "ROUNDS": 1,
+                              "first_stroke": lambda checkout, cache: 2.0, "training": lambda checkout, cache: 1.0},
     }),
     "extremes": ({"extremes.json"}, {
         "studies.extremes": {"PRESETS": {"rapid": extremes.PRESETS["rapid"]}, "STROKES": 1},
