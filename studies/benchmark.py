@@ -246,7 +246,7 @@ STEP_OF = (
     "[10.0, 10.0]]); env.reset(seed=0); env.action_space.seed(0)"
 )
 TRAINING = "train.py --strokes 4096 --no-video --num-threads 1 --out {}"
-ROUNDS = 5
+ROUNDS = 3
 """Times that two checkouts take turns."""
 SWIMS: dict[str, tuple[Fidelity, int, int]] = {
     "one robot, fast": ("fast", 1, 100),
