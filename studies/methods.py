@@ -144,13 +144,39 @@ def ids_table(found: Any) -> str:
     return markdown(["id", "asks for", "measure", "greedy", "oracle", "price of time [1/s]"], lines, (0, 1, 2))
 
 
+def trained(found: Any, first: int = 0) -> list[Cell]:
+    """Cells of learners. first: Number of the first of their test episodes."""
+    return [cell for cell in cells_of(found) if cell.decisions is not None and cell.first == first]
+
+
 def rows_table(found: Any) -> str:
     """Tables of the rows that are trained."""
-    cells = cells_of(found)
+    cells = trained(found)
     if not cells:
         return "No row is trained yet."
     picture = "![Scores against decisions and time](results/benchmark/curves.png)"
     return f"{benchmark.tables(cells, benchmark.as_markdown)}\n{picture}"
+
+
+def rules_table(found: Any) -> str:
+    """Table of the oracle, and of rules, which learn nothing."""
+    rules = [cell for cell in cells_of(found) if cell.decisions is None]
+    return benchmark.as_markdown(*benchmark.table_of(benchmark.rows_of([*benchmark.read([REFERENCES]), *rules])))
+
+
+def check_table(found: Any) -> str:
+    """Means of the check episodes, in bold where they are outside the interval of the test episodes."""
+    before = {(row.agent, row.track): row for row in benchmark.rows_of(trained(found))}
+    lines = []
+    for row in benchmark.rows_of(trained(found, benchmark.FIRST["check"])):
+        shown = []
+        for id in ENTRIES:
+            mean, of_test = row.measure(id).mean, before[row.agent, row.track].measure(id)
+            shown.append(f"{mean:.3g}" if of_test.low <= mean <= of_test.high else f"**{mean:.3g}**")
+        lines.append([row.agent, row.track, *shown])
+    return markdown(
+        ["agent", "track", *(id.removeprefix("Seastar").removesuffix("-v0") for id in ENTRIES)], lines, (0, 1)
+    )
 
 
 def draw_curves(found: Any, file: Path) -> None:
@@ -160,7 +186,7 @@ def draw_curves(found: Any, file: Path) -> None:
     from seastar_gym.files import save_figure
 
     figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.5), sharey=True, layout="constrained")
-    for row in (row for *_, rows in benchmark.groups(cells_of(found)) for row in rows):
+    for row in (row for *_, rows in benchmark.groups(trained(found)) for row in rows):
         curves = [(id, cell.curve) for id, own in row.cells.items() for cell in own if id in benchmark.scales()]
         if not curves:
             continue
@@ -184,5 +210,9 @@ def draw_curves(found: Any, file: Path) -> None:
 
 STUDY = Study(
     "methods", run, Options, "benchmark/benchmark.json",
-    pictures={"curves.png": draw_curves}, tables={"benchmark ids": ids_table, "benchmark rows": rows_table},
+    pictures={"curves.png": draw_curves},
+    tables={
+        "benchmark ids": ids_table, "benchmark rows": rows_table, "benchmark rules": rules_table,
+        "benchmark check": check_table,
+    },
 )  # fmt: skip
