@@ -20,12 +20,12 @@ from seastar_gym.evaluation import benchmark
 from seastar_gym.evaluation.benchmark import ENTRIES, EPISODES, GREEDY, ORACLE, REFERENCES, Cell, contract
 from seastar_gym.evaluation.rollout import measure_of_task
 from studies.frame import Results, Study, rounded
-from studies.oracle import Oracle
+from studies.oracle import oracle_of
 from studies.pages import markdown, show
 from studies.provenance import provenance
 from studies.tasks import greedy
 
-AGENTS = {GREEDY: greedy, ORACLE: Oracle}
+AGENTS = {GREEDY: greedy, ORACLE: oracle_of}
 
 
 @dataclass(frozen=True)

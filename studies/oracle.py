@@ -1,25 +1,35 @@
-"""Oracle of the benchmark: it is told what is hidden, and simulates the very robots ahead before every decision.
+"""Oracles of the benchmark: the best controllers that were found, which is no proof that nothing is better.
 
-It is the best controller that was found, which is no proof that nothing is better.
+`Oracle` is told what is hidden, and simulates the very robots ahead before every decision. `Sighted` is for robots that
+are seen by a camera, late: a policy that learned with full sight of such robots, and has it.
 """
 
 import itertools
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from stable_baselines3 import PPO
 
+from agents.ppo import policy_of
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.controllers.learned import LearnedPolicy, load, save
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.randomization import drawn_scene
 from seastar_gym.envs.rewards import RewardWeights
 from seastar_gym.envs.robots import Robots
-from seastar_gym.envs.tasks.hidden import FailBlind
+from seastar_gym.envs.symmetry import VectorSymmetryReduction
+from seastar_gym.envs.tasks.hidden import FailBlind, SimToReal
 from seastar_gym.envs.tasks.prey import Courses, Prey, Pursuit
 from seastar_gym.envs.tasks.prizes import Prizes, best_round, distances
 from seastar_gym.envs.tasks.station import Station
+from seastar_gym.evaluation import benchmark
 from seastar_gym.simulator import Simulator, State
 from studies.frame import Floats
 
@@ -101,6 +111,48 @@ class Oracle:
             made.set_limb_strengths(np.repeat(robots.simulator.limb_strengths, copies, axis=0))
             self._simulators[copies] = made
         return self._simulators[copies]
+
+
+SIGHTED = Path("runs/oracle")
+"""Folder of policies with full sight."""
+DECISIONS = 800_000
+"""Length of their trainings, by PPO as shipped with symmetry reduction."""
+
+
+class Sighted:
+    """Policy of the robots of a batch that are seen by a camera, which sees their true state."""
+
+    batched = True
+
+    def __init__(self, batch: Any):
+        self._batch = batch.unwrapped
+        self._policy = learned_with_sight()
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> Any:
+        """Actions of all robots, and None."""
+        return self._policy.predict(self._batch.privileged_observations(), deterministic=True)[0], None
+
+
+def learned_with_sight(id: str = "SeastarSwimSimToReal-v0") -> LearnedPolicy:
+    """Policy of seed 0 that learned the task of an id without its camera; it is trained where its file is missing."""
+    file = SIGHTED / f"{id}.safetensors"
+    if not file.is_file():
+        torch.set_num_threads(1)
+        task: Any = benchmark.task_of(id)
+        batch = benchmark.make(id, 128, threads=1, autoreset_mode="SameStep", task=replace(task, sight=None))
+        env = BatchVecEnv(VectorSymmetryReduction(batch))
+        model = PPO("MlpPolicy", env, n_steps=32, seed=0, device="cpu", policy_kwargs={"net_arch": [64, 64]})
+        model.learn(DECISIONS)
+        save(policy_of(model), file, strokes=DECISIONS, seed=0)
+        env.close()
+    return load(file)
+
+
+def oracle_of(batch: Any) -> Oracle | Sighted:
+    """Oracle of the task of a batch."""
+    return Sighted(batch) if isinstance(batch.unwrapped.task, SimToReal) else Oracle(batch)
 
 
 def search_of(robots: Robots) -> Search:

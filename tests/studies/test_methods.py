@@ -4,6 +4,7 @@ import numpy as np
 
 from seastar_gym.evaluation import benchmark
 from seastar_gym.evaluation.benchmark import Cell
+from studies import oracle
 from studies.command import main
 from studies.methods import AGENTS, ids_table, rows_table
 
@@ -37,3 +38,17 @@ def test_an_oracle_keeps_a_station_better_than_the_greedy_rule():
         ends[agent] = info["distance"]
         batch.close()
     assert np.mean(ends["oracle"]) < 0.6 * np.mean(ends["greedy"])
+
+
+def test_an_oracle_of_robots_seen_by_a_camera_learns_with_full_sight_once(tmp_path, monkeypatch):
+    monkeypatch.setattr(oracle, "SIGHTED", tmp_path)
+    monkeypatch.setattr(oracle, "DECISIONS", 1)  # one rollout
+    for _ in range(2):
+        batch = benchmark.make("SeastarSwimSimToReal-v0", 2, "test", 1)
+        policy = AGENTS["oracle"](batch)
+        observations, _ = batch.reset(options={"instance": [0, 1]})
+        actions, _ = policy.predict(np.full_like(observations, np.nan))  # it does not look at pictures
+        batch.step(actions)
+        batch.close()
+        monkeypatch.setattr(oracle, "PPO", None)  # a second training would fail
+    assert len(list(tmp_path.glob("*.safetensors"))) == 1
