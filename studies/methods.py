@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from agents.methods import METHODS
 from agents.tasks import file_of
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import load
@@ -114,7 +115,9 @@ def run(options: Options, results: Results) -> str | None:
             )
         )
         return None
+    places = list(METHODS)
     cells = benchmark.read(sorted(options.cells.glob("*/*/*.json")))
+    cells.sort(key=lambda cell: places.index(cell.agent) if cell.agent in places else len(places))
     if not cells:
         return f"There are no cells in {options.cells}: python -m agents.tasks --benchmark trains them."
     results["cells"] = [
