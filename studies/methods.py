@@ -172,11 +172,11 @@ def check_table(found: Any) -> str:
     before = {(row.agent, row.track): row for row in benchmark.rows_of(trained(found))}
     lines = []
     for row in benchmark.rows_of(trained(found, benchmark.FIRST["check"])):
-        shown = []
-        for id in ENTRIES:
+        shown = dict.fromkeys(ENTRIES, "–")
+        for id in row.cells:
             mean, of_test = row.measure(id).mean, before[row.agent, row.track].measure(id)
-            shown.append(f"{mean:.3g}" if of_test.low <= mean <= of_test.high else f"**{mean:.3g}**")
-        lines.append([row.agent, row.track, *shown])
+            shown[id] = f"{mean:.3g}" if of_test.low <= mean <= of_test.high else f"**{mean:.3g}**"
+        lines.append([row.agent, row.track, *shown.values()])
     return markdown(
         ["agent", "track", *(id.removeprefix("Seastar").removesuffix("-v0") for id in ENTRIES)], lines, (0, 1)
     )
