@@ -188,7 +188,7 @@ def draw_curves(found: Any, file: Path) -> None:
 
     from seastar_gym.files import save_figure
 
-    figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.5), sharey=True, layout="constrained")
+    figure, axes = plt.subplots(1, 2, figsize=(9.0, 4.2), sharey=True, layout="constrained")
     for row in (row for *_, rows in benchmark.groups(trained(found)) for row in rows):
         curves = [(id, cell.curve) for id, own in row.cells.items() for cell in own if id in benchmark.scales()]
         if not curves:
@@ -206,7 +206,7 @@ def draw_curves(found: Any, file: Path) -> None:
     axes[0].set(xlabel="decisions [1000]", ylabel="mean score over ids and seeds")
     axes[0].set_ylim(bottom=-1.0)  # learners that rest score below
     axes[1].set(xlabel="processor time of a training [s]")
-    axes[0].legend(fontsize="small")
+    figure.legend(*axes[0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=3)
     save_figure(figure, file)
     plt.close(figure)
 

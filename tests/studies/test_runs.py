@@ -23,7 +23,7 @@ SHORTEST = {
         "studies.benchmark": {"NODES_PER_LIMB": (5, 10), "BATCH": 8},
     }),
     "benchmark --beside .": ({"speed_history.json", "speed_history.png"}, {
-        "studies.benchmark": {"SWIMS": {"one robot": ("fast", 1, 1)}, "ENVIRONMENTS": {}, "ROUNDS": 1,
+        "studies.benchmark": {"SWIMS": {"one robot": ("fast", 1, 1)}, "ENVIRONMENTS": {}, "ROUNDS": 1, "MANY": 1,
                               "first_stroke": lambda checkout, cache: 2.0, "training": lambda checkout, cache: 1.0},
     }),
     "extremes": ({"extremes.json"}, {
