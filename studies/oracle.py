@@ -136,8 +136,8 @@ class Sighted:
 
 
 def learned_with_sight(id: str = "SeastarSwimSimToReal-v0") -> LearnedPolicy:
-    """Policy of seed 0 that learned the task of an id without its camera; it is trained where its file is missing."""
-    file = SIGHTED / f"{id}.safetensors"
+    """Policy of seed 0 that learned the task of an id without its camera; trained where its contract has no file."""
+    file = SIGHTED / f"{id}-{benchmark.contract(id)}.safetensors"
     if not file.is_file():
         torch.set_num_threads(1)
         task: Any = benchmark.task_of(id)
