@@ -11,11 +11,12 @@ import os
 import time
 from collections.abc import Callable
 from concurrent.futures import as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 from sb3_contrib import RecurrentPPO
 from stable_baselines3 import DQN, PPO, SAC
@@ -26,6 +27,7 @@ from agents.distillation import PAST
 from agents.ppo import hyperparameters, make_model
 from seastar_gym import TASKS
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.envs.instances import Split
 from seastar_gym.envs.symmetry import VectorFrameStack, VectorSymmetryReduction
 from seastar_gym.evaluation.benchmark import (
     BUDGETS,
@@ -50,47 +52,93 @@ from seastar_gym.scene.checks import require_count, require_seed
 from seastar_gym.sweep.executors import Processes
 
 
-class Method(NamedTuple):
-    """A learner. build: Makes it of environment, id and seed. robots: That learn side by side. continuous: Commands."""
+class Draw(NamedTuple):
+    """Numbers that are tuned, the same four of every method.
 
-    build: Callable[[BatchVecEnv, str, int], Any]
+    learning_rate: At the beginning. discount: From one decision to the next. uses: Gradients that a decision enters.
+    exploration: From 0 to 1, as a share: of an entropy bonus of 0.02 with PPO, of half the training for the time in
+    which DQN acts more and more by its values, and with SAC of the way from -2 to -0.5 for the target entropy of each
+    number of an action.
+    """
+
+    learning_rate: float
+    discount: float
+    uses: int
+    exploration: float
+
+
+Build = Callable[[BatchVecEnv, str, int, Draw | None], Any]
+
+
+class Method(NamedTuple):
+    """A learner. build: Makes it of environment, id, seed and what was drawn; None stands for the numbers of the rows.
+
+    robots: That learn side by side. continuous: Whether it gives commands. stacked: Whether it sees a frame stack.
+    """
+
+    build: Build
     robots: int = 64
     continuous: bool = False
     tracks: tuple[Track, ...] = TRACKS
     stacked: bool = False
 
 
-def _ours(env: BatchVecEnv, id: str, seed: int) -> Any:
+def _ours(env: BatchVecEnv, id: str, seed: int, draw: Draw | None) -> Any:
     batch: Any = env.env.unwrapped
-    return make_model(env, hyperparameters(str(TASKS[id].task), float(batch.decision_period)), seed)
+    how = hyperparameters(str(TASKS[id].task), float(batch.decision_period))
+    if draw is not None:
+        rate, discount, uses, exploration = draw
+        discount **= 1.0 / float(batch.decision_period)
+        how = replace(how, learning_rate=rate, discount=discount, epochs=uses, entropy=0.02 * exploration)
+    return make_model(env, how, seed)
 
 
-def _off_policy(kind: Any, ratio: float, **how: Any) -> Callable[[BatchVecEnv, str, int], Any]:
-    """Learner with a replay buffer. ratio: Gradient steps per decision."""
+def _on_policy(kind: Any, policy: str, **how: Any) -> Build:
+    """Learner by rollouts of 32 decisions."""
 
-    def build(env: BatchVecEnv, id: str, seed: int) -> Any:
-        steps = max(1, round(ratio * env.num_envs))
+    def build(env: BatchVecEnv, id: str, seed: int, draw: Draw | None) -> Any:
+        own: dict[str, Any] = {}
+        if draw is not None:
+            rate, discount, uses, exploration = draw
+            own = {"learning_rate": rate, "gamma": discount, "n_epochs": uses, "ent_coef": 0.02 * exploration}
+        return kind(policy, env, n_steps=32, seed=seed, device="cpu", **{**how, **own})
+
+    return build
+
+
+def _off_policy(kind: Any, batch_size: int, uses: int, **how: Any) -> Build:
+    """Learner with a replay buffer."""
+
+    def build(env: BatchVecEnv, id: str, seed: int, draw: Draw | None) -> Any:
+        own: dict[str, Any] = {}
+        if draw is not None:
+            own = {"learning_rate": draw.learning_rate, "gamma": draw.discount}
+            if kind is DQN:
+                own["exploration_fraction"] = 0.5 * draw.exploration
+            else:
+                own["target_entropy"] = (1.5 * draw.exploration - 2.0) * np.prod(env.action_space.shape or 1)
+        steps = max(1, round((draw.uses if draw else uses) * env.num_envs / batch_size))
         return kind(
             "MlpPolicy", env, seed=seed, device="cpu", buffer_size=200_000, learning_starts=2_000, train_freq=1,
-            gradient_steps=steps, **how,
+            batch_size=batch_size, gradient_steps=steps, **{**how, **own},
         )  # fmt: skip
 
     return build
 
 
 METHODS: dict[str, Method] = {
-    "PPO": Method(lambda env, id, seed: PPO("MlpPolicy", env, n_steps=32, seed=seed, device="cpu")),
+    "PPO": Method(_on_policy(PPO, "MlpPolicy")),
     "PPO, ours": Method(_ours, 128),
     "PPO, ours, frame stack": Method(_ours, 128, tracks=("symmetric",), stacked=True),
     "RecurrentPPO": Method(
-        lambda env, id, seed: RecurrentPPO(
-            "MlpLstmPolicy", env, n_steps=32, batch_size=1024, n_epochs=6, learning_rate=1e-3, gae_lambda=0.9,
-            seed=seed, device="cpu", policy_kwargs={"net_arch": [128, 128], "lstm_hidden_size": 64},
+        _on_policy(
+            RecurrentPPO, "MlpLstmPolicy", batch_size=1024, n_epochs=6, learning_rate=1e-3, gae_lambda=0.9,
+            policy_kwargs={"net_arch": [128, 128], "lstm_hidden_size": 64},
         ),
         128, tracks=("plain",),
     ),
-    "DQN": Method(_off_policy(DQN, 1 / 8, learning_rate=4e-4, exploration_fraction=0.2, target_update_interval=2_000)),
-    "SAC": Method(_off_policy(SAC, 1 / 16), continuous=True),
+    "DQN": Method(_off_policy(DQN, 32, 4, learning_rate=4e-4, exploration_fraction=0.2, target_update_interval=2_000)),
+    "SAC": Method(_off_policy(SAC, 256, 16), continuous=True),
 }  # fmt: skip
 """PPO and SAC as shipped by Stable-Baselines3 but for rollouts of 2,048 decisions and the ratio of gradient steps; ours
 with the hyperparameters of `agents.tasks`; an LSTM of 64, in one track: frames that turn from one decision to the next
@@ -165,15 +213,19 @@ def file_of_cell(folder: Path, method: str, track: Track, id: str, seed: int, de
     return folder / str(decisions) / f"{name}-{track}" / f"{id}-{seed}.json"
 
 
-def batch_of(method: Method, track: Track, id: str, n: int, train: bool) -> Batch:
-    """Batch that a method sees."""
-    more: dict[str, Any] = {"actions": "continuous"} if method.continuous else {}
-    if train:
-        more["autoreset_mode"] = "SameStep"
-    batch = make(id, n, "train" if train else "test", 1, **more)
+def batch_of(method: Method, track: Track, id: str, n: int, split: Split, **more: Any) -> Batch:
+    """Batch that a method sees. more: Of `seastar_gym.evaluation.benchmark.make`."""
+    batch = make(id, n, split, 1, **more, **({"actions": "continuous"} if method.continuous else {}))
     if method.stacked:
         return VectorFrameStack(batch, PAST)
     return VectorSymmetryReduction(batch) if track == "symmetric" else batch
+
+
+def new_model(name: str, track: Track, id: str, seed: int, draw: Draw | None = None) -> Any:
+    """A method that has learned nothing yet, on the split "train"."""
+    method = METHODS[name]
+    batch = batch_of(method, track, id, method.robots, "train", autoreset_mode="SameStep")
+    return method.build(BatchVecEnv(batch), id, seed, draw)
 
 
 class Curve(BaseCallback):
@@ -210,10 +262,10 @@ def train_cell(method: str, track: Track, id: str, seed: int, decisions: int, fi
     """Train a cell and write its files; returns a line that says so."""
     torch.set_num_threads(1)
     learner = METHODS[method]
-    model = learner.build(BatchVecEnv(batch_of(learner, track, id, learner.robots, True)), id, seed)
+    model = new_model(method, track, id, seed)
 
     def swim(model: Any) -> dict[str, Any]:
-        return swum_by(batch_of(learner, track, id, EPISODES, False), model)
+        return swum_by(batch_of(learner, track, id, EPISODES, "test"), model)
 
     curve = Curve([mark for mark in CURVE if mark < decisions], swim)
     model.learn(decisions, callback=curve)
