@@ -32,7 +32,7 @@ class Options:
 
     methods: tuple[str, ...] = tuple(METHODS)
     """Methods, each in its first track."""
-    decisions: int = 50_000
+    decisions: int = 30_000
     """Length of every training [decisions]."""
 
     def __post_init__(self) -> None:
