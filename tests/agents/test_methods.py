@@ -37,6 +37,21 @@ def test_a_method_trains_a_cell(name, tmp_path, monkeypatch):
     assert track_of(policy) == track and swam["measure"] == cell.measure
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_method_takes_the_four_numbers_that_are_tuned(name):
+    draw = methods.Draw(2e-3, 0.95, 4, 0.5)
+    model = methods.new_model(name, methods.METHODS[name].tracks[0], ID, 0, draw)
+    on_policy = hasattr(model, "n_epochs")
+    assert model.lr_schedule(1.0) == 2e-3 and model.gamma == pytest.approx(0.95)
+    assert (model.n_epochs if on_policy else model.gradient_steps * model.batch_size / model.n_envs) == 4
+    if on_policy:
+        assert model.ent_coef == 0.01
+    elif name == "DQN":
+        assert model.exploration_fraction == 0.25
+    else:
+        assert model.target_entropy == -1.25 * 5
+
+
 def test_what_is_no_method_or_id_is_refused():
     for unknown in ("A2C", "dqn"):
         with assert_refused(f"There is no method '{unknown}': choose of PPO; PPO, ours; "):
