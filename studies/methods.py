@@ -1,6 +1,6 @@
 """Methods on the benchmark: the page's tables and pictures, from the cells that `agents.tasks --benchmark` trained.
 
---references swims the greedy rules and the oracle instead, between which scores are measured: an id after the other,
+--references swims the greedy rules, the planner and the oracle instead, between the first and last of which scores are measured: an id after the other,
 those that are missing or of another contract. --agreement correlates returns with measures, by price of time.
 """
 
@@ -21,12 +21,12 @@ from seastar_gym.evaluation import benchmark
 from seastar_gym.evaluation.benchmark import ENTRIES, EPISODES, GREEDY, ORACLE, REFERENCES, Cell, contract
 from seastar_gym.evaluation.rollout import measure_of_task
 from studies.frame import Results, Study, rounded
-from studies.oracle import oracle_of
+from studies.oracle import Planner, oracle_of
 from studies.pages import markdown, show
 from studies.provenance import provenance
 from studies.tasks import greedy
 
-AGENTS = {GREEDY: greedy, ORACLE: oracle_of}
+AGENTS = {GREEDY: greedy, "planner": Planner, ORACLE: oracle_of}
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ def ids_table(found: Any) -> str:
     lines = [
         [
             f"`{id}`", entry.why, f"{measures[id].name} [{measures[id].unit}], {measures[id].better} is better",
-            *(means.get((id, agent), "none") for agent in AGENTS),
+            *(means.get((id, agent), "none") for agent in (GREEDY, ORACLE)),
             "-" if entry.price is None else f"{entry.price:g}",
         ]
         for id, entry in ENTRIES.items()

@@ -1,7 +1,8 @@
 """Oracles of the benchmark: the best controllers that were found, which is no proof that nothing is better.
 
 `Oracle` is told what is hidden, and simulates the very robots ahead before every decision. `Sighted` is for robots that
-are seen by a camera, late: a policy that learned with full sight of such robots, and has it.
+are seen by a camera, late: a policy that learned with full sight of such robots, and has it. `Planner` is a rule, which
+is told the true state and nothing else that is hidden.
 """
 
 import itertools
@@ -73,12 +74,22 @@ class Oracle:
         """Actions of all robots, and None."""
         robots = self.robots
         if self._search is None:
-            self._search = search_of(robots)
-        best = self._best(robots.simulator.get_state(), cost_of(robots), self._search)
-        chosen = self._search.commands[np.arange(robots.n_robots), best]
-        if robots.wiring is not None:
-            chosen = chosen * robots.wiring
+            self._search = self.search()
+        best = self._best(robots.simulator.get_state(), self.cost(), self._search)
+        chosen = self.wired(self._search.commands[np.arange(robots.n_robots), best])
         return np.array([self._numbers[command.tobytes()] for command in chosen + 0.0]), None
+
+    def search(self) -> Search:
+        """What is tried before every decision."""
+        return search_of(self.robots)
+
+    def cost(self) -> Cost:
+        """By which ends of decisions are compared."""
+        return cost_of(self.robots)
+
+    def wired(self, commands: Floats) -> Floats:
+        """Commands whose limbs bend as these say, shape (n, n_limbs)."""
+        return commands if self.robots.wiring is None else commands * self.robots.wiring
 
     def _best(self, states: State, cost: Cost, search: Search) -> NDArray[np.intp]:
         """Number of the first command of the sequence whose costs after all its decisions have the least sum."""
@@ -105,12 +116,41 @@ class Oracle:
     def _simulator(self, copies: int) -> Simulator:
         """Simulator of so many copies of every robot."""
         if copies not in self._simulators:
-            robots = self.robots
-            drawn = {name: np.repeat(values, copies, axis=0) for name, values in robots.drawn.items()}
-            made = Simulator(drawn_scene(robots._drawn_from, drawn), copies * robots.n_robots, 1)
-            made.set_limb_strengths(np.repeat(robots.simulator.limb_strengths, copies, axis=0))
-            self._simulators[copies] = made
+            self._simulators[copies] = self._made(copies)
         return self._simulators[copies]
+
+    def _made(self, copies: int) -> Simulator:
+        robots = self.robots
+        drawn = {name: np.repeat(values, copies, axis=0) for name, values in robots.drawn.items()}
+        made = Simulator(drawn_scene(robots._drawn_from, drawn), copies * robots.n_robots, 1)
+        made.set_limb_strengths(np.repeat(robots.simulator.limb_strengths, copies, axis=0))
+        return made
+
+
+class Planner(Oracle):
+    """Model predictive control, one decision ahead, by the true state of the robots and as if nothing were hidden.
+
+    Robots are as designed, in still water and wired as they should be, and a prey stays where it is.
+    """
+
+    def search(self) -> Search:
+        if isinstance(self.robots.task, FailBlind):
+            pairs = command_table("pairs", self.robots.scene.robot.n_limbs)
+            return Search(np.tile(pairs, (self.robots.n_robots, 1, 1)), coasting=0.5)
+        return search_of(self.robots)._replace(depth=1)
+
+    def cost(self) -> Cost:
+        robots, task = self.robots, self.robots.task
+        if isinstance(task, Prey):
+            prey = task.targets(robots)[:, None, :2]
+            return lambda hubs, _: np.hypot(*np.moveaxis(hubs - prey, -1, 0))
+        return cost_of(robots)
+
+    def wired(self, commands: Floats) -> Floats:
+        return commands
+
+    def _made(self, copies: int) -> Simulator:
+        return Simulator(self.robots.scene, copies * self.robots.n_robots, 1)
 
 
 SIGHTED = Path("runs/oracle")
