@@ -509,12 +509,33 @@ def picture_size(n_pictures: int) -> tuple[int, int]:
     return width, width * 3 // 4
 
 
+class Trail:
+    """Places of a hub [m], in an array that grows: a copy for every frame would cost the square of their number."""
+
+    def __init__(self, *places: FloatArray):
+        self._kept, self._length = np.empty((64, 2)), 0
+        for place in places:
+            self.append(place)
+
+    def append(self, place: FloatArray) -> None:
+        """Add a place. Those that were seen stay."""
+        if self._length == len(self._kept):
+            self._kept = np.concatenate([self._kept, np.empty_like(self._kept)])
+        self._kept[self._length] = place
+        self._length += 1
+
+    @property
+    def places(self) -> FloatArray:
+        """Those up to now, shape (k, 2)."""
+        return self._kept[: self._length]
+
+
 class BatchPictures:
     """Trails and views of all robots, drawn one after the other by one renderer when they are asked for."""
 
     def __init__(self, robots: Robots):
         self._robots = robots
-        self._trails: list[list[NDArray[np.float64]]] = [[] for _ in range(robots.n_robots)]
+        self._trails = [Trail() for _ in range(robots.n_robots)]
         self._cameras: dict[int, Camera] = {}
         self._renderer: Renderer | None = None
         self._shown: int | None = None
@@ -527,7 +548,7 @@ class BatchPictures:
         """Forget the trails and views of the robots in a mask, shape (n_robots,): they begin an episode."""
         hub = self._robots.simulator.hub_position()
         for robot in np.flatnonzero(begun).tolist():
-            self._trails[robot] = [hub[robot]]
+            self._trails[robot] = Trail(hub[robot])
             self._cameras.pop(robot, None)
         self._shown = None
 
@@ -538,8 +559,7 @@ class BatchPictures:
 
     def frames(self, wanted: Iterable[int]) -> list[Frame]:
         """What pictures of the robots of these numbers show now."""
-        trails = {robot: np.array(self._trails[robot]).reshape(-1, 2) for robot in wanted}
-        return list(frames_of(self._robots, trails))
+        return list(frames_of(self._robots, {robot: self._trails[robot].places for robot in wanted}))
 
     def draw(self, wanted: Iterable[int]) -> tuple[Picture, ...]:
         """Pictures of the robots of these numbers, shape (height, width, 3) each."""
