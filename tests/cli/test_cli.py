@@ -1,6 +1,8 @@
 """The command `seastar`: what it shows, writes and refuses, in a sentence each."""
 
+import ast
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -47,23 +49,29 @@ def frames(file):
         return np.stack(found)
 
 
-def test_what_is_compiled_before_is_found_by_another_process(tmp_path, monkeypatch):
-    (tmp_path / "scene.py").write_text("import seastar_gym as s; scene = s.Scene(fluid=None, actuator=s.SmaWires())")
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    command = [sys.executable, "-m", "seastar_gym.cli", "compile", "--scene", str(tmp_path / "scene.py"), "--per-robot"]
-    first = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
-    assert "seastar_gym compiles" in first.stderr
-    assert str(tmp_path / "cache") in first.stdout and first.stdout.startswith("SeastarSwim-v0: ")
-    swim = (
-        "import gymnasium as gym, numpy as np, seastar_gym as s, sys\n"
-        "given = dict(fluid=None, actuator=s.SmaWires())\n"
-        "env = gym.make('SeastarSwim-v0', scene=s.Scene(**given), fidelity='fast', decision_period=0.2)\n"
-        "env.reset(seed=1), env.step(env.action_space.sample())\n"
-        "stiffness = np.array([1e6, 2e6])\n"
-        "s.Simulator(s.Scene(s.Seastar(youngs_modulus=stiffness), **given), 2).stroke(np.zeros((2, 5)))\n"
-    )
-    done = subprocess.run([sys.executable, "-c", swim], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert "compiles" not in done.stderr
+SWIM = """
+given = dict(actuator=seastar_gym.SmaWires())
+swim(gym.make('SeastarSwim-v0', scene=Scene(**given), fidelity='fast', decision_period=0.2))
+stroke(2, robot=Seastar(youngs_modulus=np.array([1e6, 2e6])), **given)
+"""
+
+
+def test_what_another_process_asks_for_was_compiled_before(tmp_path):
+    """That it finds it stands in rods/test_compilation.py."""
+    (tmp_path / "scene.py").write_text("import seastar_gym as s; scene = s.Scene(actuator=s.SmaWires())")
+    command = "from seastar_gym.cli import main\nmain.main(['compile', '--scene', 'scene.py', '--per-robot'])\n"
+    path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
+    told, wanted = [], []
+    for code in (command, SWIM):
+        program = f"import core; print(sorted(core.wanted_by({code!r})))"
+        done = subprocess.run(
+            [sys.executable, "-c", program], env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, text=True
+        )
+        *said, kinds = done.stdout.splitlines()
+        told += said
+        wanted.append(set(ast.literal_eval(kinds)))
+    assert told[0].startswith("SeastarSwim-v0: ") and told[1:] == [f"Machine code: {compile.energies.stats.cache_path}"]
+    assert len(wanted[1]) > 3 and wanted[1] <= wanted[0]
 
 
 def test_code_that_cannot_be_kept_is_not_said_to_be(monkeypatch, capsys):
