@@ -236,10 +236,10 @@ def in_another(simulator):
 WAYS = {
     "alone": lambda n: ({"robots": np.array([robot])} for robot in range(n)),
     "in other lanes": lambda n: [{"robots": np.random.default_rng(1).permutation(n)}],
-    "on threads": lambda n: ({"threads": threads} for threads in (2, 3, 7)),
+    "on threads": lambda n: ({"threads": threads} for threads in (2, 7)),
     "with pauses": lambda n: [{"advance": in_parts}, {"advance": at_times, "threads": 2}],
     "after a reset": lambda n: [{"used": True}],
-    "pickled": lambda n: ({"between": copied, "threads": threads} for threads in (1, 2)),
+    "pickled": lambda n: [{"between": copied, "threads": 2}],
     "from states": lambda n: [{"between": in_another}],
     "unmeasured": lambda n: [{"measured": False}],
     "scalar": lambda n: [{"device": "scalar"}],
