@@ -10,7 +10,7 @@ import pytest
 
 from ways.story import block, command
 
-SHORT = "--strokes 16384 --save-freq 4096"
+SHORT = "--strokes 8192 --save-freq 2048"
 """Options of a training that takes seconds."""
 
 

@@ -106,7 +106,7 @@ def test_a_robot_in_a_tank_is_filmed_fitted_trained_driven_and_put_on_a_board(st
         assert fitted[name.split(".")[0]][name.split(".")[1]] == pytest.approx(true, rel=0.04), name
 
     # A policy that sees everything cannot drive, and says what to do; that for the camera drives.
-    short = f"--strokes 24576 --save-freq 24576 --seed {seed} --no-video"
+    short = f"--strokes 16384 --save-freq 16384 --seed {seed} --no-video"
     types("train.py --scene fitted.json", more=short)
     story.types("seastar drive runs/three/policy.safetensors", ends=2)
     assert "python train.py --resume runs/three --for-camera camera.json" in story.told
