@@ -50,7 +50,7 @@ def scenes():
     for scheme, nodes, blow in (("implicit-euler", 4, 20.0), ("sdirk2", 3, 0.3), ("implicit-midpoint", 3, 0.3)):
         yield scheme, Scene(Seastar(nodes_per_limb=nodes), actuator=pulse, numerics=Numerics(scheme, 0.02)), blow
     robot = Seastar(nodes_per_limb=3, relaxation_time=4e-3)
-    yield "fluid", Scene(robot, WATER, pulse, midpoint, loads=((4, 1e-3, -2e-3),)), 0.3
+    yield "fluid", Scene(robot, WATER, pulse, midpoint), 0.3
     bent = Seastar(nodes_per_limb=4, along=AlongLimb(0.7, (1.0, 2.0, 0.5)), stiffening=Stiffening(2.0))
     yield "bent along", Scene(bent, None, pulse, midpoint), 0.3
     for name, contact in (("contact", Contact()), ("no contact", None)):
