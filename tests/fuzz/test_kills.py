@@ -15,6 +15,7 @@ import time
 import zipfile
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -54,20 +55,18 @@ def weights_in(folder):
 
 
 @pytest.fixture(scope="module")
-def ends(tmp_path_factory):
-    """Weights at the end of a training by the strokes it was continued from, at first of one that was left alone."""
-    folder = tmp_path_factory.mktemp("alone") / "run"
-    assert train.main([*TINY, "--out", str(folder)]) == 0
-    return {0: weights_in(folder), STROKES: weights_in(folder)}
+def alone(tmp_path_factory):
+    """A training that is left alone: its folder, seconds, and touches of files, by what may come of them."""
+    folder, began = tmp_path_factory.mktemp("alone") / "run", time.monotonic()
+    output, _ = start("kill", 0, folder).communicate()
+    killed, full = map(int, output.rsplit("touches: ", 1)[1].split())
+    return SimpleNamespace(folder=folder, touches={"kill": killed, "full": full}, seconds=time.monotonic() - began)
 
 
 @pytest.fixture(scope="module")
-def touches(tmp_path_factory):
-    """How often a training touches a file, by what may come of it, and the seconds that it takes."""
-    began = time.monotonic()
-    output, _ = start("kill", 0, tmp_path_factory.mktemp("counted") / "run").communicate()
-    killed, full = map(int, output.rsplit("touches: ", 1)[1].split())
-    return {"kill": killed, "full": full, "seconds": time.monotonic() - began}
+def ends(alone):
+    """Weights at the end of a training by the strokes it was continued from, at first of one that was left alone."""
+    return {0: weights_in(alone.folder), STROKES: weights_in(alone.folder)}
 
 
 def assert_readable(folder):
@@ -129,15 +128,15 @@ def assert_one_sentence(process):
 
 @pytest.mark.parametrize("end, seed", [*some("touch", 30), *some("moment", 24), *some("full disk", 12)])
 def test_a_run_continues_that_is_killed_at_any_touch_of_a_file_or_moment_or_meets_a_full_disk(
-    end, seed, tmp_path, touches, ends
+    end, seed, tmp_path, alone, ends
 ):
     rng, folder = random.Random(seed), tmp_path / "run"
     if end == "full disk":
-        assert_one_sentence(start("full", rng.randint(1, touches["full"]), folder))
+        assert_one_sentence(start("full", rng.randint(1, alone.touches["full"]), folder))
     else:
-        process = start("kill", rng.randint(1, touches["kill"]) if end == "touch" else 0, folder)
+        process = start("kill", rng.randint(1, alone.touches["kill"]) if end == "touch" else 0, folder)
         with suppress(subprocess.TimeoutExpired):
-            process.communicate(timeout=None if end == "touch" else rng.uniform(0.3, 1.0) * touches["seconds"])
+            process.communicate(timeout=None if end == "touch" else rng.uniform(0.3, 1.0) * alone.seconds)
         process.kill()
         process.communicate()
         assert process.returncode == -9 or end == "moment"

@@ -33,7 +33,7 @@ print("errors", info["path_error"], setting.promise(certificate.promised))
 """
 
 
-@pytest.mark.parametrize("n_limbs, radius, error, seed", [(2, 2e-3, 0.01, 0), (4, 1.6e-3, 0.02, 2)])
+@pytest.mark.parametrize("n_limbs, radius, error, seed", [(3, 2e-3, 0.01, 0), (4, 1.6e-3, 0.02, 2)])
 def test_a_scene_is_certified_chosen_and_trained_at_with_its_errors_in_info(story, n_limbs, radius, error, seed):
     story.has("my_scene.py", SCENE.format(n_limbs, radius))
     certify = command("docs/accuracy.md", "seastar certify").replace("--error 0.01", f"--error {error}")

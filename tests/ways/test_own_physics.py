@@ -17,7 +17,7 @@ from seastar_gym import Scene, Seastar, SmaWires
 
 scene = Scene(Seastar({}), actuator=SmaWires(), terms=(LinearDrag({}),))
 """
-SHORT = "--strokes 8192 --save-freq 4096 --no-video"
+SHORT = "--strokes 4096 --save-freq 4096 --no-video"
 
 
 @pytest.mark.parametrize(
@@ -27,9 +27,9 @@ def test_a_robot_with_a_force_of_its_own_is_trained_continued_and_compared(story
     story.has("drag.py", block(PAGE, "class LinearDrag").partition("\nscene = ")[0])
     story.has("my_scene.py", SCENE.format(n_limbs, drag))
     story.types(f"{command('docs/own_robot.md', 'train.py --scene')} {SHORT} {options} --out runs/mine")
-    story.types("python train.py --resume runs/mine --strokes 12288 --no-video", ends=2)
+    story.types("python train.py --resume runs/mine --strokes 8192 --no-video", ends=2)
     assert "--run-scene" in story.told  # code of a run is executed for those only who say so
-    story.types("python train.py --resume runs/mine --run-scene --strokes 12288 --no-video")
+    story.types("python train.py --resume runs/mine --run-scene --strokes 8192 --no-video")
     period = "--decision-period 0.5" if "0.5" in options else ""
     story.types(f"seastar evaluate --scene runs/mine/scene.py --agents runs/mine/policy.safetensors greedy {period}")
     policy, greedy = re.findall(r"^(?:policy|greedy) .*? (\d) of 5 ", story.told, re.MULTILINE)

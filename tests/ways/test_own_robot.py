@@ -15,7 +15,7 @@ SHORT = "--strokes 8192 --save-freq 2048"
 
 
 @pytest.mark.parametrize(
-    "n_limbs, options", [(4, ""), (3, "--decision-period 0.5 --seed 3 --no-video"), (8, "--seed 1 --no-video")]
+    "n_limbs, options", [(4, "--no-video"), (3, "--decision-period 0.5 --seed 3"), (8, "--seed 1 --no-video")]
 )
 def test_a_robot_of_ones_own_is_trained_compared_filmed_played_and_published(story, n_limbs, options):
     scene = block("docs/own_robot.md", "n_limbs=4").replace("n_limbs=4", f"n_limbs={n_limbs}")

@@ -45,7 +45,7 @@ def test_a_task_of_ones_own_is_an_id_that_is_promised_trained_on_and_compared(st
     assert "passed" in story.told and "failed" not in story.told
 
     # PPO learns it, and is compared with a gait and with chance.
-    story.runs(TRAIN.format(seed, 65536 if changes else 16384))
+    story.runs(TRAIN.format(seed, 65536 if changes else 8192))
     gait = "lagged" if changes else "straight"
     line = command(PAGE, "seastar evaluate --task away:").replace("--agents straight", f"--agents {gait} mine=mine.zip")
     story.types(line.replace("--seeds 20", "--seeds 5"))
