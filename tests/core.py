@@ -186,9 +186,11 @@ class Times:
         self.started = 0.0
         self.tests: dict[str, float] = {}
 
-    def pytest_collection_modifyitems(self, items):
-        seconds = self.kept.get(self.which, {})
-        items.sort(key=lambda item: -seconds.get(file_of(item.nodeid), 0.0))
+    def pytest_collection_modifyitems(self, config, items):
+        seconds = Counter(self.kept.get(self.which, {}))
+        if config.getoption("--left"):
+            seconds.subtract(self.kept.get("core", {}))
+        items.sort(key=lambda item: -seconds[file_of(item.nodeid)])
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item):

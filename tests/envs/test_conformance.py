@@ -104,9 +104,9 @@ OPTIONS = RECORDED | {
     "two nodes": {"scene": of(Seastar(nodes_per_limb=2))},
     "seven nodes": {"scene": of(Seastar(nodes_per_limb=7))},
     "many nodes": {"scene": of(Seastar(nodes_per_limb=19))},
-    "a body": {"scene": of(Seastar(4, 4, body=Body(0.02)))},
-    "a current": {"scene": of(Seastar(4, 4), fluid=Water(current=UniformCurrent(1e-3)))},
-    "contact": {"scene": of(Seastar(4, 4), contact=Contact())},
+    "a body in a current": {
+        "scene": of(Seastar(4, 4, body=Body(0.02)), fluid=Water(current=UniformCurrent(1e-3)), contact=Contact())
+    },
     "limited": {"scene": of(actuator=Limited(SmaPulse(), 0.5, 3.0))},
     "drawn": {**DRAWN, "randomization": SIZES},
     "error bars": {"scene": of(Seastar(nodes_per_limb=4)), "error_bars": True},
