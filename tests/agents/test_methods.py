@@ -6,7 +6,18 @@ import pytest
 from later import Later
 from refusals import assert_refused
 from seastar_gym.controllers.registry import load_agent
-from seastar_gym.evaluation.benchmark import FIDELITY, Cell, contract, make, read, swum, task_of, track_of, write
+from seastar_gym.evaluation.benchmark import (
+    FIDELITY,
+    Cell,
+    contract,
+    make,
+    read,
+    require_length,
+    swum,
+    task_of,
+    track_of,
+    write,
+)
 from seastar_gym.evaluation.rollout import env_of, require_seen
 
 methods = Later("agents.methods")
@@ -35,6 +46,8 @@ def test_a_method_trains_a_cell(name, tmp_path, monkeypatch):
     policy = load_agent(str(file.with_suffix(".zip")), env)
     swam = swum(make(ID, 2, "test", 1, actions=require_seen(policy, env)), policy)
     assert track_of(policy) == track and swam["measure"] == cell.measure
+    with assert_refused("learned for 2,", "decisions: say --decisions"):
+        require_length(name, policy, 4096)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -87,7 +87,7 @@ TRIALS = {
     "water with contact and nothing else": Trial(EVERYWHERE, 10, [CONTACT], change=in_water),
     "contact in vacuum": Trial(EVERYWHERE, 10, [CONTACT], change=in_vacuum),
     "chapter-like robots with contact": Trial(EVERYWHERE, 15, [CONTACT], wild=False, change=in_water),
-    "robots with numbers of their own": Trial(EVERYWHERE, 24, [terms for terms in COMPILED if OWN in terms]),
+    "robots with numbers of their own": Trial(EVERYWHERE, 12, [terms for terms in COMPILED if OWN in terms]),
     "all terms with limited actuators": Trial(EVERYWHERE, 20, [EVERYTHING], change=limited, slow=True),
     "all terms with numbers of each robot": Trial(EVERYWHERE, 20, [frozenset(TERMS)], slow=True),
     "hub hinges of the chapter that touch": Trial(EVERYWHERE, 20, [CONTACT | {CHAPTER}], slow=True),
