@@ -180,8 +180,8 @@ def test_nineteen_nodes_gather_energy_with_steps_of_5_ms_but_not_of_half():
     scene = Scene.preset("balanced")
     undamped = replace(scene.numerics, damping=0.0)
     nineteen = replace(scene, robot=replace(scene.robot, nodes_per_limb=19), numerics=undamped)
-    assert energy_growth(nineteen) > 10.0
-    assert energy_growth(replace(nineteen, numerics=replace(undamped, step=2.5e-3))) < 1.5
+    assert energy_growth(nineteen, samples=3) > 10.0
+    assert energy_growth(replace(nineteen, numerics=replace(undamped, step=2.5e-3)), samples=3) < 1.5
 
 
 @pytest.mark.parametrize("stiffness", [0.1, 1.0, 10.0])
@@ -189,7 +189,7 @@ def test_with_the_damping_of_the_fidelities_no_mesh_of_other_robots_gathers_ener
     numerics = Numerics.preset("balanced")
     for nodes in (7, 19):
         robot = Seastar(nodes_per_limb=nodes, youngs_modulus=stiffness * 1e6)
-        assert energy_growth(Scene(robot, numerics=numerics)) < 1.5
+        assert energy_growth(Scene(robot, numerics=numerics), samples=3) < 1.5
 
 
 def test_errors_in_time_are_the_worst_of_all_measured_times_and_of_one_robot_each():
