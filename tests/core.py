@@ -77,18 +77,23 @@ def wanted_by(code: str) -> set[str]:
     return found
 
 
+def run(code: str) -> list[str]:
+    """Lines that Python code prints in a process of its own, and a last one of what `wanted_by` finds, as JSON."""
+    from seastar_gym.lanes.compile import PACKAGE
+
+    program = f"import json, core; print(json.dumps(sorted(core.wanted_by({code!r}))))"
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(PACKAGE.parent), str(Path(__file__).parent)])}
+    done = subprocess.run([sys.executable, "-c", program], env=env, stdout=subprocess.PIPE, text=True)
+    return done.stdout.splitlines()
+
+
 def core_kinds() -> set[str]:
     """Kinds of machine code of the core, compiled by processes side by side where it is not yet on the disk."""
     from seastar_gym.lanes.compile import PACKAGE, kept_code
 
-    def run(code: str) -> str:
-        program = f"import json, core; print(json.dumps(sorted(core.wanted_by({code!r}))))"
-        env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(PACKAGE.parent), str(Path(__file__).parent)])}
-        return subprocess.run([sys.executable, "-c", program], env=env, stdout=subprocess.PIPE, text=True).stdout
-
     def compile_all() -> bytes:
         with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as threads:
-            kinds = {kind for answer in threads.map(run, KINDS.values()) for kind in json.loads(answer)}
+            kinds = {kind for lines in threads.map(run, KINDS.values()) for kind in json.loads(lines[-1])}
         return json.dumps(sorted(kinds)).encode()
 
     digest = hashlib.sha256(Path(__file__).read_bytes())

@@ -1,9 +1,6 @@
 """The command `seastar`: what it shows, writes and refuses, in a sentence each."""
 
-import ast
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from core import run
 from seastar_gym import Scene, Seastar, Sight
 from seastar_gym.cli import compile, played, screen
 from seastar_gym.cli.main import main
@@ -19,7 +17,6 @@ from seastar_gym.cli.play import Steering, known_keys, typed
 from seastar_gym.gaits import lagged_gait
 from seastar_gym.scene.serial import to_dict
 
-ROOT = Path(__file__).resolve().parents[2]
 FAST = ["--path", "path.csv", "--fidelity", "fast"]
 WEAK = "from seastar_gym import Scene\nscene = Scene(limb_strengths=(0.5, 0.5, 0.5, 0.5, 0.5))\n"
 THREE_LIMBS = "from seastar_gym import Scene, Seastar\nscene = Scene(robot=Seastar(n_limbs=3))\n"
@@ -60,18 +57,9 @@ def test_what_another_process_asks_for_was_compiled_before(tmp_path):
     """That it finds it stands in rods/test_compilation.py."""
     (tmp_path / "scene.py").write_text("import seastar_gym as s; scene = s.Scene(actuator=s.SmaWires())")
     command = "from seastar_gym.cli import main\nmain.main(['compile', '--scene', 'scene.py', '--per-robot'])\n"
-    path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
-    told, wanted = [], []
-    for code in (command, SWIM):
-        program = f"import core; print(sorted(core.wanted_by({code!r})))"
-        done = subprocess.run(
-            [sys.executable, "-c", program], env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, text=True
-        )
-        *said, kinds = done.stdout.splitlines()
-        told += said
-        wanted.append(set(ast.literal_eval(kinds)))
+    (*told, compiled), (wanted,) = run(command), run(SWIM)
     assert told[0].startswith("SeastarSwim-v0: ") and told[1:] == [f"Machine code: {compile.energies.stats.cache_path}"]
-    assert len(wanted[1]) > 3 and wanted[1] <= wanted[0]
+    assert len(json.loads(wanted)) > 3 and {*json.loads(wanted)} <= {*json.loads(compiled)}
 
 
 def test_code_that_cannot_be_kept_is_not_said_to_be(monkeypatch, capsys):

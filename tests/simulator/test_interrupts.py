@@ -10,7 +10,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from itertools import product
 from typing import Any
 
 import gymnasium as gym
@@ -108,20 +107,21 @@ def fail() -> None:
 
 
 HOOKS = {
-    f"{when} {nth}, {bars}": ({when: interrupt}, KeyboardInterrupt, nth, bars == "error bars")
+    f"{when} {nth}, {bars}": ({when: interrupt}, KeyboardInterrupt, nth, bars == "error bars", SmaPulse())
     for when in ("before", "after")
     for nth, bars in ((1, "plain"), (3, "plain"), (1, "error bars"), (12, "error bars"))
-} | {"a part that fails": ({"before": fail}, MemoryError, 3, False)}
+} | {
+    "a part that fails": ({"before": fail}, MemoryError, 3, False, SmaPulse()),
+    "before 3, thermal": ({"before": interrupt}, KeyboardInterrupt, 3, False, ThermalSma()),
+    "after 12, thermal": ({"after": interrupt}, KeyboardInterrupt, 12, True, ThermalSma()),
+}
 
 
 @THREADS
-@pytest.mark.parametrize(
-    "actuator, name", [*product(["pulse"], HOOKS), *product(["thermal"], ["before 3, plain", "after 12, error bars"])]
-)
-def test_an_interrupted_stroke_is_as_if_it_had_not_begun(monkeypatch, threads, actuator, name):
+@pytest.mark.parametrize("hooks, error, nth, bars, actuator", HOOKS.values(), ids=HOOKS)
+def test_an_interrupted_stroke_is_as_if_it_had_not_begun(monkeypatch, threads, hooks, error, nth, bars, actuator):
     """In the twin of error bars, too, and after it: its eleven parts come first."""
-    hooks, error, nth, bars = HOOKS[name]
-    scene = Scene(numerics=FAST, actuator={"pulse": SmaPulse(), "thermal": ThermalSma()}[actuator])
+    scene = Scene(numerics=FAST, actuator=actuator)
     simulator = swimmers(threads, scene, bars)
     with interrupted(simulator, Kernel(monkeypatch, nth=nth, **hooks), error):
         simulator.stroke(COMMANDS[1])

@@ -19,21 +19,16 @@ from studies.operations import count_operations, flops
 from studies.pages import numbers
 
 CURVES = fit.read_curves()
-
-
-def run_with_code(checkout, words, cache, run=benchmark.run_in):
-    """With the code that is there, instead of that of an empty folder, which takes a minute to compile."""
-    return run(checkout, words, os.environ.get("NUMBA_CACHE_DIR", ""))
-
-
+KEPT = os.environ.get("NUMBA_CACHE_DIR", "")
+"""Folder of code that is there, in place of empty ones, which take a minute to fill."""
 SHORTEST = {
     "benchmark --parts throughput --seconds 0": ({"speed_history.json"}, {
         "studies.benchmark": {"NODES_PER_LIMB": (5, 10), "BATCH": 8},
     }),
     "benchmark --beside .": ({"speed_history.json", "speed_history.png"}, {
         "studies.benchmark": {"SWIMS": {"one robot": ("fast", 1, 1)}, "ENVIRONMENTS": {}, "ROUNDS": 1, "MANY": 1,
-                              "run_in": run_with_code, "first_stroke": lambda checkout, cache: 2.0,
-                              "training": lambda checkout, cache: 1.0},
+                              "run_in": lambda checkout, words, _, run=benchmark.run_in: run(checkout, words, KEPT),
+                              "first_stroke": lambda checkout, cache: 2.0, "training": lambda checkout, cache: 1.0},
     }),
     "extremes": ({"extremes.json"}, {
         "studies.extremes": {"PRESETS": {"rapid": extremes.PRESETS["rapid"]}, "STROKES": 1},

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from ways.story import block, command
+from ways.story import command
 
 
 @pytest.mark.parametrize("n_limbs, options", [("3,5", ""), ("4,8", "--seed 7 --decision-period 0.5")])
@@ -33,11 +33,3 @@ def test_the_best_of_many_designs_is_trained(story, n_limbs, options):
     train = f"{command('docs/cluster.md', 'train.py --scene')} --strokes 4096 --no-video {options}"
     story.types(f"{train} --out mine")
     assert (story.folder / "mine/evaluation/report.html").is_file()
-
-
-def test_an_executor_of_ones_own_gives_the_same_designs(story):
-    story.runs(block("docs/cluster.md", "ThreadPoolExecutor", "Sweep"))
-    speed = re.findall(r"the fastest swims ([\d.]+) mm/s", story.told)
-    story.types("seastar sweep robot.limb_length=0.05:0.15 robot.n_limbs=3,5 --latin 2 --measured 1 --executor here")
-    (again,) = re.findall(r"Best speed: ([\d.e-]+) m/s", story.told)
-    assert [f"{1e3 * float(again):.1f}"] == speed

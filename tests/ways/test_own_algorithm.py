@@ -26,19 +26,6 @@ def test_a_class_with_predict_swims_beside_the_policy_and_the_script(story):
         "nearest:make", "learned", "pentagon", "planner"]  # fmt: skip
 
 
-def test_it_swims_a_robot_of_three_limbs_too(story):
-    code = block("docs/controllers.md", "class Nearest") + block("docs/controllers.md", "def make(env)")
-    story.has("nearest.py", re.sub(r"\b5\b", "3", code))
-    story.has(
-        "three.py",
-        "from seastar_gym import Scene, Seastar, SmaPulse\nscene = Scene(Seastar(3), actuator=SmaPulse(0.4))",
-    )
-    story.types("seastar evaluate --scene three.py --agents nearest:make greedy")
-    assert int(rows(story.told)["nearest:make"]) >= 3 and rows(story.told)["greedy"] == "5"
-    story.types("seastar evaluate --scene three.py --agents nearest:make learned", ends=2)
-    assert "learned" in story.told and "5 limbs" in story.told  # what was asked for is not left out silently
-
-
 LEARN = """
 symmetric = BatchVecEnv(VectorSymmetryReduction(batch))
 for seed in range(3):
