@@ -29,7 +29,7 @@ def test_a_class_with_predict_swims_beside_the_policy_and_the_script(story):
 LEARN = """
 symmetric = BatchVecEnv(VectorSymmetryReduction(batch))
 for seed in range(3):
-    model = PPO("MlpPolicy", symmetric, n_steps=64, batch_size=256, gamma=0.8, seed=seed, device="cpu")
+    model = PPO("MlpPolicy", symmetric, n_steps=32, batch_size=256, gamma=0.8, seed=seed, device="cpu")
     model.learn(512)
     model.save(f"{seed}.zip")
 """

@@ -96,7 +96,7 @@ def test_a_robot_in_a_tank_is_filmed_fitted_trained_driven_and_put_on_a_board(st
     story.has("path.txt", "0.1,0.0\n")
 
     # Pulses, a film of them, and the numbers of the robot in the tank.
-    types("seastar drive random", more=f"--sight film.json --seed {seed} --yes --no-window --unpaced")
+    types("seastar drive random", more=f"--sight film.json --seed {seed} --seconds 14 --yes --no-window --unpaced")
     film(story.folder, turn=0.4, seed=seed)
     types("seastar track2csv")
     types("seastar identify", "--intervals")
