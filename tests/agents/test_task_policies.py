@@ -69,7 +69,7 @@ def test_a_policy_of_another_task_is_refused_with_observations_as_long_too():
 def test_the_command_trains_compares_seeds_and_writes_a_card(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr("agents.tasks.VALIDATION", 4)
     monkeypatch.setattr("agents.tasks.EPISODES", 4)
-    done = ["--tasks", "SeastarPrey-v0", "--seeds", "0", "1", "--decisions", "8192", "--out", str(tmp_path)]
+    done = ["--tasks", "SeastarPrey-v0", "--seeds", "0", "1", "--decisions", "4096", "--out", str(tmp_path)]
     assert tasks.main([*done, "--num-threads", "1"]) == 0
     policy = load(tmp_path / "prey.safetensors")
     assert policy.training["seeds"] == [0, 1] and policy.training["id"] == "SeastarPrey-v0"
