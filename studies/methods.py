@@ -1,7 +1,8 @@
 """Methods on the benchmark: the page's tables and pictures, from the cells that `agents.tasks --benchmark` trained.
 
---references swims the greedy rules, the planner and the oracle instead, between the first and last of which scores are measured: an id after the other,
-those that are missing or of another contract. --agreement correlates returns with measures, by price of time.
+--references swims the greedy rules, a planner and the oracle instead: an id after the other, those that are missing or
+of another contract. Scores are measured between rules and oracle. --agreement correlates returns with measures, by
+price of time.
 """
 
 import subprocess
