@@ -90,6 +90,7 @@ class Waypoints(Task):
         current, following = now.waypoints[each, leg], now.waypoints[each, after]
         ends = np.concatenate([current, following], axis=1)
         now.legs = Legs(start, current, following, now.way_after[each, after], ends)
+        now.measured_at = None
 
     def move_waypoints(self, robots: Robots, by: Floats) -> None:
         """Move all waypoints of every robot by a vector [m], shape (n_robots, 2)."""
@@ -106,9 +107,13 @@ class Waypoints(Task):
         return length_of_routes(self._measured(robots, hub), now.aim) + now.legs.beyond
 
     def _measured(self, robots: Robots, hub: Floats) -> Floats:
-        """What `measure_routes` finds at hub positions [m], shape (n_robots, 2)."""
-        legs, aim = robots.episode.legs, robots.episode.aim
-        return measured_routes(np.ascontiguousarray(hub), legs.start, legs.current, legs.following, aim)
+        """What `measure_routes` finds at hub positions [m], shape (n_robots, 2): once for an array and its legs."""
+        now = robots.episode
+        if now.measured_at is not hub:
+            start, current, following, *_ = now.legs
+            now.measured = measured_routes(np.ascontiguousarray(hub), start, current, following, now.aim)
+            now.measured_at = hub
+        return np.asarray(now.measured)
 
     def targets(self, robots: Robots) -> Floats:
         """The current waypoint and the next."""
@@ -147,7 +152,7 @@ class Waypoints(Task):
         """
         now, reached = robots.episode, np.zeros(robots.n_robots, np.int64)
         while True:
-            near = length(now.legs.current - hub) <= now.radius
+            near = self._measured(robots, hub)[6] <= now.radius
             if self.headings is not None and heading is not None:
                 near &= np.abs(_turn(robots, robots.waypoint_index, heading)) <= self.headings.tolerance
             if not np.count_nonzero(near):

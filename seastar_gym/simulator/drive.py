@@ -14,8 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.base import JUMP, Actuator, complete, stroke_at
+from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.scene.checks import as_floats, shown
 from seastar_gym.scene.number import column
+from seastar_gym.simulator.wires import contracted
 
 SAME_TIME = 1e-9
 """Fraction of a step. A shorter remainder before a corner is rounding of the division, not a step."""
@@ -150,24 +152,34 @@ class Drive:
         (n_times, n_robots, n_limbs).
         """
         given, phase = (self.commands, self.phase) if commands is None else (commands, 0.0)
-        steps = self._interval(phase, duration, commands is not None)
-        times, turned, before = steps.times, steps.curve, self.state
-        after = before
-        if self._has_memory:
-            turned, after = self._actuator.respond(times, given, before)
+        steps, before = self._interval(phase, duration, commands is not None), self.state
+        turned, after, heated = self._respond(steps, given, before)
         if commands is not None and self.phase > 0.0:
-            self._refuse_jump(self.strengths * turned[0] if self._has_memory else self._none)
+            self._refuse_jump(turned[0] if self._has_memory else self._none)
         if self._has_memory:
             self._turned = after, turned[-1]
         self.steps, self.commands, self.phase = steps, given, phase
         self._given, self._before, self._after = given, before, after
-        self.heating_time = np.add.reduce(self._actuator.seconds_heated(times, given, before), axis=1)
-        return times, self.strengths if self._has_memory else given * self.strengths, turned
+        self.heating_time = np.add.reduce(heated, axis=1)
+        return steps.times, self.strengths if self._has_memory else given * self.strengths, turned
 
-    def _refuse_jump(self, then: Floats) -> None:
-        """ValueError if limbs cannot begin anew from where they are. then: Rotations that they would begin with."""
-        state, turned = self._turned
-        now = self.strengths * turned if self.state is state else self.rotations()
+    def _respond(self, steps: Steps, given: Floats, before: Floats) -> tuple[Floats, Floats, Floats]:
+        """Rotations of limbs of full strength or the curve, the state in the end, and times of heating of limbs [s]."""
+        actuator, times = self._actuator, steps.times
+        if type(actuator) is SmaWires:
+            return contracted(actuator, times, given, before)
+        turned, after = actuator.respond(times, given, before) if self._has_memory else (steps.curve, before)
+        return turned, after, actuator.seconds_heated(times, given, before)
+
+    def _refuse_jump(self, turned: Floats) -> None:
+        """ValueError if limbs cannot begin anew from where they are.
+
+        turned: Rotations of limbs of full strength that they would begin with [rad].
+        """
+        state, last = self._turned
+        if self.state is state and not np.count_nonzero(turned != last):
+            return
+        then, now = self.strengths * turned, self.strengths * last if self.state is state else self.rotations()
         jumps = np.abs(then - now) > JUMP * column(self._actuator.peak_angle)
         if np.count_nonzero(jumps):
             robot, limb = np.argwhere(jumps)[0]
