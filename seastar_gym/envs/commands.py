@@ -104,13 +104,13 @@ def to_commands(actions: Actions, n_limbs: int, action: object, n_robots: int) -
     if actions == "continuous":
         return _checked_shares(array, (n_robots, n_limbs))
     shape = (n_robots, n_limbs) if actions == "limbs" else (n_robots,)
-    table = LIMB_COMMANDS if actions == "limbs" else command_table(actions, n_limbs)
+    table = LIMB_COMMANDS if actions == "limbs" else _command_table(actions, n_limbs)
     if array.dtype.kind not in "iu" or array.shape != shape:
         raise ValueError(
             f'With actions="{actions}" the actions of {n_robots} robot(s) are whole numbers of shape {shape}, '
             f"not {array.dtype} of shape {array.shape}."
         )
-    if np.count_nonzero(array.astype(np.uint64) >= len(table)):  # numbers below 0 are large ones then
+    if np.maximum.reduce(array.astype(np.uint64), axis=None) >= len(table):  # numbers below 0 are large ones then
         raise ValueError(f'With actions="{actions}" an action is from 0 to {len(table) - 1}, not {array.tolist()}.')
     return np.asarray(table[array])
 

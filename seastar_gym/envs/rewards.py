@@ -107,4 +107,4 @@ def pulses_of(heating_time: NDArray[np.float64], commands: NDArray[np.float64]) 
     """
     whole = np.rint(heating_time / PULSE * 1e12) / 1e12  # sums of tenths of a second are whole pulses again
     unknown = np.isnan(whole)
-    return np.where(unknown, np.abs(commands).sum(axis=1), whole) if np.count_nonzero(unknown) else whole
+    return np.where(unknown, np.abs(commands).sum(axis=1), whole) if any(unknown.tolist()) else whole

@@ -365,7 +365,8 @@ class Robots:
         found[:, at.stations_and_hub] = seen[:, : at.stations_and_hub.stop]
         found[:, at.waypoints] = seen[:, self._without_more.waypoints]
         found[:, at.actuators] = arrays.asarray(self._remembered())
-        found[:, at.further] = arrays.asarray(self.task.observation(self))
+        if at.entries:
+            found[:, at.further] = arrays.asarray(self.task.observation(self))
         return found
 
     def privileged_observations(self) -> NDArray[np.float32]:

@@ -116,10 +116,11 @@ def measured_routes(position: Floats, start: Floats, waypoint: Floats, after: Fl
 def length_of_routes(measured: Floats, radius: Floats) -> Floats:
     """Lengths of routes [m], shape (n,). measured: As of `measured_routes`. radius: [m], shape (n,)."""
     share = measured[4]
-    if not np.count_nonzero(share != STRAIGHT):
+    kinds = set(share.tolist())
+    if kinds == {STRAIGHT}:
         return measured[5]
     angles, out = np.arctan2(measured[2:4], measured[:2]), np.empty(len(radius))
-    if np.count_nonzero(share == UNDECIDED):
+    if UNDECIDED in kinds:
         share[:] = np.where(share == UNDECIDED, _bisected(measured[:4], angles, radius), share)
     find_bends(angles, measured, out)
     measure_bent(np.cos(out), np.sin(out), measured, radius, out)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from operator import getitem
 from typing import Any, Literal, NamedTuple
@@ -100,6 +99,23 @@ class Step(NamedTuple):
     final: Info
 
 
+class Course:
+    """Context of a step or reset: after an interruption, robots and task disagree, and only a reset helps.
+
+    is_running: Whether episodes have begun and were not interrupted.
+    """
+
+    def __init__(self) -> None:
+        self.is_running = self._was_running = False
+
+    def __enter__(self) -> None:
+        self._was_running, self.is_running = self.is_running, False
+
+    def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
+        was_refused = kind is not None and issubclass(kind, ValueError)  # before anything changed
+        self.is_running = kind is None or (was_refused and self._was_running)
+
+
 class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
     """Environment of robots that are there already, side by side; `SeastarSwimVectorEnv` documents all of it."""
 
@@ -107,8 +123,6 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
     metadata = {
         "render_modes": ["rgb_array"], "render_fps": FRAMES_PER_SECOND, "autoreset_mode": AutoresetMode.NEXT_STEP,
     }  # fmt: skip
-    is_running = False
-    """Whether episodes have begun and were not interrupted."""
 
     def __init__(
         self,
@@ -132,6 +146,7 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
         self._generators, self._seeds = map(list, zip(*(seeding.np_random(None) for _ in range(n_robots)), strict=True))
         self.pictures = BatchPictures(robots)
         self._own_attributes: dict[str, tuple[Any, ...]] = {}
+        self._course = Course()
         self._elapsed, self._limits = np.zeros(n_robots, np.int64), np.full(n_robots, LONGEST)
         self.needs_reset = np.ones(n_robots, bool)
         self._is_made = True
@@ -142,6 +157,11 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
         if decisions is not None:
             require_count("max_episode_steps", decisions, 1, LONGEST)
         object.__setattr__(self, "max_episode_steps", decisions)
+
+    @property
+    def is_running(self) -> bool:
+        """Whether episodes have begun and were not interrupted."""
+        return self._course.is_running
 
     @property
     def waypoints(self) -> tuple[NDArray[np.float64], ...]:
@@ -193,7 +213,7 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
 
     def begin(self, mask: Flags, asked: Any = None) -> None:
         """Begin episodes of the robots in a mask, with their own generators. asked: What a reset asks for."""
-        with self._to_the_end():
+        with self._course:
             self._begin_episodes(mask, asked)
 
     def _begin_episodes(self, mask: Flags, asked: Any = None) -> None:
@@ -202,17 +222,6 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
         self.needs_reset[mask] = False
         if self.render_mode is not None:
             self.pictures.begin(mask)
-
-    @contextmanager
-    def _to_the_end(self) -> Iterator[None]:
-        """Context of a step or reset: after an interruption, robots and task disagree, and only a reset helps."""
-        was_running, self.is_running = self.is_running, False
-        try:
-            yield
-        except ValueError:  # refused before anything changed
-            self.is_running = was_running
-            raise
-        self.is_running = True
 
     def step(
         self, actions: Any, out: Buffers | None = None
@@ -247,13 +256,13 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
         look: Called with the time since the decision [s] after every part, when pictures are asked for.
         """
         begun = self.needs_reset.copy()  # NEXT_STEP: these begin anew instead of swimming
-        some_begin = np.count_nonzero(begun) > 0
+        some_begin = any(begun.tolist())
         commands = to_commands(self.actions, self._robots.scene.robot.n_limbs, actions, self.num_envs)
         if some_begin:
             commands[begun] = 0.0
         if self.closed:
             self.closed = False
-        with self._to_the_end():
+        with self._course:
             outcome = self._swim(commands, look, parts)
             np.add(self._elapsed, 1, out=self._elapsed)
             reward, terminated, truncated = outcome.reward, outcome.terminated, self._elapsed >= self._limits
@@ -264,7 +273,7 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
             np.logical_or(terminated, truncated, out=self.needs_reset)
             final = Info()
             observations = self._observe()
-            if self.autoreset_mode is AutoresetMode.SAME_STEP and np.count_nonzero(self.needs_reset):
+            if self.autoreset_mode is AutoresetMode.SAME_STEP and any(self.needs_reset.tolist()):
                 begun = self.needs_reset.copy()
                 final = _final(observations, outcome.info, begun)
                 self._begin_episodes(begun)

