@@ -87,7 +87,7 @@ class OneRobotEnv(RobotsEnv, gym.Env[Observation, Any]):
             raise gym.error.ResetNeeded(
                 "The episode has not begun, is over or was interrupted: call reset() before step()."
             )
-        actions = action[None] if isinstance(action, np.ndarray | np.number) else [action]
+        actions = action[None] if isinstance(action, np.ndarray) else [action]
         look = None if self.render_mode in (None, "rgb_array") else self._look
         (seen, reward, terminated, _), info, *_ = self._batch.advance(actions, look, self.frames_per_stroke)
         self._draw_now()

@@ -24,6 +24,7 @@ from seastar_gym import (
     Water,
 )
 from seastar_gym.simulator.drive import step_times
+from seastar_gym.simulator.wires import contracted
 from strokes import assert_same, finished, ternary
 
 FAST = Scene.preset("fast")
@@ -44,6 +45,22 @@ HALF = np.array([[0.3, 0.5, 0.0, -0.7, -1.0]])
 
 def scene_with(actuator, scene: Scene = FAST) -> Scene:
     return replace(scene, actuator=actuator)
+
+
+@given(st.integers(0, 2**32 - 1), st.booleans(), st.sampled_from([0.0, 0.07]))
+def test_wires_are_compiled_to_the_bits_of_their_methods(seed, refractory, begin):
+    """For any wires, commands that are new or not, and states of two robots."""
+    rng = np.random.default_rng(seed)
+    heating_time, cooling_time = rng.choice([0.1, 0.05, *rng.uniform(1e-3, 1.0, 2)], 2)
+    peaks = rng.uniform(0.0, 1.0, 2) if rng.random() < 0.5 else 0.6
+    wires = SmaWires(peaks, heating_time, cooling_time, refractory=refractory)
+    times = begin + np.append(0.0, np.cumsum(rng.choice([0.005, 0.01, 0.0137], rng.integers(0, 50))))
+    commands = rng.choice([0.0, -0.0, 1.0, -1.0, *rng.uniform(-1.0, 1.0, 2)], (2, 5))
+    contractions = rng.choice([0.0, 1.0, 1e-10, *rng.uniform(0.0, 1.0, 2)], (2, 5, 2))
+    state = np.concatenate([contractions, rng.choice([0.0, 0.1, rng.uniform(0.0, 0.3)], (2, 5, 2))], axis=-1)
+    expected = *wires.respond(times, commands, state), wires.seconds_heated(times, commands, state)
+    for got, wanted in zip(contracted(wires, times, commands, state), expected, strict=True):
+        assert got.tobytes() == wanted.tobytes()
 
 
 # --- pieces: that pauses, states and copies change no bit stands in test_bits.py --------------------------------------
