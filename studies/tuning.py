@@ -91,7 +91,8 @@ def run(options: Options, results: Results) -> None:
 def tuning_table(found: Any) -> str:
     """The rows' numbers and the best of ten draws, both with other seeds, of methods that are tuned to the end."""
     lines, whole = [], len(draws()) + 2 * len(SEEDS)
-    for method, row in found.get("trainings", {}).items():
+    for method in METHODS:
+        row = found.get("trainings", {}).get(method, {})
         if len(row) < whole:
             continue
         best = best_of(row)
