@@ -14,13 +14,13 @@ import torch
 
 from agents.methods import METHODS, Draw, batch_of, new_model
 from agents.tasks import FAR_SEED
-from seastar_gym.evaluation.benchmark import swum
+from seastar_gym.evaluation.benchmark import EPISODES, swum
 from seastar_gym.evaluation.results import over_trainings
+from seastar_gym.scene.checks import require_count
 from studies.frame import Results, Study, require_known, rounded
 from studies.pages import markdown
 
 ID = "SeastarStation-v0"
-EPISODES = 64
 SEEDS = (1, 2, 3)
 """Seeds of the trainings that are compared; draws have seed 0."""
 ROWS = "as in the rows"
@@ -37,6 +37,7 @@ class Options:
 
     def __post_init__(self) -> None:
         require_known("method", self.methods, METHODS)
+        require_count("decisions", self.decisions, 1, 10**9)
 
 
 def draws(n: int = 10) -> dict[str, Draw]:
