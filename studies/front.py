@@ -12,20 +12,21 @@ Cost is counted, so that it is the same on every machine: Newton iterations time
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache, partial
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from seastar_gym.accuracy.certificate import REPEATED, at
-from seastar_gym.accuracy.commands import SECONDS, SLOWEST, SMALL_COMMANDS, Batch, draw_batch
-from seastar_gym.accuracy.measure import SHORTEST_PATH, Swims, errors, path_lengths, swim, swim_all, whole_seconds
+from seastar_gym.accuracy.commands import SECONDS, SMALL_COMMANDS, Batch, draw_batch
+from seastar_gym.accuracy.measure import Swims, errors, path_lengths, swim, swim_all
 from seastar_gym.files import save_figure
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaWires
 from seastar_gym.scene.numerics import DAMPING, PRESETS, Fidelity, Resolution, SchemeName
 from seastar_gym.scene.robot import SILICONE
 from studies.frame import DOCS, Floats, Results, Study, rounded
-from studies.pages import markdown
+from studies.pages import markdown, numbers
 from studies.style import CYCLE, FAINT, INK, subplots
 
 NODES = (6, 7, 8, 9, 10, 11, 12, 13, 14, 16, 19, 25, 28)
@@ -49,7 +50,11 @@ SHORT = {"strokes": 0.2e-3, "decisions": 0.4e-3}
 """Time steps of the swims that stand for the continuum [s]. Undamped limbs need shorter ones."""
 NOTICEABLE, SHOWN = 0.03, 0.2
 """A dearer setting joins the front, and stands in tables, if it reduces an error by at least this fraction."""
-FILE = "accuracy/front.json"
+NAMES: tuple[Fidelity, ...] = ("rapid", "fast", "balanced", "accurate")
+"""Presets that the scan has."""
+TITLES = {"strokes": "strokes, limbs of the chapter", "decisions": "decisions every 0.125 to 0.3 s, silicone"}
+SCHEMES = {"implicit-midpoint": ("midpoint rule", FAINT), "sdirk2": ("SDIRK2", CYCLE[1])}
+"""How schemes are named and drawn."""
 
 
 def is_scanned(nodes: int, step: float, damping: float, tolerance: float) -> bool:
@@ -74,32 +79,18 @@ def settings() -> list[Resolution]:
     return list(dict.fromkeys([*found, *(PRESETS[name] for name in NAMES)]))
 
 
-NAMES: tuple[Fidelity, ...] = ("rapid", "fast", "balanced", "accurate")
-"""Presets that the scan has."""
-
-
 class Point(NamedTuple):
     """A setting of the scan. Errors are fractions of the path: the largest and the median, of the class with most.
 
     cost: Operations over those of `fast`.
     """
 
-    nodes: int
-    scheme: SchemeName
-    step: float
-    damping: float
-    tolerance: float
+    resolution: Resolution
     cost: float
     random: float
     typical: float
     repeated: float
     typical_repeated: float
-
-    @property
-    def resolution(self) -> Resolution:
-        """Nodes per limb and numerics."""
-        numerics = Numerics(self.scheme, self.step, self.tolerance, damping=self.damping)
-        return Resolution("continuum", self.nodes, numerics)
 
 
 def batches(kind: str) -> list[Batch]:
@@ -117,8 +108,7 @@ def exact(kind: str) -> list[tuple[Batch, Swims, Floats]]:
     found = []
     for batch in batches(kind):
         (swum,) = swim_all([limit], batch.joined, period=batch.period)
-        shortest = SHORTEST_PATH if batch.period is None else SLOWEST * SECONDS
-        found.append((batch, swum, path_lengths(scene, swum.hub[whole_seconds(batch.period, len(swum.hub))], shortest)))
+        found.append((batch, swum, path_lengths(scene, swum.hub, batch.period)))
     return found
 
 
@@ -140,15 +130,12 @@ def measured(kind: str, resolution: Resolution) -> list[float]:
 
 def keys_of(resolution: Resolution) -> tuple[str, str]:
     """Mesh and numerics, as the file names them."""
-    each = resolution.numerics
-    return str(
-        resolution.nodes_per_limb
-    ), f"{each.scheme} {1e3 * each.step:.6g} {each.damping:g} {each.newton_tolerance:g}"
+    _, nodes, each = resolution
+    return str(nodes), f"{each.scheme} {1e3 * each.step:.6g} {each.damping:g} {each.newton_tolerance:g}"
 
 
 def run(results: Results) -> None:
     """Measure what is missing, mesh by mesh."""
-    results.read()
     for kind, nodes in itertools.product(SCENES, NODES):
         some = [each for each in settings() if each.nodes_per_limb == nodes]
         results.fill({(kind, str(nodes)): partial(mesh, kind, some)}, lambda found: f"{len(found)} settings")
@@ -162,12 +149,12 @@ def mesh(kind: str, some: Sequence[Resolution]) -> dict[str, list[float]]:
 def points(results: Mapping[str, Any], kind: str) -> list[Point]:
     """Points of the scan, cheapest first."""
     nodes, numerics = keys_of(PRESETS["fast"])
-    unit, found = results[kind][nodes][numerics][0], []
-    for nodes, by_numerics in results[kind].items():
-        for name, (operations, *off) in by_numerics.items():
-            scheme, step, damping, tolerance = name.split()
-            numbers = 1e-3 * float(step), float(damping), float(tolerance)
-            found.append(Point(int(nodes), cast(SchemeName, scheme), *numbers, operations / unit, *off))
+    unit, given = results[kind][nodes][numerics][0], {keys_of(each): each for each in settings()}
+    found = [
+        Point(given[nodes, name], operations / unit, *off)
+        for nodes, by_numerics in results[kind].items()
+        for name, (operations, *off) in by_numerics.items()
+    ]
     return sorted(found, key=lambda each: each.cost)
 
 
@@ -180,43 +167,22 @@ def front(points: Iterable[Point], error: Callable[[Point], float], least: float
     return chosen
 
 
-def of_random(point: Point) -> float:
-    """Largest error of random commands."""
-    return point.random
-
-
 def of_any(point: Point) -> float:
     """Largest error of any commands."""
     return max(point.random, point.repeated)
 
 
-ERRORS = of_random, of_any
+ERRORS: tuple[Callable[[Point], float], ...] = attrgetter("random"), of_any
 """Errors of which there is a front: of random commands, and of any."""
 
 
-def chosen(kind: str, results: Mapping[str, Any] | None = None) -> list[Resolution]:
+def chosen(kind: str) -> list[Resolution]:
     """Settings on the front of all, and for strokes on that of each mesh, which a robot may name."""
-    from studies.pages import numbers
-
-    known = points(numbers(DOCS, STUDY) if results is None else results, kind)
-    meshes = [[each for each in known if each.nodes == nodes] for nodes in NODES] if kind == "strokes" else []
+    known = points(numbers(DOCS, STUDY), kind)
+    of_mesh = [[each for each in known if each.resolution.nodes_per_limb == nodes] for nodes in NODES]
+    meshes = of_mesh if kind == "strokes" else []
     found = [each for some in (known, *meshes) for error in ERRORS for each in front(some, error)]
-    return list(dict.fromkeys(_as_given(each.resolution) for each in found))
-
-
-@cache
-def _given() -> dict[tuple[str, str], Resolution]:
-    return {keys_of(each): each for each in settings()}
-
-
-def _as_given(resolution: Resolution) -> Resolution:
-    """The setting as it was scanned: the file has steps of six digits."""
-    return _given()[keys_of(resolution)]
-
-
-TITLES = {"strokes": "strokes, limbs of the chapter", "decisions": "decisions every 0.125 to 0.3 s, silicone"}
-SCHEMES = {"implicit-midpoint": ("midpoint rule", FAINT), "sdirk2": ("SDIRK2", CYCLE[1])}
-"""How schemes are named and drawn."""
+    return list(dict.fromkeys(each.resolution for each in found))
 
 
 def picture(results: Mapping[str, Any], file: Path) -> None:
@@ -225,7 +191,8 @@ def picture(results: Mapping[str, Any], file: Path) -> None:
     for axes, (kind, title) in zip(both, TITLES.items(), strict=True):
         some = points(results, kind)
         for scheme, (name, colour) in SCHEMES.items():
-            axes.plot(*drawn(each for each in some if each.scheme == scheme), ".", ms=3, color=colour, label=name)
+            of_scheme = drawn(each for each in some if each.resolution.numerics.scheme == scheme)
+            axes.plot(*of_scheme, ".", ms=3, color=colour, label=name)
         axes.plot(*drawn(front(some, of_any)), color=CYCLE[0], lw=1.2, label="fastest for its error")
         for fidelity in NAMES:
             x, y = drawn(each for each in some if keys_of(each.resolution) == keys_of(PRESETS[fidelity]))
@@ -255,10 +222,11 @@ def table(results: Mapping[str, Any], kind: str) -> str:
     for each in some:
         name = names.get(keys_of(each.resolution))
         if each in best or name is not None:
-            off = [f"{rounded(100 * number, 2):g}" for number in each[6:]]
-            scheme = f"{each.scheme.replace('implicit-midpoint', 'midpoint')}, {1e3 * each.step:.3g} ms"
+            off = [f"{rounded(100 * number, 2):g}" for number in each[2:]]
+            _, nodes, its = each.resolution
+            scheme = f"{its.scheme.replace('implicit-midpoint', 'midpoint')}, {1e3 * its.step:.3g} ms"
             rows.append([
-                f"`{name}`" if name else "", each.nodes, scheme, f"{each.damping:g}", f"{each.tolerance:.0e}",
+                f"`{name}`" if name else "", nodes, scheme, f"{its.damping:g}", f"{its.newton_tolerance:.0e}",
                 f"{1 / each.cost:.2g}", f"{off[0]} ({off[1]})", f"{off[2]} ({off[3]})",
             ])  # fmt: skip
     head = ["", "N", "scheme and step", "damping", "tolerance", "speed", "random [%]", "repeated [%]"]
@@ -266,6 +234,6 @@ def table(results: Mapping[str, Any], kind: str) -> str:
 
 
 STUDY = Study(
-    "front", run, file=FILE, pictures={"front.png": picture},
+    "front", run, file="accuracy/front.json", pictures={"front.png": picture},
     tables={"front of strokes": partial(table, kind="strokes"), "front of decisions": partial(table, kind="decisions")},
 )  # fmt: skip

@@ -285,8 +285,7 @@ def measure_settings(
         def told(share: float, before: int = done, own: int = batch.joined.size) -> None:
             report(SHARE_OF_SWIMS * (before + own * share) / whole)
 
-        shortest = SHORTEST_PATH if batch.period is None else SLOWEST * SECONDS
-        found.append(measure(scene, resolutions, limit, short, batch.joined, told, batch.period, shortest))
+        found.append(measure(scene, resolutions, limit, short, batch.joined, told, batch.period))
         done += batch.joined.size
 
     def by_class(numbers: Iterable[Floats]) -> dict[str, Floats]:
@@ -331,7 +330,6 @@ def measure(
     commands: Floats,
     progress: Progress | None = None,
     period: float | None = None,
-    shortest: float = SHORTEST_PATH,
 ) -> Measured:
     """Errors of a scene at some resolutions, of space and of time, sequence by sequence.
 
@@ -340,14 +338,13 @@ def measure(
 
     limit: What stands for the continuum. short: Numerics that stand for infinitely short steps with a discretisation
     and nodes per limb. commands: Shape (strokes, n, n_limbs). period: Time between decisions [s]; errors are then those
-    after any decision, and paths as long as they are seen at whole seconds. None means strokes. shortest: Of a path
-    whose errors are fractions of its length [limb lengths].
+    after any decision. None means strokes.
     """
     meshes = [each[:2] for each in resolutions]
     half: tuple[Discretisation, int] = (limit.discretisation, (limit.nodes_per_limb + 1) // 2)
     fine = [Resolution(*mesh, short(*mesh)) for mesh in dict.fromkeys([*meshes, half])]
     exact, *swum = swim_all([at(scene, each) for each in (limit, *fine, *resolutions)], commands, progress, period)
-    lengths = path_lengths(scene, exact.hub[whole_seconds(period, len(exact.hub))], shortest)
+    lengths = path_lengths(scene, exact.hub, period)
     converged = {each[:2]: found for each, found in zip(fine, swum, strict=False)}
     of_limit = errors(converged[half], exact, lengths).path / 3.0
     space = {mesh: errors(found, exact, lengths) for mesh, found in converged.items()}
@@ -414,11 +411,15 @@ def whole_seconds(period: float | None, n: int) -> slice:
     return slice((n - 1) % every, None, every)
 
 
-def path_lengths(scene: Scene, hub: Floats, shortest: float = SHORTEST_PATH) -> Floats:
-    """Lengths of paths through a scene's water from the origin [m], shape (n,), at least `shortest` [limb lengths].
+def path_lengths(scene: Scene, hub: Floats, period: float | None = None) -> Floats:
+    """Lengths of paths through a scene's water from the origin [m], shape (n,), of which errors are fractions.
 
-    hub: At the ends of strokes [m], shape (strokes, n, 2). How far the water carries it is no way swum.
+    They are at least SHORTEST_PATH, and at least SLOWEST fast where decisions are shorter than strokes.
+
+    hub: At the ends of strokes or decisions [m], shape (strokes, n, 2). How far the water carries it is no way swum.
+    period: Time between decisions [s]; a path is then as long as it is seen at whole seconds. None means strokes.
     """
+    hub, shortest = hub[whole_seconds(period, len(hub))], SHORTEST_PATH if period is None else SLOWEST * SECONDS
     steps = np.diff(hub, axis=0, prepend=0.0) - carried(scene, hub)
     return np.fmax(np.linalg.norm(steps, axis=-1).sum(axis=0), shortest * float(np.max(scene.robot.limb_length)))
 

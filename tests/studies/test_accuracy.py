@@ -56,8 +56,6 @@ def test_a_study_stores_every_preset(tmp_path, monkeypatch):
         assert [each.resolution for each in certificate.settings] == [*PRESETS.values()]
         assert certificate.limit_error > 0.0 and all(each.speed > 0.0 for each in certificate.settings)
     assert timed.measured_over["periods"] == [0.2, 0.5] and "policies" in timed.promised
-    with assert_refused("needs the whole study"):
-        study.Options(quick=True, store=True)
     with assert_refused("Unknown table"):
         study.Options(only=("air",))
 
