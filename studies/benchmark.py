@@ -36,10 +36,9 @@ from seastar_gym.rods import interval as stroke
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator, StrokeReport, batch
-from studies.frame import Results, Study, require_known, rounded
+from studies.frame import Results, Study, commit_of, require_known, rounded
 from studies.operations import count_operations, flops
 from studies.pages import markdown
-from studies.provenance import provenance
 from studies.style import INK, subplots
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -51,8 +50,8 @@ BATCH = 512
 ENVIRONMENTS = {"SeastarSwim-v0": "strokes of 1 s", "SeastarSwimTimedModerate-v0": "decisions of 0.2 s"}
 NEIGHBOURS = {"Swimmer-v5": "0.04 s", "HalfCheetah-v5": "0.05 s"}
 """Environments of MuJoCo, timed where it is installed, and how long a decision is."""
-Row = tuple[str, str, float, float, float]
-"""What a number is, its unit, its median, and the range of the middle half of its repeats."""
+Row = tuple[str, list[Any]]
+"""What a number is; its unit, its median, and the range of the middle half of its repeats."""
 
 
 # Throughput
@@ -71,8 +70,7 @@ def repeat(run: Callable[[], object], seconds: float) -> list[float]:
 
 def row(what: str, unit: str, values: list[float]) -> Row:
     """Row of a number from its repeats."""
-    low, middle, high = np.percentile(values, [25, 50, 75])
-    return what, unit, float(middle), float(low), float(high)
+    return what, [unit, *map(rounded, np.percentile(values, [50, 25, 75]))]
 
 
 def straight(scene: Scene, n_robots: int, threads: int = 1) -> Callable[[], StrokeReport]:
@@ -198,7 +196,6 @@ def throughput(seconds: float) -> Iterator[Row]:
 
 # Cold start
 
-
 IMPORT = "import gymnasium", "import seastar_gym"
 FIRST = "import seastar_gym as s; from studies.gpu import EVERYTHING, scenes"
 SWIM = "scene = {}; n = scene.n_robots or 1; s.Simulator(scene, n).stroke([[0, 1, 0, 0, -1]] * n)"
@@ -239,7 +236,6 @@ def cold_start(seconds: float) -> Iterator[Row]:
 
 # History
 
-
 SWIM_OF = "swim = s.Simulator({0}, {1}, threads=1).stroke; commands = [[0.0, 1.0, 0.0, 0.0, -1.0]] * {1}"
 STEP_OF = (
     "import gymnasium as gym; env = gym.make('{}', fidelity='fast', max_episode_steps=10**9, path=[[10.0, 0.0], "
@@ -254,19 +250,8 @@ SWIMS: dict[str, tuple[Fidelity, int, int]] = {
     **{f"{BATCH} robots, {name}": (name, BATCH, n) for name, n in zip(FIDELITIES, (4, 3, 1, 1), strict=True)},
 }
 """Strokes that are timed in two checkouts: fidelity, robots, and how many after a first one."""
-
-
-def things() -> dict[str, tuple[int, str, str]]:
-    """What is timed in two checkouts: how often after a first time, or 0 for the first time, before it, and what."""
-    strokes = {
-        name: (repeats, SWIM_OF.format(f"s.Scene.preset('{fidelity}')", n_robots), "swim(commands)")
-        for name, (fidelity, n_robots, repeats) in SWIMS.items()
-    }
-    steps = {
-        f"one environment, {what}": (200, STEP_OF.format(id), "env.step(env.action_space.sample())")
-        for id, what in ENVIRONMENTS.items()
-    }
-    return {"import": (0, "pass", "import seastar_gym"), **strokes, **steps}
+Clock = Callable[[Path, str], float]
+"""Processor time in a checkout [s], with the code in a folder."""
 
 
 def training(checkout: Path, cache: str) -> float:
@@ -285,24 +270,32 @@ def first_stroke(checkout: Path, cache: str) -> float:
         return process_seconds("pass", f"import seastar_gym as s; {swim}", empty, checkout=checkout)
 
 
-def of_thing(repeats: int, before: str, timed: str) -> Callable[[Path, str], float]:
-    """Least processor time of one of `things` in a checkout [s]."""
-    setup = f"import seastar_gym as s; {before}; {timed}" if repeats else before
-    return lambda checkout, cache: process_seconds(setup, timed, cache, max(1, repeats), checkout)
+def repeated(before: str, timed: str, repeats: int) -> Clock:
+    """Clock of code, the least of some repeats after a first time. before: What it needs."""
+    setup = f"import seastar_gym as s; {before}; {timed}"
+    return lambda checkout, cache: process_seconds(setup, timed, cache, repeats, checkout)
+
+
+def things() -> dict[str, tuple[int, Clock]]:
+    """What is timed in two checkouts: how often they take turns, and its clock."""
+    found: dict[str, tuple[int, Clock]] = {
+        "first stroke ever": (1, first_stroke),
+        "import": (MANY, lambda checkout, cache: process_seconds("pass", "import seastar_gym", cache, 1, checkout)),
+    }
+    for name, (fidelity, n_robots, repeats) in SWIMS.items():
+        swim = repeated(SWIM_OF.format(f"s.Scene.preset('{fidelity}')", n_robots), "swim(commands)", repeats)
+        found[name] = MANY if repeats > 10 else ROUNDS, swim
+    for id, what in ENVIRONMENTS.items():
+        step = repeated(STEP_OF.format(id), "env.step(env.action_space.sample())", 200)
+        found[f"one environment, {what}"] = MANY, step
+    return found | {"training of 4,096 strokes": (ROUNDS, training)}
 
 
 def history(beside: Path) -> dict[str, list[float]]:
     """Least processor times in another checkout and in this one [s], by what is timed."""
-    clocks = {
-        "first stroke ever": first_stroke,
-        **{name: of_thing(*how) for name, how in things().items()},
-        "training of 4,096 strokes": training,
-    }
-    quick = {name: repeats == 0 or repeats > 10 for name, (repeats, *_) in things().items()}
     found = {}
     with tempfile.TemporaryDirectory() as other, tempfile.TemporaryDirectory() as own:
-        for name, clock in clocks.items():
-            rounds = 1 if name == "first stroke ever" else MANY if quick.get(name) else ROUNDS
+        for name, (rounds, clock) in things().items():
             turns = [(clock(beside, other), clock(ROOT, own)) for _ in range(rounds)]
             found[name] = [rounded(min(times)) for times in zip(*turns, strict=True)]
             print(f"{name}: {found[name][0]:,.3g} and {found[name][1]:,.3g} s", flush=True)
@@ -310,7 +303,6 @@ def history(beside: Path) -> dict[str, list[float]]:
 
 
 # The study
-
 
 PARTS: dict[str, Callable[[float], Iterator[Row]]] = {"throughput": throughput, "start": cold_start}
 
@@ -332,21 +324,14 @@ class Options:
             raise ValueError(f"{self.beside} is no checkout of the project: it has no train.py.")
 
 
-def commit_of(checkout: Path) -> str:
-    """Short name of the commit in a folder; empty outside a checkout."""
-    words = ["git", "rev-parse", "--short=8", "HEAD"]
-    return subprocess.run(words, cwd=checkout, capture_output=True, text=True, check=False).stdout.strip()
-
-
 def run(options: Options, results: Results) -> None:
     """Time what is asked for, and add a row."""
-    found: dict[str, Any] = {name: value for name, value in provenance("").items() if name != "command"}
+    found: dict[str, Any] = {name: value for name, value in results.about.items() if name != "command"}
     found["commit"] = commit_of(ROOT)
     if options.beside is not None:
         found["beside"], found["seconds"] = commit_of(options.beside), history(options.beside.resolve())
     else:
-        rows = [each for part in options.parts for each in PARTS[part](options.seconds)]
-        found["figures"] = {what: [unit, *(rounded(each) for each in numbers)] for what, unit, *numbers in rows}
+        found["figures"] = dict(row for part in options.parts for row in PARTS[part](options.seconds))
     results.read()
     results.update(results.about)
     results.row(["runs"])[time.strftime("%Y-%m-%d %H:%M")] = found

@@ -18,9 +18,8 @@ from typing import Any
 import tyro
 
 from seastar_gym.files import write_atomically
-from studies.frame import Results, Study, require_known
+from studies.frame import Results, Study, provenance, require_known
 from studies.pages import show, stale
-from studies.provenance import provenance
 
 
 def names() -> list[str]:

@@ -1,7 +1,11 @@
 """What a study is, and the numbers that it keeps. A study is a module with `STUDY = Study(...)`."""
 
+import importlib.metadata
 import json
+import os
+import platform
 import re
+import subprocess
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.files import write_atomically
+from seastar_gym.version import __version__
 
 Floats = NDArray[np.float64]
 DOCS = Path(__file__).parents[1] / "docs"
@@ -94,9 +99,8 @@ class Results(dict[str, Any]):
                 self.update(self.about)
                 self.row(keys)[name] = found
                 self.save()
-                print(
-                    f"{', '.join([*keys[1:], name])}: {tell(found)} ({time.perf_counter() - began:.0f} s)", flush=True
-                )
+                took = time.perf_counter() - began
+                print(f"{', '.join([*keys[1:], name])}: {tell(found)} ({took:.0f} s)", flush=True)
 
     def row(self, keys: Sequence[str]) -> dict[str, Any]:
         """Cells that have these keys in common."""
@@ -104,6 +108,22 @@ class Results(dict[str, Any]):
         for key in keys:
             row = row.setdefault(key, {})
         return row
+
+
+def provenance(command: str) -> dict[str, Any]:
+    """Command, machine and versions."""
+    versions = {"seastar-gym": __version__, "python": platform.python_version()}
+    versions |= {name: importlib.metadata.version(name) for name in ("numpy", "numba", "llvmlite")}
+    lines = facts.read_text("utf-8").splitlines() if (facts := Path("/proc/cpuinfo")).is_file() else []
+    models = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    machine = f"{os.cpu_count()} cores of {next(models, platform.machine())}"
+    return {"command": command, "machine": machine, "versions": versions}
+
+
+def commit_of(checkout: Path = Path()) -> str:
+    """Short name of the commit in a folder; empty outside a checkout."""
+    words = ["git", "rev-parse", "--short=8", "HEAD"]
+    return subprocess.run(words, cwd=checkout, capture_output=True, text=True, check=False).stdout.strip()
 
 
 def require_known(kind: str, asked: Collection[str], known: Collection[str]) -> None:

@@ -214,13 +214,12 @@ def batches(preset: Fidelity, contact: bool, device: str) -> dict[str, dict[str,
         simulator = Simulator(scene, n_robots, device=device)
         first, *others = commands_of(scene, n_robots, 3)
         simulator.stroke(first)
-        taken, done = [], []
+        done = []
         for commands in others:
             began = time.perf_counter()
             report = simulator.stroke(commands)
-            taken.append(time.perf_counter() - began)
-            done.append((report.steps.sum(), report.newton_iterations.sum()))
-        seconds, (steps, iterations) = min(taken), done[int(np.argmin(taken))]
+            done.append((time.perf_counter() - began, report.steps.sum(), report.newton_iterations.sum()))
+        seconds, steps, iterations = min(done)
         row[str(n_robots)] = {
             "steps_per_second": rounded(steps / seconds), "seconds": rounded(seconds),
             "iterations_per_step": rounded(iterations / steps), "failed": int(simulator.failed.sum()),

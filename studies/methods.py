@@ -5,14 +5,13 @@ of another contract. Scores are measured between rules and oracle. --agreement c
 price of time.
 """
 
-import subprocess
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from agents.methods import METHODS
 from agents.tasks import file_of
@@ -21,13 +20,15 @@ from seastar_gym.controllers.learned import load
 from seastar_gym.evaluation import benchmark
 from seastar_gym.evaluation.benchmark import ENTRIES, EPISODES, GREEDY, ORACLE, REFERENCES, Cell, contract
 from seastar_gym.evaluation.rollout import measure_of_task
-from studies.frame import Results, Study, rounded
+from seastar_gym.files import save_figure
+from studies.frame import Results, Study, commit_of, provenance, rounded
 from studies.oracle import Planner, oracle_of
 from studies.pages import markdown, show
-from studies.provenance import provenance
 from studies.tasks import greedy
 
 AGENTS = {GREEDY: greedy, "planner": Planner, ORACLE: oracle_of}
+SHARES, PRICES = (0.0, 0.1, 0.3, 0.5), (0.0, 1.0)
+"""Shares of random actions, and prices of time [1/s], of the agreement."""
 
 
 @dataclass(frozen=True)
@@ -40,24 +41,18 @@ class Options:
     """Swim the greedy rules and the oracle, and write them into the package."""
     agreement: bool = False
     """Correlate returns with measures, of ids with a price of time."""
-    ids: tuple[str, ...] = tuple(ENTRIES)
-    """Environments that are swum."""
-
-    def __post_init__(self) -> None:
-        benchmark.require_ids(self.ids)
 
 
-def swim_references(ids: Sequence[str], file: Path = REFERENCES) -> None:
+def swim_references(file: Path = REFERENCES) -> None:
     """Swim what is missing of greedy rules and oracle, and write the file after each; all others stay."""
     known = {(cell.agent, cell.id): cell for cell in benchmark.cells_in(file)} if file.is_file() else {}
-    commit = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True).stdout.strip()
-    for (agent, make_agent), id in product(AGENTS.items(), ids):
+    for (agent, make_agent), id in product(AGENTS.items(), ENTRIES):
         if (agent, id) in known and known[agent, id].contract == contract(id):
             continue
         batch = benchmark.make(id, EPISODES, "test", 1)
         swum = benchmark.swum(batch, make_agent(batch))
         known[agent, id] = Cell(agent, "plain", id, 0, contract(id), 0, **swum)
-        about = provenance("python -m studies.methods --references") | {"commit": commit}
+        about = provenance("python -m studies.methods --references") | {"commit": commit_of()}
         benchmark.write([*known.values()], file, **about)
         print(f"{id}, {agent}: {np.mean(swum['measure']):.4g}, return {np.mean(swum['returns']):.4g}", flush=True)
 
@@ -70,16 +65,11 @@ class Perturbed:
     def __init__(self, policy: Policy, share: float, n_actions: int):
         self._policy, self._share, self._n, self._rng = policy, share, n_actions, np.random.default_rng(0)
 
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
-    ) -> Any:
+    def predict(self, observation: Any, *others: Any, **named: Any) -> Any:
         """Actions and state of the policy, some actions at random."""
-        actions, state = self._policy.predict(observation, state, episode_start, deterministic)
+        actions, state = self._policy.predict(observation, *others, **named)
         at_random = self._rng.random(len(actions)) < self._share
         return np.where(at_random, self._rng.integers(self._n, size=len(actions)), actions), state
-
-
-SHARES, PRICES = (0.0, 0.1, 0.3, 0.5), (0.0, 1.0)
 
 
 def agreement(id: str) -> list[str]:
@@ -106,15 +96,11 @@ def agreement(id: str) -> list[str]:
 def run(options: Options, results: Results) -> str | None:
     """Put the cells of all files together, or swim the references, or the agreement."""
     if options.references:
-        swim_references(options.ids)
+        swim_references()
         return None
     if options.agreement:
-        ids = [id for id in options.ids if ENTRIES[id].price is not None]
-        show(
-            markdown(
-                ["id", *(f"{price:g} per second" for price in PRICES)], [[f"`{id}`", *agreement(id)] for id in ids]
-            )
-        )
+        rows = [[f"`{id}`", *agreement(id)] for id, entry in ENTRIES.items() if entry.price is not None]
+        show(markdown(["id", *(f"{price:g} per second" for price in PRICES)], rows))
         return None
     places = list(METHODS)
     cells = benchmark.read(sorted(options.cells.glob("*/*/*.json")))
@@ -185,11 +171,8 @@ def check_table(found: Any) -> str:
 
 def draw_curves(found: Any, file: Path) -> None:
     """Mean score of every row against decisions, and against processor time."""
-    import matplotlib.pyplot as plt
-
-    from seastar_gym.files import save_figure
-
-    figure, axes = plt.subplots(1, 2, figsize=(9.0, 4.2), sharey=True, layout="constrained")
+    figure = Figure(figsize=(9.0, 4.2), layout="constrained")
+    axes = figure.subplots(1, 2, sharey=True)
     for row in (row for *_, rows in benchmark.groups(trained(found)) for row in rows):
         curves = [(id, cell.curve) for id, own in row.cells.items() for cell in own if id in benchmark.scales()]
         if not curves:
@@ -209,7 +192,6 @@ def draw_curves(found: Any, file: Path) -> None:
     axes[1].set(xlabel="processor time of a training [s]")
     figure.legend(*axes[0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=3)
     save_figure(figure, file)
-    plt.close(figure)
 
 
 STUDY = Study(

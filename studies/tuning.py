@@ -105,11 +105,8 @@ def tuning_table(found: Any) -> str:
     return markdown([*head, "exploration", "ten draws [s]"], lines, (0, 1))
 
 
-def settings(options: Options) -> dict[str, Any]:
-    """What all trainings have in common, and what was drawn."""
-    return {"id": ID, "decisions": options.decisions, "draws": {name: list(draw) for name, draw in draws().items()}}
-
-
 STUDY = Study(
-    "tuning", run, Options, "benchmark/tuning.json", settings=settings, tables={"benchmark tuning": tuning_table}
-)
+    "tuning", run, Options, "benchmark/tuning.json", tables={"benchmark tuning": tuning_table},
+    settings=lambda options: {"id": ID, "decisions": options.decisions,
+                              "draws": {name: list(draw) for name, draw in draws().items()}},
+)  # fmt: skip
