@@ -5,14 +5,13 @@ in the continuum's discretisation. The pictures show the first (orange) and the 
 with 73 nodes, too. The statements are printed; distances and motions are written to `chapter.json`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
@@ -26,9 +25,6 @@ from studies.frame import Floats, Results, Study, rounded
 from studies.pages import markdown, show
 from studies.style import FAINT, INK, MM, MS, new_figure, subplots
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 REAL_TIME_FROM, ISSUES_FROM = 3e-3, 20e-3
 """Time steps [s] from which the chapter's code runs faster than real time, and from which it reports numerical issues.
 """
@@ -37,6 +33,12 @@ BISECTORS = (36.0, 72.0, 108.0, 144.0)
 """Directions of the pairs' bisectors at rest, on the side that they swim to [degrees]."""
 SIDE = gaits.SWIMMING_STROKES + gaits.RESTING_STROKES
 """Strokes on a side of the pentagon, swimming and resting."""
+STEPS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 40.0]) * 1e-3
+"""Time steps of Fig. 13.9 [s]."""
+BATCH = 64
+"""Robots in the batch whose cost is measured."""
+COLUMNS = ("its setting", "its ten nodes, converged", "continuum", "73 nodes")
+"""Columns of values. Of the cost, the second is empty; the last has the pairs only."""
 
 # Swims
 
@@ -129,10 +131,6 @@ def stroke_motion(straight: Swim, stroke: int = -1) -> tuple[float, float, float
     heated = int(np.searchsorted(since, straight.scene.actuator.corners[1] - 1e-9))
     farthest = int(np.argmax(x))
     return x[heated] - x[0], x[farthest] - x[heated], x[farthest] - x[-1], float(since[farthest])
-
-
-BATCH = 64
-"""Robots in the batch whose cost is measured."""
 
 
 class Cost(NamedTuple):
@@ -247,10 +245,6 @@ def cost_statements(costs: Sequence[Cost]) -> list[Statement]:
     ]
 
 
-COLUMNS = ("its setting", "its ten nodes, converged", "continuum", "73 nodes")
-"""Columns of values. Of the cost, the second is empty; the last has the pairs only."""
-
-
 def as_table(statements: Iterable[Statement]) -> str:
     """Statements as a table in Markdown."""
     rows = []
@@ -263,7 +257,6 @@ def as_table(statements: Iterable[Statement]) -> str:
 
 # Pictures
 
-
 LIMB, ACTUATED = "#9aa1ab", "#1f4fd8"
 ORANGE = "#e07b00"
 CONTINUUM: dict[str, Any] = {"color": INK, "linestyle": "-", "linewidth": 1.3, "zorder": 2.2}
@@ -272,10 +265,13 @@ CONTINUUM_PATH: dict[str, Any] = {"color": INK, "linewidth": 2.4, "zorder": 3.5}
 CHAPTER_PATH: dict[str, Any] = {"color": ORANGE, "linewidth": 1.1, "zorder": 3.6}
 """Line of the chapter's paths. It is solid, because a robot swims back and forth and dashes would overlap."""
 PAIR_COLOURS = ("#0072b2", "#009e73", "#cc3d7a", "#8c6d1f")
-
-
+PAIR_LABELS = ((42.0, 22.0), (26.0, 50.0), (-18.0, 60.0), (-46.0, 12.0))
+"""Positions of the pairs' names [mm]."""
 NUMBERS = 8.0
 """Distance of a limb's number from its tip [mm]."""
+STRAIGHT_TIMES, PENTAGON_TIMES = (0.0, 2.2, 5.5, 10.0), (22.1, 72.1, 122.1, 172.1, 222.1)
+"""Times of the snapshots in Figs. 13.6 and 13.2 [s]; in the latter in the middle of every side, when limbs are rotated
+farthest."""
 
 
 def draw_robot(axes: Axes, swim: Swim, time: float, beyond: float = NUMBERS) -> None:
@@ -289,10 +285,6 @@ def draw_robot(axes: Axes, swim: Swim, time: float, beyond: float = NUMBERS) -> 
         x, y = line[-1] + beyond * (line[-1] - line[-2]) / np.hypot(*(line[-1] - line[-2]))
         axes.text(x, y, f"{limb + 1}", color=INK, fontsize=8, ha="center", va="center", zorder=6.0)
     axes.plot(*nodes[0], marker="o", markersize=4.5, color=INK, zorder=5.0)
-
-
-STRAIGHT_TIMES = (0.0, 2.2, 5.5, 10.0)
-"""Times of the snapshots in Fig. 13.6 [s]."""
 
 
 def draw_straight(continuum: Swim, chapter: Swim, file: Path) -> None:
@@ -332,10 +324,6 @@ def draw_straight(continuum: Swim, chapter: Swim, file: Path) -> None:
     panels["b"].legend(loc="upper left", fontsize=9)
     figure.align_ylabels([panels["b"], panels["c"]])
     save_figure(figure, file)
-
-
-PENTAGON_TIMES = (22.1, 72.1, 122.1, 172.1, 222.1)
-"""Times of the snapshots in Fig. 13.2 [s]: in the middle of every side, when limbs are rotated farthest."""
 
 
 def draw_pentagon_snapshots(continuum: Swim, chapter: Swim, file: Path) -> None:
@@ -385,10 +373,6 @@ def draw_pentagon(continuum: Swim, chapter: Swim, file: Path) -> None:
     axes.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]", xlim=(-85.0, 240.0), ylim=(-50.0, 305.0))
     axes.legend(loc="upper center", fontsize=9)
     save_figure(figure, file)
-
-
-PAIR_LABELS = ((42.0, 22.0), (26.0, 50.0), (-18.0, 60.0), (-46.0, 12.0))
-"""Positions of the pairs' names [mm]."""
 
 
 def draw_pairs(continuum: Swim, chapter: Swim, names: Sequence[str], file: Path) -> None:
@@ -454,9 +438,6 @@ def draw_cost(costs: Sequence[Cost], file: Path) -> None:
 
 
 # The study
-
-STEPS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 40.0]) * 1e-3
-"""Time steps of Fig. 13.9 [s]."""
 
 
 @dataclass(frozen=True)

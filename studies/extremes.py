@@ -3,12 +3,12 @@
 Every fidelity has its own nodes and numerics. Robots begin at rest, or with random velocities or shifts of their nodes.
 """
 
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from seastar_gym.accuracy.certificate import at
 from seastar_gym.scene import Scene, SmaPulse
 from seastar_gym.scene.numerics import PRESETS, Fidelity
 from seastar_gym.simulator import Simulator
@@ -27,14 +27,13 @@ def cases() -> list[Case]:
 
 def swum(fidelity: Fidelity) -> dict[str, Any]:
     """Numbers of a fidelity over all scenes; iterations are Newton's, per time step of a stroke."""
-    discretisation, nodes, numerics = PRESETS[fidelity]
     robots, failed, halved, iterations = 0, 0, 0, []
     for case in cases():
-        robot = replace(case.robot, discretisation=discretisation, nodes_per_limb=nodes)
+        scene = at(Scene(case.robot, case.fluid, SmaPulse(case.peak_angle)), PRESETS[fidelity])
         commands, rng = case.commands(), np.random.default_rng(3)
-        simulator = Simulator(Scene(robot, case.fluid, SmaPulse(case.peak_angle), numerics), len(commands))
+        simulator = Simulator(scene, len(commands))
         disturb(simulator, case.speed, case.shift)
-        steps = len(step_times(simulator.scene.actuator.corners, numerics.step)) - 1  # without substeps
+        steps = len(step_times(scene.actuator.corners, scene.numerics.step)) - 1  # without substeps
         for _ in range(STROKES):
             report = simulator.stroke(commands)
             halved += int((report.halvings > 0).sum())

@@ -11,8 +11,6 @@ Prints and keeps a summary, and draws what the solver needed to converge, Newton
 the hub's path.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import os
@@ -20,9 +18,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap, LogNorm
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import EngFormatter
 from tqdm import tqdm
 
 from seastar_gym.files import save_figure
@@ -35,9 +39,6 @@ from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
 from studies.frame import Floats, Results, Study
 from studies.pages import markdown
 from studies.style import FAINT, INK, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 STEPS = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 2e-2, 5e-2, 1e-1, 3e-1, 1.0)
 """Time steps of the atlas [s]."""
@@ -132,13 +133,6 @@ def format_value(value: float | None) -> str:
     if value >= 1e4:
         return "10" + str(round(math.log10(value))).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"{value:g}"
-
-
-def format_step(step: float) -> str:
-    """Text of a time step [s] in the unit that makes it a number from 1 to 999."""
-    if step < 1e-3:
-        return f"{1e6 * step:g} µs"
-    return f"{1e3 * step:g} ms" if step < 1.0 else f"{step:g} s"
 
 
 # A cell of the atlas
@@ -276,15 +270,8 @@ def atlas(sweeps: Sequence[Sweep], steps: Sequence[float], scheme: SchemeName = 
                 bar.update()
         return cells
 
-    def weight(sweep: Sweep, value: float | None) -> float:
-        case = sweep.case(value)
-        return float(case.robot.n_nodes * len(case.commands()))
-
     with bar, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        # The longest columns go first, so that no thread is left with one of them at the end.
-        order = sorted(range(len(columns)), key=lambda k: -weight(*columns[k]))
-        found = dict(zip(order, pool.map(lambda k: column(*columns[k]), order), strict=True))
-    return [cell for k in range(len(columns)) for cell in found[k]]
+        return [cell for cells in pool.map(lambda each: column(*each), columns) for cell in cells]
 
 
 # The summary
@@ -359,11 +346,11 @@ class Numbers(NamedTuple):
 NUMBERS = {
     "iterations": Numbers(
         "Newton iterations per time step", "Newton iterations per time step", lambda cell: cell.iterations,
-        "viridis_r", (1.0, 300.0), "{:g}",
+        "viridis_r", (1.0, 300.0), "{x:g}",
     ),
     "error": Numbers(
         "error of the hub's path against the converged run", "error of the hub's path",
-        lambda cell: 100.0 * cell.error, "magma_r", (0.01, 100.0), "{:g} %", "no converged run",
+        lambda cell: 100.0 * cell.error, "magma_r", (0.01, 100.0), "{x:g} %", "no converged run",
     ),
 }  # fmt: skip
 """What pictures show beside the needs of the solver, by the ends of their names."""
@@ -378,10 +365,6 @@ def need(cell: Cell) -> float:
 
 def draw(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], scheme: str, file: Path) -> None:
     """Write the picture that a file's name ends with, such as stability_needs.png."""
-    from matplotlib.colors import ListedColormap, LogNorm
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
     numbers = NUMBERS.get(file.stem.rpartition("_")[2])
     columns, rows = min(4, len(sweeps)), math.ceil(len(sweeps) / min(4, len(sweeps)))
     figure = new_figure(3.1 * columns + 0.3, 2.75 * rows + 1.2)
@@ -409,13 +392,9 @@ def draw(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float],
     if numbers is None:
         patches = [Patch(color=colour, label=each) for each, colour in NEEDS.items()]
     else:
-        bar = figure.colorbar(
-            image, cax=foot.inset_axes((0.0, 0.55, 0.5, 0.3)), orientation="horizontal", extend="both"
-        )
-        low, high = map(math.log10, numbers.limits)
-        ticks = [10.0**k for k in range(round(low), math.floor(high) + 1)]
-        bar.set_ticks(ticks, labels=[numbers.tick.format(value) for value in ticks])
-        bar.set_label(numbers.label)
+        place = foot.inset_axes((0.0, 0.55, 0.5, 0.3))
+        look = {"orientation": "horizontal", "extend": "both", "format": numbers.tick, "label": numbers.label}
+        bar = figure.colorbar(image, cax=place, **look)
         bar.ax.minorticks_off()
         patches = [Patch(facecolor=EMPTY, label=numbers.missing)] if numbers.missing else []
     marks = [
@@ -431,14 +410,11 @@ def draw(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float],
 
 def finish(axes: Axes, sweep: Sweep, steps: Sequence[float], refused: Iterable[tuple[float | None, float]]) -> None:
     """Add ticks, a title, the marks of the chapter, and hatching over refused cells."""
-    from matplotlib.patches import Rectangle
-    from matplotlib.patheffects import withStroke
-
     halo = [withStroke(linewidth=3.2, foreground="white")]  # lines then show on any colour
     axes.set_facecolor(EMPTY)
     for value, step in refused:
         axes.add_patch(Rectangle((steps.index(step), sweep.values.index(value)), 1, 1, linewidth=0.0, **REFUSED))
-    axes.set_xticks(np.arange(len(steps)) + 0.5, [format_step(step) for step in steps], rotation=90)
+    axes.set_xticks(np.arange(len(steps)) + 0.5, [EngFormatter("s")(step) for step in steps], rotation=90)
     axes.set_yticks(np.arange(len(sweep.values)) + 0.5, [format_value(value) for value in sweep.values])
     axes.tick_params(length=0, labelsize=8)
     axes.set_title(f"{sweep.label} [{sweep.unit}]" if sweep.unit else sweep.label, loc="left")

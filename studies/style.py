@@ -1,14 +1,11 @@
 """Style of all studies' pictures: a picture begins with `subplots` or `new_figure`, and `save_figure` writes it."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
+import matplotlib.style
 import numpy as np
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from matplotlib.figure import Figure
 
 INK, FAINT = "#1b1f26", "#80868f"
 CYCLE = ("#3366aa", "#cc7a00", "#118855", "#cc3355", "#8844aa", "#5aa2d6")
@@ -19,9 +16,6 @@ MM, MS = 1e3, 1e3
 
 def new_figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
     """Empty figure. width, height: Size [inches]."""
-    import matplotlib.style
-    from matplotlib.figure import Figure
-
     matplotlib.style.use(Path(__file__).with_suffix(".mplstyle"))
     return Figure(figsize=(width, height), layout=layout)
 
