@@ -14,7 +14,7 @@ from seastar_gym.controllers.learned import bundled_file, load
 from seastar_gym.controllers.open_loop import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.films import Picture, shrunk, write_gif
-from seastar_gym.evaluation.rollout import Info, rollout
+from seastar_gym.evaluation.rollout import rollout
 from studies.frame import Results, Study
 
 LOOKS, BETWEEN = 0.2, 1.2
@@ -27,27 +27,17 @@ REST = 7
 """Frames for which the film rests on its end."""
 
 
-def frames(policy: Policy, per_decision: int, most: int | None = None, **arguments: Any) -> list[Picture]:
-    """Pictures of a swim round the pentagon every BETWEEN seconds, `most` of them at most, and that of its end.
+def frames(policy: Policy, per_decision: int, **arguments: Any) -> list[Picture]:
+    """Pictures of a swim round the pentagon every BETWEEN seconds, and that of its end.
 
     per_decision: Number of looks in a decision.
     """
     each = round(BETWEEN / LOOKS)
     env = SeastarSwimEnv(render_mode="rgb_array_list", frames_per_stroke=per_decision, **arguments)
     drawn = list[Picture]()
-
-    def look(info: Info) -> bool:
-        drawn.extend(map(shrunk, env.render() or []))
-        return most is not None and len(drawn) > each * most
-
-    rollout(env, policy, seeds=0, on_step=look)
+    rollout(env, policy, seeds=0, on_step=lambda info: drawn.extend(map(shrunk, env.render() or [])))
     env.close()
-    return [*drawn[each::each], drawn[-1]][:most]  # the first picture is of the robot at rest
-
-
-def side_by_side(left: list[Picture], right: list[Picture]) -> list[Picture]:
-    """Pictures beside each other, until one of the swims is over."""
-    return [np.concatenate(both, axis=1) for both in zip(left, right, strict=False)]
+    return [*drawn[each::each], drawn[-1]]  # the first picture is of the robot at rest
 
 
 def named(picture: Picture, name: str) -> Picture:
@@ -65,11 +55,10 @@ def run(results: Results) -> None:
     # As `seastar swim` shows it, and at the same fidelity as the other.
     period = policy.decision_period
     learned = frames(policy, 1, actions=policy.actions, fidelity="balanced", decision_period=period)
-    chapter = frames(gait, round(1.0 / LOOKS), len(learned), actions=gait.actions, fidelity="balanced")
-    film = side_by_side(
-        [named(picture, "scripted gait, every second") for picture in chapter],
-        [named(picture, "PPO policy, every 0.2 s") for picture in learned],
-    )
+    chapter = frames(gait, round(1.0 / LOOKS), actions=gait.actions, fidelity="balanced")
+    left = [named(picture, "scripted gait, every second") for picture in chapter]
+    right = [named(picture, "PPO policy, every 0.2 s") for picture in learned]
+    film = [np.concatenate(both, axis=1) for both in zip(left, right, strict=False)]  # until one swim is over
     write_gif(film + [film[-1]] * REST, results.out, FPS)
     print(f"Written: {results.out}, {len(film)} frames of {BETWEEN} s.")
 

@@ -93,17 +93,16 @@ def errors(numbers: Measured, curves: Sequence[Curve]) -> Floats:
 def fit(curves: Sequence[Curve], starts: int = STARTS) -> Measured:
     """Numbers of the least squares, of logarithms within their ranges."""
     lowest, guess, highest = np.log([LOWEST, GUESS, HIGHEST])
-    rng, best = np.random.default_rng(0), None
-    for start in range(starts):
-        drawn = guess + (0.4 * rng.standard_normal(len(guess)) if start else 0.0)
-        found = least_squares(
+    drawn = guess + 0.4 * np.random.default_rng(0).standard_normal((starts - 1, len(guess)))
+    found = [
+        least_squares(
             lambda logs: residuals(Measured(*np.exp(logs)), curves).ravel(),
-            np.clip(drawn, lowest + 1e-6, highest - 1e-6),
+            np.clip(start, lowest + 1e-6, highest - 1e-6),
             bounds=(lowest, highest), x_scale="jac", max_nfev=200,
-        )  # fmt: skip
-        best = found if best is None or found.cost < best.cost else best
-    assert best is not None
-    return Measured(*np.exp(best.x).tolist())
+        )
+        for start in (guess, *drawn)
+    ]  # fmt: skip
+    return Measured(*np.exp(min(found, key=lambda each: each.cost).x).tolist())
 
 
 def run(results: Results) -> None:

@@ -168,9 +168,7 @@ def _file_name(exhibit: Exhibit) -> str:
 
 def run(results: Results) -> None:
     """Draw the pictures into docs/gallery, or where --out says, and measure the costs."""
-    folder = results.out.parent if results.out.suffix else results.out
-    folder = Path("docs/gallery") if results.out == STUDY.default_out else folder
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = Path("docs/gallery") if results.out == STUDY.default_out else results.folder
     for exhibit in EXHIBITS:
         draw(exhibit, folder / _file_name(exhibit))
     found = zip(EXHIBITS, *measure_costs(EXHIBITS), strict=True)

@@ -5,13 +5,14 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
+from PIL import Image
 
 from seastar_gym import TASKS
 from seastar_gym.controllers.learned import bundled_for, load
 from seastar_gym.controllers.registry import load_agent
 from seastar_gym.envs import IDS
 from seastar_gym.evaluation.films import Picture, shrunk, write_gif
-from seastar_gym.evaluation.rollout import Info, rollout
+from seastar_gym.evaluation.rollout import Info, env_of, rollout
 from seastar_gym.files import write_atomically
 from studies.frame import Results, Study
 
@@ -26,7 +27,7 @@ INSTANCE = 0
 def agent(id: str) -> Any:
     """The bundled policy of an id; where there is none, the gait round a pentagon."""
     file = bundled_for(id)
-    return load(file) if file else load_agent("pentagon", gym.make(id, fidelity="fast").unwrapped)  # type: ignore[arg-type]
+    return load(file) if file else load_agent("pentagon", env_of(id, fidelity="fast"))
 
 
 def frames(id: str) -> list[Picture]:
@@ -48,8 +49,6 @@ def frames(id: str) -> list[Picture]:
 
 def png(shown: Picture) -> bytes:
     """PNG of a picture in 256 colours."""
-    from PIL import Image
-
     file = io.BytesIO()
     Image.fromarray(shown).quantize(dither=Image.Dither.NONE).save(file, "PNG", optimize=True)
     return file.getvalue()

@@ -3,8 +3,8 @@
     python -m studies.mutants --count 300 --kernels 120 --seed 1
 
 draws mutants of the package by a seed, from its rooms in turn, and writes one after the other into a copy of the
-repository. Each meets tests of its room, or those that are named: the core, and if it lives, with --all. A line of JSON
-says what came of it. What has its line is not run again, so the study can be broken off and continued.
+repository. Each meets the tests of its room: the core, and if it lives, with --all. A line of JSON says what came of
+it. What has its line is not run again, so the study can be broken off and continued.
 """
 
 import ast
@@ -66,7 +66,7 @@ def drawn(root: Path, count: int, kernels: int, seed: int) -> list[Mutant]:
 
 @dataclass(frozen=True)
 class Options:
-    """Which mutants are drawn, and which tests they meet."""
+    """Which mutants are drawn."""
 
     count: int = 300
     """Number of mutants."""
@@ -74,8 +74,6 @@ class Options:
     """How many of them are of kernels."""
     seed: int = 0
     """Which are drawn."""
-    tests: tuple[str, ...] = ()
-    """Files or folders of tests. None are those of the room of a mutant."""
 
 
 def passes(root: Path, *words: str, **environment: str) -> bool:
@@ -85,14 +83,13 @@ def passes(root: Path, *words: str, **environment: str) -> bool:
     return subprocess.run(command, cwd=root, env=own, capture_output=True, check=False).returncode == 0
 
 
-def killed_by(root: Path, file: str, tests: tuple[str, ...]) -> str:
+def killed_by(root: Path, file: str) -> str:
     """By what a mutant is killed: core, all or nothing. Code of a mutated kernel has a folder of its own."""
     room = f"tests/{Path(file).parts[1]}"
-    tests = tests or (room if (root / room).exists() else "tests",)
+    tests = room if (root / room).exists() else "tests"
     with tempfile.TemporaryDirectory() as cache:
         own = {"NUMBA_CACHE_DIR": cache} if root / file in kernel_sources(root / PACKAGE) else {}
-        runs = {"core": (*tests, "--core"), "all": (*tests, "--all")}
-        return next((by for by, words in runs.items() if not passes(root, *words, **own)), "nothing")
+        return next((by for by in ("core", "all") if not passes(root, tests, f"--{by}", **own)), "nothing")
 
 
 def run(options: Options, results: Results) -> None:
@@ -102,7 +99,7 @@ def run(options: Options, results: Results) -> None:
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder).resolve()
         subprocess.run(["git", "checkout-index", "--all", f"--prefix={root}/"], check=True)
-        if not passes(root, "--collect-only", *options.tests):
+        if not passes(root, "--collect-only"):
             raise ValueError("Without a change the tests cannot be collected.")
         for mutant in drawn(root, options.count, options.kernels, options.seed):
             name, (before, after, text) = mutant[0], changed(root, *mutant)
@@ -110,7 +107,7 @@ def run(options: Options, results: Results) -> None:
             if json.dumps(told)[:-1] not in known:
                 original, began = (root / name).read_bytes(), time.perf_counter()
                 (root / name).write_text(text, encoding="utf-8")
-                told |= {"killed by": killed_by(root, name, options.tests), "seconds": time.perf_counter() - began}
+                told |= {"killed by": killed_by(root, name), "seconds": time.perf_counter() - began}
                 (root / name).write_bytes(original)
                 with file.open("a", encoding="utf-8") as lines:
                     print(json.dumps(told), file=lines)

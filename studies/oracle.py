@@ -8,7 +8,7 @@ is told the true state and nothing else that is hidden.
 import itertools
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -41,6 +41,10 @@ AHEAD = np.arange(0.0, 201.0)
 """Times at which a prey is foreseen [s]."""
 NEVER = 1e3
 """Time that a prey counts that is not met [s]."""
+SIGHTED = Path("runs/oracle")
+"""Folder of policies with full sight."""
+DECISIONS = 800_000
+"""Length of their trainings, by PPO as shipped with symmetry reduction."""
 
 
 class Search(NamedTuple):
@@ -65,22 +69,17 @@ class Oracle:
         inner = batch.unwrapped
         self.robots: Robots = inner._robots
         self._numbers = {command.tobytes(): number for number, command in enumerate(inner.command_table + 0.0)}
-        self._simulators: dict[int, Simulator] = {}
-        self._search: Search | None = None
+        self._simulator = cache(self._made)
 
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
-    ) -> Any:
+    def predict(self, observation: Any, *_: Any, **__: Any) -> Any:
         """Actions of all robots, and None."""
-        robots = self.robots
-        if self._search is None:
-            self._search = self.search()
-        best = self._best(robots.simulator.get_state(), self.cost(), self._search)
-        chosen = self.wired(self._search.commands[np.arange(robots.n_robots), best])
+        best = self._best(self.robots.simulator.get_state(), self.cost(), self.search)
+        chosen = self.wired(self.search.commands[np.arange(self.robots.n_robots), best])
         return np.array([self._numbers[command.tobytes()] for command in chosen + 0.0]), None
 
+    @cached_property
     def search(self) -> Search:
-        """What is tried before every decision."""
+        """What is tried before every decision, in the episodes that had begun at the first."""
         return search_of(self.robots)
 
     def cost(self) -> Cost:
@@ -113,13 +112,8 @@ class Oracle:
                 first, total = np.repeat(first[each, kept], k, axis=1), np.repeat(total[each, kept], k, axis=1)
         return np.asarray(first[each[:, 0], np.argmin(total, axis=1)])
 
-    def _simulator(self, copies: int) -> Simulator:
-        """Simulator of so many copies of every robot."""
-        if copies not in self._simulators:
-            self._simulators[copies] = self._made(copies)
-        return self._simulators[copies]
-
     def _made(self, copies: int) -> Simulator:
+        """Simulator of so many copies of every robot."""
         robots = self.robots
         drawn = {name: np.repeat(values, copies, axis=0) for name, values in robots.drawn.items()}
         made = Simulator(drawn_scene(robots._drawn_from, drawn), copies * robots.n_robots, 1)
@@ -133,6 +127,7 @@ class Planner(Oracle):
     Robots are as designed, in still water and wired as they should be, and a prey stays where it is.
     """
 
+    @cached_property
     def search(self) -> Search:
         if isinstance(self.robots.task, FailBlind):
             pairs = command_table("pairs", self.robots.scene.robot.n_limbs)
@@ -153,12 +148,6 @@ class Planner(Oracle):
         return Simulator(self.robots.scene, copies * self.robots.n_robots, 1)
 
 
-SIGHTED = Path("runs/oracle")
-"""Folder of policies with full sight."""
-DECISIONS = 800_000
-"""Length of their trainings, by PPO as shipped with symmetry reduction."""
-
-
 class Sighted:
     """Policy of the robots of a batch that are seen by a camera, which sees their true state."""
 
@@ -168,9 +157,7 @@ class Sighted:
         self._batch = batch.unwrapped
         self._policy = learned_with_sight()
 
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
-    ) -> Any:
+    def predict(self, observation: Any, *_: Any, **__: Any) -> Any:
         """Actions of all robots, and None."""
         return self._policy.predict(self._batch.privileged_observations(), deterministic=True)[0], None
 

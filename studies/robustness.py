@@ -5,20 +5,18 @@ The bundled policies swim held-out random paths at "fast", all in the same robot
 A swim that does not arrive within the limit counts with the limit.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy, bundled_file, load
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import make_scene
-from seastar_gym.envs.sight import Sight
+from seastar_gym.envs.sight import Sees, Sight
 from seastar_gym.evaluation.swim import HELD_OUT_SEED, TIME_LIMIT, swim_many
-from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from studies.frame import Results, Study
 from studies.pages import markdown
@@ -68,42 +66,33 @@ class Seeing:
         self.policy, self.actions, self.condition = policy, policy.actions, condition
         self.age, self.velocities = layout.waypoints.start, slice(layout.velocities.start, layout.hub_velocity.stop)
 
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
-    ) -> tuple[Any, Any]:
+    def predict(self, observation: Any, *others: Any, **named: Any) -> tuple[Any, Any]:
         """As the policy does."""
         seen = np.delete(observation, self.age, axis=1)
         if not self.condition.moves:
             seen[:, self.velocities] = 0.0
-        return self.policy.predict(seen, state, episode_start, deterministic)
-
-
-def robot_of(condition: Condition, period: float | None) -> Scene:
-    """Scene of a condition."""
-    scene = make_scene(None, FIDELITY, period)
-    return replace(scene, robot=replace(scene.robot, youngs_modulus=condition.modulus * scene.robot.youngs_modulus))
-
-
-def swum(policy: Policy, condition: Condition, period: float | None, sees: str) -> dict[str, Any]:
-    """Mean time [s] of the swims of a policy, and how many arrive. sees: As of a `Sight`."""
-    sight = Sight(RATE, condition.delay, noise=condition.noise, sees=sees)  # type: ignore[arg-type]
-    swims = swim_many(
-        "learned", policy, "random", N_PATHS, robot_of(condition, period), seed=HELD_OUT_SEED,
-        decision_period=period, action_delay=condition.action_delay, sight=sight,
-    )  # fmt: skip
-    times = [float(swim.time[-1]) if swim.finished else TIME_LIMIT for swim in swims]
-    return {"mean": float(np.mean(np.round(times, 1))), "arrived": sum(swim.finished for swim in swims)}
+        return self.policy.predict(seen, *others, **named)
 
 
 def examine(name: str, condition: Condition) -> dict[str, Any] | None:
-    """Swims of the bundled policy of a column; None where a condition does not apply."""
+    """Mean time [s] of the swims of the bundled policy of a column, and how many arrive.
+
+    None where a condition does not apply.
+    """
     period = PERIODS[name]
     if (period is None and condition.action_delay) or (name == CAMERA and not condition.moves):
         return None
-    if name == CAMERA:
-        return swum(load(bundled_file(period, task="sim-to-real")), condition, period, "pose")
-    layout = Layout.of(robot_of(condition, period))
-    return swum(Seeing(load(bundled_file(period)), condition, layout), condition, period, "nodes")
+    sees: Sees = "pose" if name == CAMERA else "nodes"
+    scene = make_scene(None, FIDELITY, period)
+    scene = replace(scene, robot=replace(scene.robot, youngs_modulus=condition.modulus * scene.robot.youngs_modulus))
+    policy = load(bundled_file(period, task="sim-to-real" if name == CAMERA else None))
+    swims = swim_many(
+        "learned", policy if name == CAMERA else Seeing(policy, condition, Layout.of(scene)), "random", N_PATHS, scene,
+        seed=HELD_OUT_SEED, decision_period=period, action_delay=condition.action_delay,
+        sight=Sight(RATE, condition.delay, noise=condition.noise, sees=sees),
+    )  # fmt: skip
+    times = [float(swim.time[-1]) if swim.finished else TIME_LIMIT for swim in swims]
+    return {"mean": float(np.mean(np.round(times, 1))), "arrived": sum(swim.finished for swim in swims)}
 
 
 def table(results: Mapping[str, Any]) -> str:
@@ -121,8 +110,7 @@ def table(results: Mapping[str, Any]) -> str:
 
 def run(results: Results) -> None:
     """Swim what is missing."""
-    results.read()
-    cells: dict[tuple[str, ...], Callable[[], Any]] = {
+    cells = {
         ("policies", column, name): partial(examine, column, condition)
         for column in PERIODS
         for name, condition in CONDITIONS.items()

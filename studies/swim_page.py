@@ -19,7 +19,7 @@ from seastar_gym.envs.headings import wrapped
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.rendering import limb_nodes
 from seastar_gym.envs.stations import heading_of
-from seastar_gym.evaluation.playback import RecordingEnv
+from seastar_gym.evaluation.playback import UNIT, RecordingEnv
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene
@@ -28,8 +28,6 @@ from seastar_gym.simulator import Simulator
 from studies.frame import Floats, Results, Study
 
 TEMPLATE = Path(__file__).with_suffix(".html")
-UNIT = 1e-4
-"""[m]: positions are kept as whole numbers of tenths of a millimetre."""
 FRAMES_PER_SECOND = 10
 SEEN = 6
 """Nodes of a limb that the page draws, without the hub."""

@@ -1,6 +1,5 @@
 """Greedy rules of the tasks, on the held-out episodes of docs/control.md, whose column "greedy" is printed."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +15,11 @@ from seastar_gym.envs.tasks.obst_trap import ObstTrap, rims
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.station import Station
-from seastar_gym.evaluation.rollout import RECORDED, Batch, make_batch, measure_of_task, rollout
+from seastar_gym.envs.waypoints import length
+from seastar_gym.evaluation.benchmark import swum
+from seastar_gym.evaluation.rollout import Batch, make_batch
 from seastar_gym.scene.numerics import Fidelity
-from studies.frame import Floats, Results, Study, require_known
+from studies.frame import Floats, Results, Study
 from studies.pages import markdown, show
 
 FIDELITY: Fidelity = "fast"
@@ -32,11 +33,6 @@ Floats32 = NDArray[np.float32]
 
 
 # Greedy rules
-
-
-def length(vectors: Floats) -> Floats:
-    """Length over the last axis."""
-    return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
 
 
 class OnRoute(Searcher):
@@ -103,28 +99,13 @@ def greedy(batch: Batch) -> Policy:
 
 def held_out(id: str, n: int = HELD_OUT) -> float:
     """Mean measure of the greedy rule over the first held-out episodes of a task."""
-    batch: Any = make_batch(id, n, split="test", fidelity=FIDELITY)
-    done = rollout(batch, greedy(batch), seeds=0, record=RECORDED, options={"instance": np.arange(n)})
-    batch.close()
-    inner = batch.unwrapped
-    limited = done._replace(limit=inner.max_episode_steps * inner.decision_period)
-    return float(measure_of_task(inner.task).of(limited).mean())
+    batch = make_batch(id, n, split="test", fidelity=FIDELITY)
+    return float(np.mean(swum(batch, greedy(batch))["measure"]))
 
 
-@dataclass(frozen=True)
-class Options:
-    """Greedy rules of the tasks, on the held-out episodes of docs/control.md."""
-
-    tasks: tuple[str, ...] = tuple(TASKS)
-    """Environments."""
-
-    def __post_init__(self) -> None:
-        require_known("task", self.tasks, TASKS)
-
-
-def run(options: Options, results: Results) -> None:
+def run(results: Results) -> None:
     """Measure the greedy rules; prints the column of the page."""
-    show(markdown(["task", "greedy"], [[id, f"{held_out(id):.3g}"] for id in options.tasks]))
+    show(markdown(["task", "greedy"], [[id, f"{held_out(id):.3g}"] for id in TASKS]))
 
 
-STUDY = Study("tasks", run, Options, out=Path("runs/tasks"))
+STUDY = Study("tasks", run, out=Path("runs/tasks"))

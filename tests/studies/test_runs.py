@@ -48,7 +48,9 @@ SHORTEST = {
                                "CONDITIONS": {"soft": robustness.Condition(modulus=0.5)}},
     }),
     "swim_page": ({""}, {"studies.swim_page": {"record": partial(swim_page.record, "fast", 1)}}),
-    "tasks --tasks SeastarPrizes-v0": (set(), {"studies.tasks": {"held_out": partial(tasks.held_out, n=2)}}),
+    "tasks": (set(), {
+        "studies.tasks": {"TASKS": ["SeastarPrizes-v0"], "held_out": partial(tasks.held_out, n=2)},
+    }),
 }  # fmt: skip
 """Commands, files that they write, "" for the one that --out names, and what of them is made shorter."""
 
