@@ -7,10 +7,6 @@ import numpy as np
 
 from seastar_gym.lanes.plain import Lanes, Mask
 from seastar_gym.lanes.registers import N_LANES
-from seastar_gym.rods.bundles import Rods, Work
-
-NO_RODS, NO_WORK = (bundle(*[None] * len(bundle._fields)) for bundle in (Rods, Work))
-"""Bundles of scenes that name nothing."""
 
 
 def slope(f: Callable[[Any], Any], x: Any, step: float) -> np.ndarray:

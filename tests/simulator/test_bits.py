@@ -23,14 +23,11 @@ from seastar_gym import (
     Body,
     Contact,
     Limb,
-    Limited,
-    MeasuredCurve,
     Numerics,
     Scene,
     Seastar,
     ShearCurrent,
     Simulator,
-    SmaLimb,
     SmaPulse,
     SmaWires,
     SolverStatus,
@@ -47,6 +44,7 @@ from seastar_gym.scene.number import side_by_side
 from seastar_gym.simulator import batch
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
 from simulator.test_conservation import CURLED
+from simulator.test_intervals import ALL
 from strokes import finished
 
 pytestmark = pytest.mark.filterwarnings("ignore:Limbs of robot:RuntimeWarning")
@@ -90,15 +88,6 @@ TERMS = {
         "fluid": FLUID, "contact": Contact(), "loads": ((7, 1e-3, 2e-3),),
     },
 }  # fmt: skip
-ACTUATORS = {
-    "pulse": SmaPulse(),
-    "curve": MeasuredCurve((0.0, 0.13, 0.4, 1.0), (0.0, 0.5, -0.2, 0.0)),
-    "refractory": SmaWires(refractory=True, cooling_time=0.3),
-    "thermal": ThermalSma(),
-    "hot": ThermalSma(0.6, 0.1, 0.1, largest_temperature=60.0),
-    "limited": Limited(SmaPulse(), largest_rate=2.0),
-    "measured limb": SmaLimb(heating_time=0.1, delay=0.02),
-}
 LONG = brief(Numerics("implicit-euler", 5e-3), Seastar(nodes_per_limb=40), contact=Contact())
 ROWS = {
     "default strokes": Row(Scene(TEN, numerics=MIDPOINT)),
@@ -107,7 +96,7 @@ ROWS = {
     "body": Row(Scene(ON_BODY, numerics=MIDPOINT)),
     "current": Row(Scene(Seastar(nodes_per_limb=10, relaxation_time=1e-4), FLUID, numerics=MIDPOINT)),
     "sections": Row(Scene(Seastar(nodes_per_limb=10, limbs=(Limb(section=Strip(2e-3, 8e-3)),) * 5), numerics=MIDPOINT)),
-    **{f"{name} actuator": Row(replace(FAST, actuator=each)) for name, each in ACTUATORS.items()},
+    **{f"{name} actuator": Row(replace(FAST, actuator=each)) for name, each in ALL.items() if name != "wires"},
     "error bars": Row(FAST, (), True),
     "error bars, contact": Row(replace(FAST, contact=Contact()), (), True),
     "error bars, thermal": Row(replace(FAST, actuator=ThermalSma()), (), True),

@@ -76,10 +76,3 @@ def test_no_step_that_has_not_converged_is_accepted(scene, speed, seed):
         hessian = oracle.incremental_hessian(star, after.positions[k], before.positions[k], h, delta_psi)
         move = np.linalg.norm(oracle.descent(hessian, gradient), axis=1).max()
         assert move < 100.0 * scene.numerics.newton_tolerance * robot.limb_length
-
-
-def test_robots_whose_shortest_steps_fail_come_to_rest_and_swim_on():
-    """Edges of 2.8 mm collapse at random velocities of 50 m/s, where every step on creates energy."""
-    simulator, commands = rattled(Simulator(Scene.preset("reference"), 8), 50.0, seed=2), ternary(1, 8, 1)[0]
-    report = simulator.stroke(commands)
-    assert report.energy_cuts.any() and not report.status.any()
