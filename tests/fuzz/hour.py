@@ -7,13 +7,13 @@ import itertools
 import multiprocessing
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from random import Random
 from typing import NamedTuple
 
-from fuzz import odd, swims
+from fuzz import odd
 from fuzz.promises import PROMISES, TAME_PROMISES, WITHOUT
 from fuzz.scenes import (
     BENT,
@@ -41,11 +41,8 @@ BLOCK = 8
 EVERY = 2
 """Sets of terms, one of which may have rare ones."""
 
-OF_SWIMS: dict[str, Callable[[int], None]] = {
-    "odd arguments": lambda seed: odd.check_odd_arguments(Random(seed)),
-    "environment": swims.check_environment,
-}
-"""Promises of the chapter's robot, once in a block."""
+ODD = "odd arguments"
+"""Promise of whatever takes arguments, once in a block."""
 
 
 class Trial(NamedTuple):
@@ -66,8 +63,8 @@ class Trial(NamedTuple):
 
 def attempt(trial: Trial) -> None:
     """Raise what the trial finds."""
-    if trial.promise in OF_SWIMS:
-        OF_SWIMS[trial.promise](trial.seed)
+    if trial.promise == ODD:
+        odd.check_odd_arguments(Random(trial.seed))
     elif trial.promise in TAME_PROMISES:
         TAME_PROMISES[trial.promise](draw_case(Random(trial.seed), trial.terms, wild=False))
     else:
@@ -94,8 +91,7 @@ def trials(seed: int) -> Iterator[Trial]:
             for name in (*PROMISES, *TAME_PROMISES):
                 if not terms & WITHOUT.get(name, frozenset()):
                     yield Trial(name, terms, number)
-        for name in OF_SWIMS:
-            yield Trial(name, frozenset(), number)
+        yield Trial(ODD, frozenset(), number)
 
 
 class Workers:
