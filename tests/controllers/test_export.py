@@ -41,7 +41,7 @@ ON_A_BODY = Description("pairs", True, Scene(Seastar(nodes_per_limb=4, body=Body
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler cc")
 
 
-def drawn(description: Description, seed: int = 0) -> LearnedPolicy:
+def random_policy(description: Description, seed: int = 0) -> LearnedPolicy:
     """Policy with random weights."""
     rng = np.random.default_rng(seed)
     shapes = description.shapes().items()
@@ -67,7 +67,7 @@ along limb 1, with nothing, and of a network without hidden layers."""
 
 
 def policy_of(name: str) -> LearnedPolicy:
-    return drawn(OWN[name]) if name in OWN else load_policy(name)
+    return random_policy(OWN[name]) if name in OWN else load_policy(name)
 
 
 class Compiled:
@@ -400,7 +400,7 @@ def test_every_policy_in_the_box_is_exported_to_c_that_allocates_and_keeps_nothi
     assert kept and all(line.startswith("static const") for line in kept)
     assert all("(" in line for line in CODE.read_text(encoding="utf-8").splitlines() if "static" in line)
     with assert_refused("cannot be exported to C, only to ONNX"):
-        to_c(drawn(ON_A_BODY), "body")
+        to_c(random_policy(ON_A_BODY), "body")
     for points in (1, 1001, 2.5):
         with assert_refused("points per limb must be a whole number from 2 to 1000"):
             to_c(policy_of("learned"), "learned", points)
@@ -427,7 +427,7 @@ def test_onnx_decides_as_numpy_does(name):
         np.testing.assert_array_equal(found["commands"], to_commands(policy.actions, n_limbs, found["action"], 1000))
         if past is not None:
             np.testing.assert_array_equal(found["later"], later[0])
-    assert close < 20 and len(to_onnx(drawn(ON_A_BODY), "body")) > 1000
+    assert close < 20 and len(to_onnx(random_policy(ON_A_BODY), "body")) > 1000
     observations, past = odd_observations(policy, 2000)
     commands, sure = commands_and_margins(policy, observations, past)
     found = session.run(["commands"], {"observation": observations} | ({} if past is None else {"past": past}))[0]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import safetensors.numpy
 
+from controllers.test_export import random_policy
 from every_part import ACTUATORS, PARTS
 from later import Later
 from refusals import assert_refused
@@ -35,12 +36,6 @@ TASK = Description(
     "joint", True, WIRES, (8,), 0.5, "miswired", ((0, -1),), ("vector", "pseudoscalar"), shows_limbs=True, past=2
 )
 FOUR_LIMBS = Scene(robot=Seastar(n_limbs=4, nodes_per_limb=4), numerics=FAST)
-
-
-def random_policy(description, seed=0):
-    rng = np.random.default_rng(seed)
-    shapes = description.shapes().items()
-    return LearnedPolicy(description, {name: rng.normal(size=shape).astype(np.float32) for name, shape in shapes})
 
 
 def observations(scene=Scene(), n=2000, seed=0):
