@@ -3,11 +3,13 @@
 import json
 import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from drawn import drawn
 from evaluation.made_up import MARKUP, swims
 from refusals import assert_refused
 from seastar_gym import Scene, UniformCurrent, Vortex
@@ -76,30 +78,12 @@ def test_trials_are_as_kept(kept, tmp_path):
     kept("trials.html", report.table_html(report.trials_table(file)))
 
 
-def drawn(figure):
-    """What stands in a picture of traces, a line each."""
-    (axes,) = figure.axes
-    yield f"size {figure.get_size_inches().round(3)}, view {np.round([axes.get_xlim(), axes.get_ylim()], 3).tolist()}"
-    for line in axes.lines:
-        style = line.get_color(), line.get_linestyle(), line.get_marker(), line.get_linewidth(), line.get_markersize()
-        label = "" if line.get_label().startswith("_") else line.get_label()
-        yield f"{label}: {style} {line.get_zorder():g} {np.round(line.get_xydata(), 3).tolist()}"
-    for circle in axes.patches:
-        yield f"circle {circle.center} {circle.radius:g} {circle.get_facecolor()} {circle.get_zorder():g}"
-    for text in axes.texts:
-        yield f"{text.get_text()} at {np.round(text.xy, 3).tolist()}, {np.round(text.xyann, 3).tolist()}"
-    for arrows in axes.collections:
-        yield f"arrows {np.round(np.column_stack([arrows.get_offsets(), arrows.U, arrows.V]), 3).tolist()}"
-    yield f"{axes.get_xlabel()}, {axes.get_ylabel()}, {axes.get_legend().get_title().get_text()}"
-
-
-def test_traces_are_drawn_as_kept(kept, monkeypatch, tmp_path):
+def test_traces_are_drawn_as_kept(kept, monkeypatch):
     """In the colours and styles of ten agents; the view is not stretched by who swims far away. With a current, too."""
-    figures, done = [], swims()
-    monkeypatch.setattr(pictures, "save_figure", lambda figure, *arguments, **options: figures.append(figure))
-    pictures.draw_traces([*done[:2], *done[:1] * 8], 2e-3, tmp_path)
-    pictures.draw_traces(done[2:], 2e-3, tmp_path, UniformCurrent(1e-3, 0.0))
-    kept("traces.txt", "\n\n".join("\n".join(drawn(figure)) for figure in figures))
+    done, flow = swims(), UniformCurrent(1e-3, 0.0)
+    many = drawn(monkeypatch, pictures, partial(pictures.draw_traces, [*done[:2], *done[:1] * 8], 2e-3))
+    one = drawn(monkeypatch, pictures, partial(pictures.draw_traces, done[2:], 2e-3, current=flow))
+    kept("traces.txt", f"{many}\n\n{one}")
 
 
 def of_figure(figure, **how):
