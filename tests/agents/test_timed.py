@@ -49,14 +49,6 @@ def test_gaits_in_time_round_the_pentagon(gait):
     assert done.joules_per_metre == pytest.approx(7.6 * done.seconds_heated / done.hub_path_length)
 
 
-@pytest.mark.parametrize(
-    "name, period", [("lagged", None), ("lagged", 1.0), ("wave", 0.5), ("pentagon", 0.3), ("lagged-pentagon", 0.7)]
-)
-def test_gaits_that_do_not_fit_the_decisions_are_refused(name, period):
-    with assert_refused("decision"):
-        scripted(name, decision_period=period)
-
-
 # Training
 
 

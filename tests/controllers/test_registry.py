@@ -98,6 +98,8 @@ REFUSED = [
     *((lambda name=name: scripted(name), "two different limbs from 1 to 5") for name in ("1+,1-", "1+,6-", "0+,1-")),
     *((lambda name=name: scripted(name, n_limbs=4, decision_period=0.5), "are for five limbs, not 4.")
       for name in ("pentagon", "wave", "lagged-pentagon")),
+    *((lambda gait=gait: scripted(gait[0], decision_period=gait[1]), "decision") for gait in (
+        ("lagged", None), ("lagged", 1.0), ("wave", 0.5), ("pentagon", 0.3), ("lagged-pentagon", 0.7))),
     (lambda: OpenLoopPolicy(np.ones((1, 5)), "pairs"), 'no action with actions="pairs"'),
     (lambda: OpenLoopPolicy(np.full((1, 5), 0.5), "limbs"), 'no action with actions="limbs"'),
     (lambda: swim("a", agent(action_space=Discrete(243)), env("pairs"), max_strokes=1), 'actions="pairs"'),

@@ -112,18 +112,3 @@ def test_an_agent_that_does_not_fit_costs_the_others_nothing(tasks, tmp_path, ca
     assert main(["evaluate", *words]) == 2
     assert "lagged does not swim SeastarShort-v0: A lagged gait needs two decisions" in capsys.readouterr().err
     assert [one["agent"] for one in json.loads(file.read_text())] == ["rest"]
-
-
-@pytest.mark.parametrize(
-    "arguments, words",
-    [
-        (["--task", "CartPole-v1"], "There is no task 'CartPole-v1': choose of SeastarSwim-v0, "),
-        (["--task", SWIM, "--agents", "rest", "rest"], "Two agents are called rest: name them with LABEL=AGENT."),
-        (["--task", SWIM, "--seeds", "0"], "--seeds must be"),
-        (["--task", SWIM, "--sets", "nominal"], "leave out --sets"),
-        (["--task", "SeastarStation-v0", "--agents", "rest", "--seeds", "1", "--decisions", "2"], "count after 30 s"),
-    ],
-)
-def test_what_cannot_be_measured_is_said_in_a_sentence(arguments, words, capsys):
-    assert main(["evaluate", *arguments]) == 2
-    assert words in capsys.readouterr().err
