@@ -275,9 +275,8 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     yield "Range", named("Range")("a", 0.0, 1.0).spaced, dict(n=3)
     yield "Range", named("Range")("a", 0.0, 1.0).at, dict(share=0.5)
     yield "Buffers", lambda out: batch_to_step().step(np.zeros((2, 5), int), out=out), dict(out=None)
-    for name in ("VectorFrameStack",):
-        yield name, of_batch(name).reset, dict(seed=0, options=None)
-        yield name, of_batch(name).step, dict(actions=np.zeros(2, int))
+    yield "VectorFrameStack", of_batch("VectorFrameStack").reset, dict(seed=0, options=None)
+    yield "VectorFrameStack", of_batch("VectorFrameStack").step, dict(actions=np.zeros(2, int))
     yield "BatchVecEnv", of_batch("BatchVecEnv", "SameStep").step, dict(actions=np.zeros(2, int))
     yield "Symmetry", symmetry_for(5).reduce, dict(observations=observations())
     yield "Symmetry", symmetry_for(5).restore, dict(actions=np.zeros((2, 5), int), elements=np.zeros(2, int))

@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import pytest
 
+from faults import COLD_WITHIN
+
 pytestmark = pytest.mark.skipif(not hasattr(os, "openpty"), reason="There are no pseudo-terminals here.")
 
-COLD_WITHIN = 0.2
 ROLES = Path(__file__).with_name("roles.py")
 
 

@@ -43,8 +43,6 @@ def test_pairs_go_along_their_bisectors_1_4_farthest_and_1_2_least():
     distances = np.array([values(rows, f"distance of {name}") for name in study.PAIRS]).T
     assert [list(np.argsort(row)) for row in distances[1:3]] == [[0, 1, 3, 2], [0, 3, 1, 2]]
     assert values(rows, "largest angle off it").max() < 1e-6
-    assert distances[0, 1] == pytest.approx(36.025, rel=1e-3)  # the straight swim, mirrored
-    np.testing.assert_allclose(distances[2], [27.98, 34.36, 39.33, 32.08], atol=0.1)
     kept = json.loads((DOCS / "results" / study.STUDY.file).read_text(encoding="utf-8"))["pairs_mm"]
     np.testing.assert_allclose(kept[study.LIMIT.label], [28.19, 34.36, 39.36, 32.29], atol=0.01)
     np.testing.assert_allclose(distances[3], kept[study.LIMIT.label], rtol=2e-3)
