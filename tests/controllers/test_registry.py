@@ -24,14 +24,7 @@ from seastar_gym.controllers.contract import actions_of, observed, require_fit, 
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import BUNDLED, bundled_file, by_name, load, of_task, pretrained
 from seastar_gym.controllers.open_loop import OpenLoopPolicy, RandomPolicy, scripted
-from seastar_gym.controllers.registry import (
-    AGENTS,
-    call_function,
-    default_agents,
-    files_of,
-    load_agent,
-    load_agents,
-)
+from seastar_gym.controllers.registry import AGENTS, call_function, default_agents, files_of, load_agent, load_agents
 from seastar_gym.controllers.search import GreedyPolicy, Planner
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction

@@ -7,17 +7,7 @@ from gymnasium.vector import AutoresetMode
 
 from episodes import assert_same, swum
 from hubs import TEN
-from seastar_gym import (
-    Attachment,
-    Body,
-    Numerics,
-    Scene,
-    Seastar,
-    Sight,
-    Simulator,
-    SmaPulse,
-    Uniform,
-)
+from seastar_gym import Attachment, Body, Numerics, Scene, Seastar, Sight, Simulator, SmaPulse, Uniform
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.layout import VELOCITY_SCALE, Layout
 from seastar_gym.envs.observation import observe

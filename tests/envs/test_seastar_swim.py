@@ -8,16 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from seastar_gym import (
-    Body,
-    DomainRandomization,
-    RewardWeights,
-    Scene,
-    Seastar,
-    SmaWires,
-    ThermalSma,
-    Uniform,
-)
+from seastar_gym import Body, DomainRandomization, RewardWeights, Scene, Seastar, SmaWires, ThermalSma, Uniform
 from seastar_gym.envs import rendering, seastar_swim
 from seastar_gym.envs.paths import cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv

@@ -4,16 +4,7 @@ import numpy as np
 import pytest
 
 from own_actuators import Triangle
-from seastar_gym import (
-    Limited,
-    Numerics,
-    RewardWeights,
-    Scene,
-    SmaPulse,
-    SmaWires,
-    SymmetryReduction,
-    ThermalSma,
-)
+from seastar_gym import Limited, Numerics, RewardWeights, Scene, SmaPulse, SmaWires, SymmetryReduction, ThermalSma
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 

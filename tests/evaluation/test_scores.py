@@ -12,14 +12,7 @@ from seastar_gym.controllers import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.evaluation.rollout import (
-    MEASURES,
-    SECONDS,
-    make_batch,
-    measure_of,
-    swim_episodes,
-    task_ids,
-)
+from seastar_gym.evaluation.rollout import MEASURES, SECONDS, make_batch, measure_of, swim_episodes, task_ids
 from seastar_gym.evaluation.scores import Scores
 
 SWIM, SHORT, OTHER = "SeastarSwim-v0", "SeastarShort-v0", "SeastarDrift-v0"

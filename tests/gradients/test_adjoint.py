@@ -10,17 +10,7 @@ import numpy as np
 import pytest
 
 import seastar_gym.gradients.adjoint as adjoint
-from gradients.test_differentiate import (
-    BRANCH,
-    COMMANDS,
-    HALVED,
-    SMALL,
-    SWIMS,
-    TERMS,
-    THERMAL,
-    WIRES,
-    differences,
-)
+from gradients.test_differentiate import BRANCH, COMMANDS, HALVED, SMALL, SWIMS, TERMS, THERMAL, WIRES, differences
 from refusals import assert_refused
 from seastar_gym import Scene, Simulator, Water
 from seastar_gym.gradients import Motion, differentiate, gradient, record

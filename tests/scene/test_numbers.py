@@ -30,13 +30,7 @@ from seastar_gym import (
 from seastar_gym.envs.randomization import LogUniform
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks import NAMED
-from seastar_gym.scene.checks import (
-    require_count,
-    require_finite,
-    require_number,
-    require_range,
-    require_within,
-)
+from seastar_gym.scene.checks import require_count, require_finite, require_number, require_range, require_within
 from seastar_gym.scene.number import PerRobot, declared, unit_of
 from seastar_gym.scene.serial import KINDS
 

@@ -3,14 +3,7 @@
 import numpy as np
 import pytest
 
-from seastar_gym import (
-    Numerics,
-    Scene,
-    Seastar,
-    Simulator,
-    SmaPulse,
-    Water,
-)
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.lanes.registers import N_LANES
 
 N_ROBOTS = N_LANES + 3

@@ -4,16 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from seastar_gym import (
-    Numerics,
-    Scene,
-    Seastar,
-    Simulator,
-    SmaPulse,
-    UniformCurrent,
-    Water,
-    relaxation_time,
-)
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, UniformCurrent, Water, relaxation_time
 
 # Closed forms
 

@@ -8,16 +8,7 @@ import pytest
 
 from currents import CURRENTS, velocity
 from hubs import TEN
-from seastar_gym import (
-    Body,
-    Numerics,
-    Scene,
-    Seastar,
-    Simulator,
-    SolverStatus,
-    UniformCurrent,
-    Water,
-)
+from seastar_gym import Body, Numerics, Scene, Seastar, Simulator, SolverStatus, UniformCurrent, Water
 from seastar_gym import model as module
 from seastar_gym.accuracy.measure import long_swims
 from seastar_gym.rods.step import scheme_of, tableau
