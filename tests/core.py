@@ -49,16 +49,16 @@ def forward_and_back():
     swum.gradient({'positions': np.ones(swum.swim.positions.shape)}, ['commands'])
 """
 KINDS = {
+    "gradients": "forward_and_back()",
     "an environment": "swim(gym.make('SeastarSwim-v0'))",
     "a batch": "swim(gym.make_vec('SeastarSwimTimed-v0', 3, vectorization_mode='vector_entry_point'))",
     "hub hinges": "stroke(robot=Seastar(discretisation='chapter'))",
     "current": "stroke(fluid=Water(current=UniformCurrent(0.01, 0.0)))",
     "contact": "stroke(contact=Contact())",
     "body": "stroke(robot=Seastar(body=Body(radius=0.02, mass=0.01)))",
-    "gradients": "forward_and_back()",
     "sections": "stroke(3, robot=Seastar(limbs=(Limb(radius=1e-3 * np.array([1.0, 1.1, 1.2])),) * 5))",
 }
-"""Scenes whose code is compiled before the tests begin, side by side."""
+"""Scenes whose code is compiled before the tests begin, side by side, that of the first for longest."""
 
 
 def wanted_by(code: str) -> set[str]:
