@@ -10,12 +10,15 @@ def test_a_method_is_tuned_once_by_what_all_are(tmp_path, monkeypatch, capsys):
     few = dict(list(tuning.draws().items())[:2])
     monkeypatch.setattr(tuning, "draws", lambda: few)
     monkeypatch.setattr(tuning, "EPISODES", 2)
-    given = ["tuning", "--methods", "DQN", "--decisions", "64", "--out", str(tmp_path)]
+    monkeypatch.setattr(tuning, "LONG", 96)
+    given = ["tuning", "--methods", "DQN", "--decisions", "64", "--long", "--out", str(tmp_path)]
     assert main(given) == 0
-    (row,) = json.loads((tmp_path / "tuning.json").read_text())["trainings"].values()
+    found = json.loads((tmp_path / "tuning.json").read_text())
+    (row,), (long,) = found["trainings"].values(), found["long trainings"].values()
     best = min(few, key=lambda name: row[f"{name}, seed 0"]["measure"])
     again = {f"{name}, seed {seed}" for name in (tuning.ROWS, best) for seed in tuning.SEEDS}
     assert row.keys() == {f"{name}, seed 0" for name in few} | again
+    assert long.keys() == {f"{best}, seed {seed}" for seed in tuning.SEEDS}
     rate, discount, *_ = few[best]
     told = capsys.readouterr().out
     assert "| DQN | plain | " in told and f"| {rate} | {discount} | " in told
