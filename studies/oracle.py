@@ -8,7 +8,7 @@ is told the true state and nothing else that is hidden.
 import itertools
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache, cached_property, partial
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -124,7 +124,7 @@ class Oracle:
 class Planner(Oracle):
     """Model predictive control, one decision ahead, by the true state of the robots and as if nothing were hidden.
 
-    Robots are as designed, in still water and wired as they should be, and a prey stays where it is.
+    Robots are as designed, in still water and wired as they should be, and a prey swims straight on.
     """
 
     @cached_property
@@ -137,8 +137,8 @@ class Planner(Oracle):
     def cost(self) -> Cost:
         robots, task = self.robots, self.robots.task
         if isinstance(task, Prey):
-            prey = task.targets(robots)[:, None, :2]
-            return lambda hubs, _: np.hypot(*np.moveaxis(hubs - prey, -1, 0))
+            place, velocity = (each[:, None, None] for each in task.prey(robots))
+            return _chase(task, lambda since: place + (since + AHEAD)[:, None] * velocity)
         return cost_of(robots)
 
     def wired(self, commands: Floats) -> Floats:
@@ -203,9 +203,8 @@ def cost_of(robots: Robots) -> Cost:
     """Cost of the ends of decisions in the task of robots, by their present episodes."""
     task, now = robots.task, robots.episode
     if isinstance(task, Prey):
-        return partial(
-            _until_met, Pursuit(0.0075, 0.9 * task.catch_radius), now.course[:, None, None], robots.simulator.time
-        )
+        courses, time = Courses(now.course[:, None, None]), robots.simulator.time[:, None, None]
+        return _chase(task, lambda since: courses.place(time + since + AHEAD))
     if isinstance(task, Station):
         return lambda hubs, _: np.hypot(*np.moveaxis(hubs - now.station[:, None], -1, 0))
     if isinstance(task, Prizes):
@@ -216,12 +215,20 @@ def cost_of(robots: Robots) -> Cost:
     return lambda hubs, _: RewardWeights().way_to_next(hubs, first, second, radius)
 
 
-def _until_met(pursuit: Pursuit, courses: Floats, time: Floats, hubs: Floats, since: float) -> Floats:
-    """Time until the prey is met [s]; where it is not, the time that is lacking at least, on top of NEVER."""
-    prey = Courses(courses).place(time[:, None, None] + since + AHEAD)
-    prey = np.broadcast_to(prey, (*hubs.shape[:2], *prey.shape[2:]))
-    lacking = pursuit.gaps(hubs, prey, AHEAD).min(axis=-1) / pursuit.speed
-    return np.minimum(pursuit.meeting_time(hubs, prey, AHEAD), NEVER + np.maximum(lacking, 0.0))
+def _chase(task: Prey, foreseen: Callable[[float], Floats]) -> Cost:
+    """Time until the prey is met [s]; where it is not, the time that is lacking at least, on top of NEVER.
+
+    foreseen: Places of the prey of all robots AHEAD of a time from now on [s], shape (n, 1, len(AHEAD), 2) [m].
+    """
+    pursuit = Pursuit(0.0075, 0.9 * task.catch_radius)
+
+    def until_met(hubs: Floats, since: float) -> Floats:
+        prey = foreseen(since)
+        prey = np.broadcast_to(prey, (*hubs.shape[:2], *prey.shape[2:]))
+        lacking = pursuit.gaps(hubs, prey, AHEAD).min(axis=-1) / pursuit.speed
+        return np.minimum(pursuit.meeting_time(hubs, prey, AHEAD), NEVER + np.maximum(lacking, 0.0))
+
+    return until_met
 
 
 def _next_prizes(robots: Robots, task: Prizes) -> Floats:
