@@ -188,7 +188,7 @@ def draw_curves(found: Any, file: Path) -> None:
         for axis, x in zip(axes, (decisions / 1000.0, seconds), strict=True):
             axis.plot(x, scores, marker="o", label=f"{row.agent}, {row.track}")
     axes[0].set(xlabel="decisions [1000]", ylabel="mean score over ids and seeds")
-    axes[0].set_ylim(bottom=-1.0)  # learners that rest score below
+    axes[0].set_ylim(-1.0, 1.0)  # learners that rest score below, the oracle 1
     axes[1].set(xlabel="processor time of a training [s]")
     figure.legend(*axes[0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=3)
     save_figure(figure, file)
