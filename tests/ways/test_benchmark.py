@@ -2,6 +2,8 @@
 
 import json
 
+import pytest
+
 from ways.story import command
 
 CELL = "--methods PPO --tracks symmetric --ids SeastarStation-v0 --decisions 2048 --processes 1"
@@ -59,6 +61,38 @@ def train(seed, envs):
         adam.step()
     return policy
 """
+TORCHRL = """
+import torch
+from tensordict import TensorDict
+from tensordict.nn import TensorDictModule
+from torch.distributions import Categorical
+from torchrl.collectors import Collector
+from torchrl.envs import GymWrapper
+from torchrl.envs.utils import ExplorationType, set_exploration_type
+from torchrl.modules import MLP, ProbabilisticActor
+
+from seastar_gym.evaluation.benchmark import make
+
+
+def actor(env):
+    network = MLP(in_features=env.observation_space.shape[-1], out_features=243, num_cells=[32])
+    module = TensorDictModule(network, in_keys=["observation"], out_keys=["logits"])
+    return ProbabilisticActor(module, in_keys=["logits"], distribution_class=Categorical)
+
+
+def action(policy, observation):
+    with set_exploration_type(ExplorationType.DETERMINISTIC):
+        return int(policy(TensorDict({"observation": torch.as_tensor(observation)}))["action"])
+
+
+def train(seed, envs):
+    torch.manual_seed(seed)
+    policy = actor(envs)
+    env = GymWrapper(envs, categorical_action_encoding=True)
+    for rollout in Collector(env, policy, frames_per_batch=32, total_frames=32, auto_register_policy_transforms=False):
+        assert rollout["next", "reward"].shape[:2] == (8, 4)
+    return policy
+"""
 ROW = """
 
 class Mine:
@@ -81,13 +115,18 @@ def seed1(env):
 
 if __name__ == "__main__":
     for seed in (0, 1):
-        policy = train(seed, make("SeastarStation-v0", 8, autoreset_mode="SameStep"))
+        policy = train(seed, make("SeastarStation-v0", 8, autoreset_mode="AUTORESET"))
         torch.save(policy.state_dict(), f"{seed}.pt")
 """
 
 
-def test_a_learner_in_one_file_has_a_row_by_the_same_command(story):
-    story.has("mine.py", LOOP + ROW)
+@pytest.mark.parametrize("learner", ["one file, like CleanRL", "torchrl"])
+def test_a_learner_of_another_library_has_a_row_by_the_same_command(story, learner):
+    loop, autoreset = LOOP, "SameStep"
+    if learner == "torchrl":
+        pytest.importorskip("torchrl")
+        loop, autoreset = TORCHRL, "Disabled"
+    story.has("mine.py", loop + ROW.replace("AUTORESET", autoreset))
     story.types("python mine.py")
     evaluate = command("docs/benchmark.md", "seastar evaluate --benchmark", "--agents").partition("--agents")[0]
     story.types(f"{evaluate} --agents mine=mine:seed0,mine:seed1 --decisions 32 --out runs/mine")
