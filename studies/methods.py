@@ -38,13 +38,13 @@ class Options:
     cells: Path = Path("runs/benchmark")
     """Folder of the cells."""
     references: bool = False
-    """Swim the greedy rules and the oracle, and write them into the package."""
+    """Swim the greedy rules, the planner and the oracle, and write them into the package."""
     agreement: bool = False
     """Correlate returns with measures, of ids with a price of time."""
 
 
 def swim_references(file: Path = REFERENCES) -> None:
-    """Swim what is missing of greedy rules and oracle, and write the file after each; all others stay."""
+    """Swim what is missing of greedy rules, planner and oracle, and write the file after each; all others stay."""
     known = {(cell.agent, cell.id): cell for cell in benchmark.cells_in(file)} if file.is_file() else {}
     for (agent, make_agent), id in product(AGENTS.items(), ENTRIES):
         if (agent, id) in known and known[agent, id].contract == contract(id):
