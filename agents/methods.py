@@ -71,9 +71,10 @@ Build = Callable[[BatchVecEnv, str, int, Draw | None], Any]
 
 
 class Method(NamedTuple):
-    """A learner. build: Makes it of environment, id, seed and what was drawn; None stands for the numbers of the rows.
+    """A learner. build: Makes it of environment, id, seed and what was drawn; None stands for its own numbers.
 
     robots: That learn side by side. continuous: Whether it gives commands. stacked: Whether it sees a frame stack.
+    draw: The best of those that `studies.tuning` tries, of a method that was tuned.
     """
 
     build: Build
@@ -81,6 +82,7 @@ class Method(NamedTuple):
     continuous: bool = False
     tracks: tuple[Track, ...] = TRACKS
     stacked: bool = False
+    draw: Draw | None = None
 
 
 def _ours(env: BatchVecEnv, id: str, seed: int, draw: Draw | None) -> Any:
@@ -128,6 +130,7 @@ def _off_policy(kind: Any, batch_size: int, uses: int, **how: Any) -> Build:
 
 METHODS: dict[str, Method] = {
     "PPO": Method(_on_policy(PPO, "MlpPolicy")),
+    "PPO, tuned": Method(_on_policy(PPO, "MlpPolicy"), draw=Draw(0.0017, 0.855, 7, 0.73)),
     "PPO, ours": Method(_ours, 128),
     "PPO, ours, frame stack": Method(_ours, 128, tracks=("symmetric",), stacked=True),
     "RecurrentPPO": Method(
@@ -143,6 +146,8 @@ METHODS: dict[str, Method] = {
 """PPO and SAC as shipped by Stable-Baselines3 but for rollouts of 2,048 decisions and the ratio of gradient steps; ours
 with the hyperparameters of `agents.tasks`; an LSTM of 64, in one track: frames that turn from one decision to the next
 would turn its memory. DQN as shipped never arrives."""
+UNTUNED = tuple(name for name, method in METHODS.items() if method.draw is None)
+"""Methods with their own numbers."""
 
 
 @dataclass(frozen=True)
@@ -225,7 +230,7 @@ def new_model(name: str, track: Track, id: str, seed: int, draw: Draw | None = N
     """A method that has learned nothing yet, on the split "train"."""
     method = METHODS[name]
     batch = batch_of(method, track, id, method.robots, "train", autoreset_mode="SameStep")
-    return method.build(BatchVecEnv(batch), id, seed, draw)
+    return method.build(BatchVecEnv(batch), id, seed, draw or method.draw)
 
 
 class Curve(BaseCallback):

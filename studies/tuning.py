@@ -1,12 +1,10 @@
 """Equal tuning: ten draws of the same four numbers for every method of the benchmark, on one id and the split "train".
 
-A draw is judged by 64 episodes of that split. The best of ten and the numbers of the benchmark's rows are then trained
-again with other seeds, which did not choose. With --long the best is also trained as long as the rows, and judged by
-their test episodes. Processes with other --methods may fill one file side by side.
+A draw is judged by 64 episodes of that split. The best of ten and a method's own numbers are then trained again with
+other seeds, which did not choose. Processes with other --methods may fill one file side by side.
 """
 
 import time
-from collections import defaultdict
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -14,37 +12,31 @@ from typing import Any
 import numpy as np
 import torch
 
-from agents.methods import METHODS, Draw, batch_of, new_model
+from agents.methods import METHODS, UNTUNED, Draw, batch_of, new_model
 from agents.tasks import FAR_SEED
-from seastar_gym.envs.instances import Split
-from seastar_gym.evaluation.benchmark import BUDGETS, EPISODES, read, swum
+from seastar_gym.evaluation.benchmark import EPISODES, swum
 from seastar_gym.evaluation.results import over_trainings
-from seastar_gym.scene.checks import require_count, require_flag
-from studies.frame import DOCS, Results, Study, require_known, rounded
+from seastar_gym.scene.checks import require_count
+from studies.frame import Results, Study, require_known, rounded
 from studies.pages import markdown
 
 ID = "SeastarStation-v0"
 SEEDS = (1, 2, 3)
 """Seeds of the trainings that are compared; draws have seed 0."""
-ROWS = "as in the rows"
-LONG = BUDGETS[0]
-"""Length of the long trainings [decisions]."""
+OWN = "own numbers"
 
 
 @dataclass(frozen=True)
 class Options:
     """Which methods are tuned, and how long every training is."""
 
-    methods: tuple[str, ...] = tuple(METHODS)
+    methods: tuple[str, ...] = UNTUNED
     """Methods, each in its first track."""
     decisions: int = 30_000
     """Length of every training [decisions]."""
-    long: bool = False
-    """Train the best draw as long as the rows, too."""
 
     def __post_init__(self) -> None:
-        require_known("method", self.methods, METHODS)
-        require_flag("long", self.long)
+        require_known("method", self.methods, UNTUNED)
         require_count("decisions", self.decisions, 1, 10**9)
 
 
@@ -62,17 +54,15 @@ def draws(n: int = 10) -> dict[str, Draw]:
     }
 
 
-def trained(
-    name: str, draw: Draw | None, seed: int, decisions: int, split: Split = "train", first: int = FAR_SEED
-) -> dict[str, float]:
-    """Mean measure in episodes of a split, which are by default such that no training begins with, and time [s]."""
+def trained(name: str, draw: Draw | None, seed: int, decisions: int) -> dict[str, float]:
+    """Mean measure in episodes that no training begins with, and processor time [s]."""
     torch.set_num_threads(1)
     method, track, began = METHODS[name], METHODS[name].tracks[0], time.process_time()
     model = new_model(name, track, ID, seed, draw)
     model.learn(decisions)
     model.get_env().close()
     seconds = time.process_time() - began
-    found = swum(batch_of(method, track, ID, EPISODES, split), model, first)
+    found = swum(batch_of(method, track, ID, EPISODES, "train"), model, FAR_SEED)
     return {"measure": rounded(float(np.mean(found["measure"]))), "seconds": round(seconds, 1)}
 
 
@@ -82,22 +72,21 @@ def best_of(row: dict[str, Any]) -> str:
 
 
 def run(options: Options, results: Results) -> None:
-    """Train what is missing: the draws of every method, then the best of them and the rows' numbers."""
-    known: dict[str, Draw | None] = {ROWS: None, **draws()}
+    """Train what is missing: the draws of every method, then the best of them and its own numbers."""
+    known: dict[str, Draw | None] = {OWN: None, **draws()}
 
-    def fill(method: str, names: list[str], seeds: tuple[int, ...], kind: str = "trainings", **how: Any) -> None:
-        each = partial(trained, method, **{"decisions": options.decisions, **how})
+    def fill(method: str, names: list[str], seeds: tuple[int, ...]) -> None:
+        each = partial(trained, method, decisions=options.decisions)
         cells = {
-            (kind, method, f"{name}, seed {seed}"): partial(each, known[name], seed) for name in names for seed in seeds
+            ("trainings", method, f"{name}, seed {seed}"): partial(each, known[name], seed)
+            for name in names
+            for seed in seeds
         }
         results.fill(cells, lambda cell: f"{cell['measure']:.3g} mm")
 
     for method in options.methods:
         fill(method, list(draws()), (0,))
-        best = best_of(results["trainings"][method])
-        fill(method, [ROWS, best], SEEDS)
-        if options.long:
-            fill(method, [best], SEEDS, "long trainings", decisions=LONG, split="test", first=0)
+        fill(method, [OWN, best_of(results["trainings"][method])], SEEDS)
 
 
 def over_seeds(means: list[float]) -> str:
@@ -107,37 +96,23 @@ def over_seeds(means: list[float]) -> str:
 
 
 def tuning_table(found: Any) -> str:
-    """The rows' numbers and the best of ten draws, both with other seeds, of methods that are tuned to the end."""
+    """A method's own numbers and the best of ten draws, both with other seeds, of methods that are tuned to the end."""
     lines, whole = [], len(draws()) + 2 * len(SEEDS)
-    for method in METHODS:
+    for method in UNTUNED:
         row = found.get("trainings", {}).get(method, {})
         if len(row) < whole:
             continue
         best = best_of(row)
-        told = (over_seeds([row[f"{name}, seed {seed}"]["measure"] for seed in SEEDS]) for name in (ROWS, best))
+        told = (over_seeds([row[f"{name}, seed {seed}"]["measure"] for seed in SEEDS]) for name in (OWN, best))
         seconds = sum(row[f"{name}, seed 0"]["seconds"] for name in draws())
         lines.append([method, METHODS[method].tracks[0], *told, *draws()[best], f"{seconds:.0f}"])
-    head = ["method", "track", "as in the rows [mm]", "best of ten [mm]", "learning rate", "discount", "uses"]
+    head = ["method", "track", f"{OWN} [mm]", "best of ten [mm]", "learning rate", "discount", "uses"]
     return markdown([*head, "exploration", "ten draws [s]"], lines, (0, 1))
-
-
-def long_table(found: Any) -> str:
-    """The benchmark's rows, and the best draws trained as long, in the same episodes."""
-    of_rows = defaultdict[tuple[str, str], list[float]](list)
-    for cell in read([DOCS / "results/benchmark/benchmark.json"]):
-        if (cell.id, cell.first, cell.decisions) == (ID, 0, LONG):
-            of_rows[cell.agent, cell.track].append(float(np.mean(cell.measure)))
-    lines = []
-    for method, long in found.get("long trainings", {}).items():
-        track, after = METHODS[method].tracks[0], [each["measure"] for each in long.values()]
-        both = (f"{over_seeds(means)} ({len(means)})" if means else "–" for means in (of_rows[method, track], after))
-        lines.append([method, track, *both])
-    return markdown(["method", "track", f"{ROWS} [mm]", "best of ten [mm]"], lines, (0, 1))
 
 
 STUDY = Study(
     "tuning", run, Options, "benchmark/tuning.json",
     settings=lambda options: {"id": ID, "decisions": options.decisions,
                               "draws": {name: list(draw) for name, draw in draws().items()}},
-    tables={"benchmark tuning": tuning_table, "benchmark tuning, long": long_table},
+    tables={"benchmark tuning": tuning_table},
 )  # fmt: skip

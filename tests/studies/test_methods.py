@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from later import Later
 from seastar_gym.evaluation import benchmark
 from seastar_gym.evaluation.benchmark import Cell
-from studies import oracle
 from studies.command import main
-from studies.methods import AGENTS, ids_table, rows_table
 
+methods = Later("studies.methods")
 PREY = "SeastarPreyTimed-v0"
 
 
@@ -26,12 +26,13 @@ def test_cells_become_a_file_a_picture_and_a_table(tmp_path, monkeypatch, capsys
     assert {file.name for file in (tmp_path / "page").iterdir()} == {"benchmark.json", "curves.png"}
     told = capsys.readouterr().out
     assert "| PPO | 5 [4, 6] (3) | 0.625 [0.5, 0.75] |" in told and "| PPO | plain | **9** |" in told
-    assert rows_table({}) == "No row is trained yet." and all(id in ids_table({}) for id in benchmark.ENTRIES)
+    assert methods.rows_table({}) == "No row is trained yet."
+    assert all(id in methods.ids_table({}) for id in benchmark.ENTRIES)
 
 
 def test_an_oracle_keeps_a_station_better_than_a_planner_and_that_better_than_the_greedy_rule():
     ends = {}
-    for agent, make_agent in AGENTS.items():
+    for agent, make_agent in methods.AGENTS.items():
         batch = benchmark.make("SeastarStation-v0", 4, "test", 1)
         policy = make_agent(batch)
         observations, info = batch.reset(seed=0)
@@ -43,14 +44,14 @@ def test_an_oracle_keeps_a_station_better_than_a_planner_and_that_better_than_th
 
 
 def test_an_oracle_of_robots_seen_by_a_camera_learns_with_full_sight_once(tmp_path, monkeypatch):
-    monkeypatch.setattr(oracle, "SIGHTED", tmp_path)
-    monkeypatch.setattr(oracle, "DECISIONS", 1)  # one rollout
+    monkeypatch.setattr("studies.oracle.SIGHTED", tmp_path)
+    monkeypatch.setattr("studies.oracle.DECISIONS", 1)  # one rollout
     for _ in range(2):
         batch = benchmark.make("SeastarSwimSimToReal-v0", 2, "test", 1)
-        policy = AGENTS["oracle"](batch)
+        policy = methods.AGENTS["oracle"](batch)
         observations, _ = batch.reset(options={"instance": [0, 1]})
         actions, _ = policy.predict(np.full_like(observations, np.nan))  # it does not look at pictures
         batch.step(actions)
         batch.close()
-        monkeypatch.setattr(oracle, "PPO", None)  # a second training would fail
+        monkeypatch.setattr("studies.oracle.PPO", None)  # a second training would fail
     assert len(list(tmp_path.glob("*.safetensors"))) == 1

@@ -20,7 +20,6 @@ from studies.command import main, module_of, names
 from studies.frame import DOCS, Study, require_known, rounded
 from studies.pages import BLOCK, stale
 
-STUDIES = {name: module_of(name).STUDY for name in names()}
 PAGES = [*DOCS.glob("*.md"), DOCS.parent / "README.md"]
 TEXTS = {page.name: page.read_text(encoding="utf-8") for page in PAGES}
 
@@ -100,7 +99,7 @@ def test_the_command_lists_the_studies_and_refuses_others(toy, capsys):
 
 def test_pages_say_what_their_numbers_say():
     """`python -m studies --draw` fills them again."""
-    assert [file.name for file, _ in stale([*STUDIES.values()])] == []
+    assert [file.name for file, _ in stale([module_of(name).STUDY for name in names()])] == []
 
 
 def test_a_number_that_was_changed_by_hand_is_noticed_and_mended(tmp_path, monkeypatch, capsys):
@@ -130,7 +129,7 @@ def test_commands_on_pages_exist_or_have_the_commit_that_has_them():
     for page, text in TEXTS.items():
         said += [(page, *found) for found in command.findall(" ".join(text.split()))]
     assert len(said) > 10
-    lost = [each for each in said if each[2] not in STUDIES]
+    lost = [each for each in said if each[2] not in names()]
     assert [each for each in lost if not re.search(r"commit `?[0-9a-f]{7,8}\b", f"{each[1]}{each[3]}")] == []
 
 
