@@ -1,13 +1,13 @@
 """How kernels are compiled and cached.
 
-`kernel` and `inlined_kernel` compile building blocks; `entry_point` compiles a function that Python calls, releases
-the GIL and keeps the machine code on disk. Numba's own cache looks at the file of the cached function only, so an edit
-in a called file would silently run the old code. Ours lives in a folder named after a digest of every file of the
-package that defines kernels, the versions of numba, llvmlite and numpy and the lane width: whatever changes, the old
-code cannot be found. Every file begins with a digest of the rest: what was cut off or written over is not there, and is
-compiled and written anew. What cannot be written is compiled in every process, and so is all where others than the user
-could have written it: numba keeps pickles. Processes that want the same code at once wait for the first
-of them, which compiles it, and load it then.
+`kernel`, `inlined_kernel` and `rare_kernel` compile building blocks; `entry_point` compiles a function that Python
+calls, releases the GIL and keeps the machine code on disk. Numba's own cache looks at the file of the cached function
+only, so an edit in a called file would silently run the old code. Ours lives in a folder named after a digest of every
+file of the package that defines kernels, the versions of numba, llvmlite and numpy and the lane width: whatever
+changes, the old code cannot be found. Every file begins with a digest of the rest: what was cut off or written over is
+not there, and is compiled and written anew. What cannot be written is compiled in every process, and so is all where
+others than the user could have written it: numba keeps pickles. Processes that want the same code at once wait for the
+first of them, which compiles it, and load it then.
 """
 
 import contextlib
@@ -76,6 +76,12 @@ def kernel(function, **options):
 
 # Where calls are many, and each would pass the fifty pointers of rods and work: together a tenth of a stroke.
 inlined_kernel = functools.partial(kernel, forceinline=True)
+
+
+def rare_kernel(function):
+    """Compile what hardly any step calls, and leave it out of its caller, whose common way is slower with it."""
+    function.is_rare = True
+    return kernel(function)
 
 
 def kernel_sources(package: Path = PACKAGE) -> list[Path]:

@@ -220,10 +220,14 @@ MANGLED = "seastar_gym"
 class Part(JITCodeLibrary):
     """Code that compiled code alone calls: its own, one module, without that of the kernels which it calls."""
 
+    is_rare = False
+
     def add_ir_module(self, ir_module):
         for function in ir_module.functions:
             if function.blocks:
                 function.linkage = "linkonce_odr"  # whoever links it may inline it and leave it out
+                if self.is_rare:
+                    function.attributes.add("noinline")
         super().add_ir_module(ir_module)
 
     def add_llvm_module(self, ll_module):
@@ -320,7 +324,9 @@ class _AsPart(_Lowered):
 
     def run_pass(self, state):
         state.targetctx.get_abi_sizeof = functools.partial(_size_of, state.targetctx.target_data)
-        return super().run_pass(state)
+        super().run_pass(state)
+        state.library.is_rare = getattr(state.func_id.func, "is_rare", False)
+        return True
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)

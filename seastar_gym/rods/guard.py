@@ -62,7 +62,7 @@ the angle and velocity that it extrapolates to, so that its B is the difference 
 Rigid motion: the one that has a robot's momentum and angular momentum; velocities are cut down about it.
 """
 
-from seastar_gym.lanes.compile import kernel
+from seastar_gym.lanes.compile import kernel, rare_kernel
 from seastar_gym.lanes.registers import (
     absolute,
     add_product,
@@ -282,7 +282,7 @@ def cut_velocities(rods, q, v, frame, motion, share, robots):
 KNOWN = 1e300  # energy [J]: the rigid motion of nodes that lie in one point is no number
 
 
-@kernel
+@rare_kernel
 def come_to_rest(rods, work, q, v, robots):
     """Leave the robots in the mask the rigid motion that has their momenta alone.
 
