@@ -226,7 +226,7 @@ class Part(JITCodeLibrary):
         for function in ir_module.functions:
             if function.blocks:
                 function.linkage = "linkonce_odr"  # whoever links it may inline it and leave it out
-                if self.is_rare:
+                if self.is_rare and "alwaysinline" not in function.attributes:
                     function.attributes.add("noinline")
         super().add_ir_module(ir_module)
 
