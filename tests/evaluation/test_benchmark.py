@@ -11,8 +11,9 @@ from seastar_gym.cli.main import main
 from seastar_gym.controllers.learned import pretrained
 from seastar_gym.controllers.open_loop import scripted
 from seastar_gym.evaluation import benchmark
-from seastar_gym.evaluation.benchmark import ENTRIES, Cell, contract, make, read, tables, write
+from seastar_gym.evaluation.benchmark import ENTRIES, Cell, contract, make, read, swum, tables, write
 from seastar_gym.evaluation.results import interquartile_mean, over_trainings, probability_of_improvement
+from studies.tasks import greedy
 
 PREY, STATION = "SeastarPreyTimed-v0", "SeastarStation-v0"
 SCALES = {PREY: (0.0, 8.0), STATION: (2.0, 0.5)}
@@ -212,6 +213,14 @@ def test_a_contract_is_of_observations_rewards_and_numbers_of_the_task(monkeypat
         assert contract(PREY) == known
     contract.cache_clear()
     assert {one.contract for one in read([benchmark.REFERENCES]) if one.id == PREY} == {known}
+
+
+def test_references_are_what_rules_swim_in_the_first_test_episodes():
+    batch = make(STATION, 2, "test", 1)
+    now = swum(batch, greedy(batch))
+    (kept,) = (one for one in read([benchmark.REFERENCES]) if (one.agent, one.id) == (benchmark.GREEDY, STATION))
+    for name in ("measure", "returns"):
+        assert now[name] == pytest.approx(getattr(kept, name)[:2], rel=1e-3), name
 
 
 def test_a_price_of_time_is_charged_where_returns_would_not_see_it():
