@@ -8,14 +8,12 @@ A run adds a row with its date to `speed_history.json`. Both checkouts take turn
 counts: what else a machine does slows either. Other numbers are medians, with the range of the middle half.
 """
 
-import gc
 import os
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-import tracemalloc
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -148,22 +146,6 @@ def environment(id: str, n_robots: int | None = None) -> Any:
     return gym.make_vec(id, n_robots, vectorization_mode="vector_entry_point", threads=1, **options)
 
 
-def memory_per_robot(scene: Scene, n_robots: int = BATCH) -> tuple[float, float]:
-    """Memory of a robot in a batch [KiB], and memory that a stroke leaves allocated per robot [B]."""
-    tracemalloc.start()
-    swim = straight(scene, n_robots)
-    held = tracemalloc.get_traced_memory()[0]
-    swim()
-    gc.collect()
-    before = tracemalloc.get_traced_memory()[0]
-    for _ in range(20):
-        swim()
-    gc.collect()
-    left = tracemalloc.get_traced_memory()[0] - before
-    tracemalloc.stop()
-    return held / n_robots / 1024, max(0, left) / 20 / n_robots
-
-
 def throughput(seconds: float) -> Iterator[Row]:
     """Speed of strokes and environments. seconds: For which a number is measured."""
     chapter = Scene(Seastar(nodes_per_limb=10), numerics=Numerics.preset("chapter"))
@@ -175,9 +157,6 @@ def throughput(seconds: float) -> Iterator[Row]:
     yield row("time per robot and Newton iteration, all included", "us", iterations)
     yield row("operations of it", "kflop", [flops(count_operations(chapter)["iteration"]) / 1e3])
     yield row("exponent of the cost over nodes, N = 5 to 640", "1", [exponent(chapter, seconds / 4)])
-    held, left = memory_per_robot(chapter, BATCH)
-    yield row(f"memory per robot, batch of {BATCH}", "KiB", [held])
-    yield row("memory that a stroke leaves behind, per robot", "B", [left])
     for id, what in ENVIRONMENTS.items():
         for n_robots in (None, BATCH):
             env, n = environment(id, n_robots), max(3, int(seconds * (20 if n_robots else 200)))

@@ -1,9 +1,11 @@
 """Every study of speed, devices, policies and pictures runs in its shortest form, and what its numbers promise."""
 
+import gc
 import json
 import os
 import re
 import subprocess
+import tracemalloc
 from functools import partial
 
 import numpy as np
@@ -69,8 +71,19 @@ def test_a_study_runs_in_its_shortest_form_and_writes_its_files(command, tmp_pat
 
 
 def test_a_robot_is_small_and_a_stroke_leaves_nothing_behind():
-    held, left = benchmark.memory_per_robot(Scene())
-    assert held < 64.0 and left < 8.0  # KiB, and B: less than one number per robot
+    n_robots = 512
+    tracemalloc.start()
+    swim = benchmark.straight(Scene(), n_robots)
+    held = tracemalloc.get_traced_memory()[0]
+    swim()
+    gc.collect()
+    before = tracemalloc.get_traced_memory()[0]
+    for _ in range(20):
+        swim()
+    gc.collect()
+    left = tracemalloc.get_traced_memory()[0] - before
+    tracemalloc.stop()
+    assert held < n_robots * 64 * 1024 and left < 20 * n_robots * 8  # B: less than one number per robot and stroke
 
 
 # Operations of a Newton iteration: they show on any machine when kernels become slower.
