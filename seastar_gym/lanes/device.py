@@ -138,8 +138,9 @@ class Program:
         module = ir.Module()
         entry = add_entry(module, self._add_robot(module, description))
         joined = _parsed(str(module), triple, machine)
-        # Calls would pass the fifty pointers of rods and work through memory.
-        joined.link_in(_parsed(DEFINITION.sub(r"\1 alwaysinline {", str(kernels)), triple, machine))
+        # Calls would pass the fifty pointers of rods and work through memory, those of rare kernels, too.
+        inlined = DEFINITION.sub(r"\1 alwaysinline {", str(kernels).replace(" noinline", " alwaysinline"))
+        joined.link_in(_parsed(inlined, triple, machine))
         for function in joined.functions:
             if not (function.is_declaration or function.name == entry):
                 function.linkage = "internal"
