@@ -138,7 +138,7 @@ class Program:
         module = ir.Module()
         entry = add_entry(module, self._add_robot(module, description))
         joined = _parsed(str(module), triple, machine)
-        # Calls would pass the fifty pointers of rods and work through memory, those of rare kernels, too.
+        # Calls would pass the fifty pointers of rods and work through memory: rare kernels are inlined, too.
         inlined = DEFINITION.sub(r"\1 alwaysinline {", str(kernels).replace(" noinline", " alwaysinline"))
         joined.link_in(_parsed(inlined, triple, machine))
         for function in joined.functions:

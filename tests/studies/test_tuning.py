@@ -39,3 +39,5 @@ def test_tuned_rows_have_the_best_draws():
     found = json.loads((DOCS / "results/benchmark/tuning.json").read_text())["trainings"]
     tuned = {name.removesuffix(", tuned"): method.draw for name, method in methods.METHODS.items() if method.draw}
     assert tuned and all(draw == tuning.draws()[tuning.best_of(found[name])] for name, draw in tuned.items())
+    learner = methods.new_model("PPO, tuned", "plain", tuning.ID, 0)
+    assert (learner.learning_rate, learner.gamma, learner.n_epochs) == tuned["PPO"][:3]
