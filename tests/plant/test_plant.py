@@ -11,6 +11,7 @@ import tty
 from collections import deque
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -487,9 +488,10 @@ def test_it_asks_before_wires_are_heated(more, answer, is_heated, tmp_path, caps
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="There are no pseudo-terminals here.")
-def test_a_drive_over_a_serial_line(tank, tmp_path, capsys):
-    """The second one finds what is left of the first one on the line, and its plant dies."""
+def test_a_drive_over_a_serial_line(tank, tmp_path, capsys, monkeypatch):
+    """The second one finds what is left of the first one on the line, and its plant dies. A busy machine has time."""
     process, line = tank
+    monkeypatch.setattr(drive_command, "Limits", partial(Limits, patience=1.0, oldest=2.0))
     assert drive(tmp_path / "first", "--yes", "--plant", line) == 0
     assert "The guard had nothing to stop." in capsys.readouterr().out
     commands = tmp_path / "second" / "out" / "commands.csv"
@@ -503,7 +505,7 @@ def test_a_drive_over_a_serial_line(tank, tmp_path, capsys):
     killer.start()
     assert drive(tmp_path / "second", "--yes", "--plant", line, "--seconds", "20") == 1
     killer.join(10.0)
-    assert "No new picture for 0.12 s: all wires are stopped." in capsys.readouterr().out
+    assert "No new picture for 1 s: all wires are stopped." in capsys.readouterr().out
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="There are no pseudo-terminals here.")
