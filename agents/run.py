@@ -339,8 +339,7 @@ class Watch(BaseCallback):
         )
 
     def _on_training_start(self) -> None:
-        if self.learner.num_timesteps == 0:
-            self.measure()  # the untrained policy: where the learning curve begins
+        self.is_untrained = self.learner.num_timesteps == 0
         # On a terminal only: elsewhere, a line at every checkpoint says how far it is.
         total, done = self.options.length, self.learner.num_timesteps
         self.bar = tqdm(total=total, initial=done, unit=" decisions", unit_scale=True, disable=None, smoothing=0.1)
@@ -366,6 +365,11 @@ class Watch(BaseCallback):
         self.seconds["policy"] += self._lap() - simulator
         for name, share in self.shares().items():
             self.logger.record(f"time/share_{name}", share)
+        if self.is_untrained:
+            # Where the learning curve begins. Not before: the film's process has compiled the code of a lap meanwhile.
+            self.is_untrained = False
+            self.measure(untrained=True)
+            self._lap()
 
     def _on_training_end(self) -> None:
         self.bar.close()
@@ -395,14 +399,15 @@ class Watch(BaseCallback):
         write_atomically(copy, (self.folder / "model.zip").read_bytes())
         return self.measure()
 
-    def measure(self) -> Swim:
-        """Log how the policy swims round the pentagon now; returns that swim."""
-        strokes = self.learner.num_timesteps
+    def measure(self, untrained: bool = False) -> Swim:
+        """Log how the policy swims round the pentagon now, which nothing has trained yet if so; returns that swim."""
+        strokes = 0 if untrained else self.learner.num_timesteps
+        seconds = 0.0 if untrained else self._before.seconds + sum(self.seconds.values())
         limit = self.options.limit(self.pentagon.scene)
         done = swim("learned", policy_of(self.learner), self.pentagon, max_strokes=limit)
         self.learner.logger.record("eval/pentagon_strokes", done.strokes)
         self.learner.logger.record("eval/pentagon_waypoints", done.waypoints_reached)
-        self.efficiency = record(self.folder, strokes, self._before.seconds + sum(self.seconds.values()), done)
+        self.efficiency = record(self.folder, strokes, seconds, done)
         return done
 
 
