@@ -22,11 +22,11 @@ from seastar_gym.evaluation.benchmark import ENTRIES, EPISODES, GREEDY, ORACLE, 
 from seastar_gym.evaluation.rollout import measure_of_task
 from seastar_gym.files import save_figure
 from studies.frame import Results, Study, commit_of, provenance, rounded
-from studies.oracle import Planner, oracle_of
+from studies.oracle import Adaptive, Planner, oracle_of
 from studies.pages import markdown, show
 from studies.tasks import greedy
 
-AGENTS = {GREEDY: greedy, "planner": Planner, ORACLE: oracle_of}
+AGENTS = {GREEDY: greedy, "planner": Planner, "adaptive": Adaptive, ORACLE: oracle_of}
 SHARES, PRICES = (0.0, 0.1, 0.3, 0.5), (0.0, 1.0)
 """Shares of random actions, and prices of time [1/s], of the agreement."""
 

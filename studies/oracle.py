@@ -1,8 +1,8 @@
 """Oracles of the benchmark: the best controllers that were found, which is no proof that nothing is better.
 
 `Oracle` is told what is hidden, and simulates the very robots ahead before every decision. `Sighted` is for robots that
-are seen by a camera, late: a policy that learned with full sight of such robots, and has it. `Planner` is a rule, which
-is told the true state and nothing else that is hidden.
+are seen by a camera, late: a policy that learned with full sight of such robots, and has it. `Planner` and `Adaptive`
+are rules, which are told the true state and nothing else that is hidden.
 """
 
 import itertools
@@ -21,12 +21,13 @@ from agents.ppo import policy_of
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.learned import LearnedPolicy, load, save
 from seastar_gym.envs.commands import command_table
+from seastar_gym.envs.observation import axes_of
 from seastar_gym.envs.paths import WAYPOINT_RADIUS
 from seastar_gym.envs.randomization import drawn_scene
 from seastar_gym.envs.rewards import RewardWeights
 from seastar_gym.envs.robots import Robots
 from seastar_gym.envs.symmetry import VectorSymmetryReduction
-from seastar_gym.envs.tasks.hidden import FailBlind, SimToReal
+from seastar_gym.envs.tasks.hidden import MOST_DEAD, FailBlind, Miswired, SimToReal
 from seastar_gym.envs.tasks.prey import Courses, Prey, Pursuit
 from seastar_gym.envs.tasks.prizes import Prizes, best_round, distances
 from seastar_gym.envs.tasks.station import Station
@@ -41,6 +42,10 @@ AHEAD = np.arange(0.0, 201.0)
 """Times at which a prey is foreseen [s]."""
 NEVER = 1e3
 """Time that a prey counts that is not met [s]."""
+OF_CURRENT = 20
+"""Decisions over which what robots have drifted is averaged at most."""
+LARGEST_TURN = 0.2
+"""Turn per second of a prey [rad/s]; of more, it is another prey."""
 SIGHTED = Path("runs/oracle")
 """Folder of policies with full sight."""
 DECISIONS = 800_000
@@ -146,6 +151,75 @@ class Planner(Oracle):
 
     def _made(self, copies: int) -> Simulator:
         return Simulator(self.robots.scene, copies * self.robots.n_robots, 1)
+
+
+class Adaptive(Planner):
+    """Planner that believes in what explains the past best: the wiring, the dead limbs, a current, how a prey turns.
+
+    It simulates every decision again under all beliefs, and compares displacements and turns with those that it saw.
+    Where nothing of that is hidden it is the planner.
+    """
+
+    def __init__(self, batch: Any):
+        super().__init__(batch)
+        n, n_limbs = self.robots.n_robots, self.robots.scene.robot.n_limbs
+        other = {Miswired: (-1.0,), FailBlind: (0.0,)}.get(type(self.robots.task), ())
+        beliefs = np.array(list(itertools.product((1.0, *other), repeat=n_limbs)))
+        self._beliefs = beliefs[np.count_nonzero(beliefs == 0.0, axis=1) <= MOST_DEAD]  # factors of commands
+        self._errors, self._flow, self._rate = np.zeros((n, len(self._beliefs))), np.zeros((n, 2)), np.zeros(n)
+        self._before: tuple[State, Floats, Floats] | None = None  # state, commands and velocity of the prey
+        self._decisions = 0
+
+    def predict(self, observation: Any, *_: Any, **__: Any) -> Any:
+        task, robots = self.robots.task, self.robots
+        velocity = task.prey(robots)[1] @ [1.0, 1j] if isinstance(task, Prey) else np.zeros(robots.n_robots, complex)
+        if self._before is not None:
+            self._learn(*self._before, velocity)
+        states, cost, flow = self._in_water(robots.simulator.get_state()), self.cost(), self._flow[:, None]
+        believed = self.search.commands * self._beliefs[np.argmin(self._errors, axis=1)][:, None]
+        best = self._best(
+            states, lambda hubs, since: cost(hubs + since * flow, since), self.search._replace(commands=believed)
+        )
+        chosen = self.search.commands[np.arange(robots.n_robots), best]
+        self._before = states, chosen, velocity
+        return np.array([self._numbers[command.tobytes()] for command in chosen + 0.0]), None
+
+    def _in_water(self, states: State) -> State:
+        """States in the frame of the water that flows as it believes, none under way."""
+        velocities = states.velocities - self._flow[:, None]
+        return states._replace(velocities=velocities, commands=None, phase=None)
+
+    def _learn(self, states: State, commands: Floats, before: NDArray[np.complex128], velocity: Any) -> None:
+        """Learn from a decision. states, commands: With which it began. before, velocity: Of the prey [m/s], x + iy."""
+        robots, period, k = self.robots, self.robots.decision_period, len(self._beliefs)
+        simulator = self._simulator(k)
+        simulator.set_state(states.of_robots(np.repeat(np.arange(robots.n_robots), k)))
+        simulator.advance(period, (commands[:, None] * self._beliefs).reshape(len(commands) * k, -1))
+        hubs = simulator.hub_position().reshape(-1, k, 2) + period * self._flow[:, None]
+        missed = robots.simulator.hub_position()[:, None] - hubs
+        c, s = axes_of(simulator).reshape(2, -1, k)
+        turned = np.angle(np.exp(1j * robots.heading()[:, None]) / (c + 1j * s))
+        self._errors += (missed**2).sum(axis=-1) / robots.scene.robot.limb_length**2 + turned**2
+        if isinstance(robots.task, Station):
+            self._decisions += 1
+            self._flow += missed[:, 0] / period / min(self._decisions, OF_CURRENT)
+        turn = np.angle(velocity * before.conj()) / period
+        self._rate = np.where(np.abs(turn) < LARGEST_TURN, turn, 0.0)
+
+    def cost(self) -> Cost:
+        robots, task = self.robots, self.robots.task
+        if not isinstance(task, Prey):
+            return super().cost()
+        place, velocity = (each @ [1.0, 1j] for each in task.prey(robots))
+        rate = np.where(self._rate == 0.0, 1e-9, self._rate)
+
+        def foreseen(since: float) -> Floats:
+            """The prey goes on turning as it has turned since the last decision."""
+            turns = 1j * rate[:, None] * (since + AHEAD)
+            places = place[:, None] + velocity[:, None] * np.expm1(turns) / (1j * rate[:, None])
+            return np.stack([places.real, places.imag], axis=-1)[:, None]
+
+        return _chase(task, foreseen)
 
 
 class Sighted:

@@ -1,6 +1,7 @@
-"""The study of the benchmark: a page from cells, and an oracle that is told what is hidden."""
+"""The study of the benchmark: a page from cells, an oracle that is told what is hidden, and a rule that finds it out."""
 
 import numpy as np
+import pytest
 
 from later import Later
 from seastar_gym.evaluation import benchmark
@@ -8,7 +9,7 @@ from seastar_gym.evaluation.benchmark import Cell
 from studies.command import main
 
 methods = Later("studies.methods")
-PREY = "SeastarPreyTimed-v0"
+PREY, STATION = "SeastarPreyTimed-v0", "SeastarStation-v0"
 
 
 def test_cells_become_a_file_a_picture_and_a_table(tmp_path, monkeypatch, capsys):
@@ -30,10 +31,38 @@ def test_cells_become_a_file_a_picture_and_a_table(tmp_path, monkeypatch, capsys
     assert all(id in methods.ids_table({}) for id in benchmark.ENTRIES)
 
 
+def after_decisions(agent, id, n):
+    """Policy, batch and info after n decisions of the first four test episodes."""
+    batch = benchmark.make(id, 4, "test", 1)
+    policy = methods.AGENTS[agent](batch)
+    observations, info = batch.reset(options={"instance": [*range(4)]})
+    for _ in range(n):
+        observations, *_, info = batch.step(policy.predict(observations)[0])
+    batch.close()
+    return policy, batch, info
+
+
+@pytest.mark.parametrize("id, hidden, n", [("SeastarMiswiredTimed-v0", "wiring", 60),
+                                           ("SeastarFailBlind-v0", "limb_strengths", 12)])  # fmt: skip
+def test_the_adaptive_rule_finds_out_wirings_and_dead_limbs(id, hidden, n):
+    policy, _, info = after_decisions("adaptive", id, n)
+    believed = policy._beliefs[np.argmin(policy._errors, axis=1)]
+    is_changed = info[hidden] != 1.0
+    assert (believed[~is_changed] == 1.0).all()
+    assert (believed == info[hidden])[is_changed].mean() > 0.6  # it has not heated all others
+
+
+def test_the_adaptive_rule_keeps_a_station_better_than_the_planner_as_it_knows_the_current():
+    planned, (policy, batch, info) = (after_decisions(agent, STATION, 40) for agent in ("planner", "adaptive"))
+    assert np.mean(info["distance"]) < 0.6 * np.mean(planned[2]["distance"])
+    current = np.stack([batch.unwrapped._robots.drawn[f"fluid.current.u_{axis}"] for axis in "xy"], axis=1)
+    np.testing.assert_allclose(policy._flow, current, atol=0.1 * np.abs(current).max())
+
+
 def test_an_oracle_keeps_a_station_better_than_a_planner_and_that_better_than_the_greedy_rule():
     ends = {}
     for agent, make_agent in methods.AGENTS.items():
-        batch = benchmark.make("SeastarStation-v0", 4, "test", 1)
+        batch = benchmark.make(STATION, 4, "test", 1)
         policy = make_agent(batch)
         observations, info = batch.reset(seed=0)
         for _ in range(15):
