@@ -20,20 +20,16 @@ from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import gymnasium as gym
 import numpy as np
 
-from seastar_gym.envs import observation
 from seastar_gym.files import save_figure
 from seastar_gym.gaits import STRAIGHT
-from seastar_gym.lanes.dispatch import code_for
 from seastar_gym.lanes.registers import N_LANES
-from seastar_gym.rods import interval as stroke
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.simulator import Simulator, StrokeReport, batch
+from seastar_gym.simulator import Simulator, StrokeReport
 from studies.frame import Results, Study, commit_of, require_known, rounded
 from studies.operations import count_operations, flops
 from studies.pages import markdown
@@ -104,38 +100,16 @@ def exponent(scene: Scene, seconds: float) -> float:
     return float(np.polyfit(np.log(5 * np.array(NODES_PER_LIMB) - 4), np.log(cost), 1)[0])
 
 
-def step_of(env: Any, n: int) -> tuple[float, float]:
-    """Processor time of a step beyond its kernels, and in them [s], means of n random steps.
-
-    Kernels are the machine code of the strokes and of the observation, as Python calls it.
-    """
+def steps_per_second(env: Any, n: int) -> float:
+    """Random steps per second of processor time, mean of n."""
     env.reset(seed=0)
     env.action_space.seed(0)
     actions = [env.action_space.sample() for _ in range(n)]
     env.step(actions[0])
-    in_kernels = 0.0
-
-    def timed(kernel: Callable[..., None]) -> Callable[..., None]:
-        codes: list[Callable[..., None]] = []
-
-        def call(*arguments: Any) -> None:
-            nonlocal in_kernels
-            if not codes:
-                codes.append(code_for(kernel, *arguments))
-            start = time.thread_time()
-            codes[0](*arguments)
-            in_kernels += time.thread_time() - start
-
-        call.at = lambda form: call  # type: ignore[attr-defined]  # as entry points are asked for their lanes
-        return call
-
-    advance, observe = timed(stroke.advance), timed(observation.observe)
-    with patch.object(batch, "advance", advance), patch.object(observation, "observe", observe):
-        start = time.thread_time()
-        for action in actions:
-            env.step(action)
-        whole = time.thread_time() - start
-    return (whole - in_kernels) / n, in_kernels / n
+    start = time.thread_time()
+    for action in actions:
+        env.step(action)
+    return n / (time.thread_time() - start)
 
 
 def environment(id: str, n_robots: int | None = None) -> Any:
@@ -160,15 +134,12 @@ def throughput(seconds: float) -> Iterator[Row]:
     for id, what in ENVIRONMENTS.items():
         for n_robots in (None, BATCH):
             env, n = environment(id, n_robots), max(3, int(seconds * (20 if n_robots else 200)))
-            beyond, kernels = np.array([step_of(env, n) for _ in range(5)]).T
+            rates = [(n_robots or 1) * steps_per_second(env, n) for _ in range(5)]
             env.close()
-            name = f"{n_robots or 'one'}, fast, {what}"
-            yield row(f"step of {name}: Python", "ms", [1e3 * each for each in beyond])
-            yield row(f"step of {name}: kernels", "ms", [1e3 * each for each in kernels])
-            yield row(f"decisions of {name}", "1/s", [(n_robots or 1) / each for each in beyond + kernels])
+            yield row(f"decisions of {n_robots or 'one'}, fast, {what}", "1/s", rates)
     for id, what in NEIGHBOURS.items() if find_spec("mujoco") else ():
         env = gym.make(id, max_episode_steps=10**9)
-        rates = [1.0 / step_of(env, max(3, int(2000 * seconds)))[0] for _ in range(5)]
+        rates = [steps_per_second(env, max(3, int(2000 * seconds))) for _ in range(5)]
         env.close()
         yield row(f"decisions of {id}, {what}", "1/s", rates)
 
