@@ -1,8 +1,7 @@
 """Methods on the benchmark: the page's tables and pictures, from the cells that `agents.tasks --benchmark` trained.
 
 --references swims the greedy rules, a planner and the oracle instead: an id after the other, those that are missing or
-of another contract. Scores are measured between rules and oracle. --agreement correlates returns with measures, by
-price of time.
+of another contract. Scores are measured between rules and oracle.
 """
 
 from dataclasses import dataclass
@@ -11,36 +10,30 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from agents.methods import METHODS
-from agents.tasks import file_of
-from seastar_gym.controllers.contract import Policy
-from seastar_gym.controllers.learned import load
 from seastar_gym.evaluation import benchmark
-from seastar_gym.evaluation.benchmark import ENTRIES, EPISODES, GREEDY, ORACLE, REFERENCES, Cell, contract
+from seastar_gym.evaluation.benchmark import ENTRIES, EPISODES, GREEDY, ORACLE, REFERENCES, TRACKS, Cell, contract
+from seastar_gym.evaluation.results import interquartile_mean
 from seastar_gym.evaluation.rollout import measure_of_task
 from seastar_gym.files import save_figure
 from studies.frame import Results, Study, commit_of, provenance, rounded
 from studies.oracle import Adaptive, Planner, oracle_of
-from studies.pages import markdown, show
+from studies.pages import markdown
+from studies.style import CYCLE, INK, subplots
 from studies.tasks import greedy
 
 AGENTS = {GREEDY: greedy, "planner": Planner, "adaptive": Adaptive, ORACLE: oracle_of}
-SHARES, PRICES = (0.0, 0.1, 0.3, 0.5), (0.0, 1.0)
-"""Shares of random actions, and prices of time [1/s], of the agreement."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """Which cells are read, or whether references or agreement are swum instead."""
+    """Which cells are read, or whether references are swum instead."""
 
     cells: Path = Path("runs/benchmark")
     """Folder of the cells."""
     references: bool = False
     """Swim the greedy rules, the planner and the oracle, and write them into the package."""
-    agreement: bool = False
-    """Correlate returns with measures, of ids with a price of time."""
 
 
 def swim_references(file: Path = REFERENCES) -> None:
@@ -57,50 +50,10 @@ def swim_references(file: Path = REFERENCES) -> None:
         print(f"{id}, {agent}: {np.mean(swum['measure']):.4g}, return {np.mean(swum['returns']):.4g}", flush=True)
 
 
-class Perturbed:
-    """Policy that takes a share of its actions at random."""
-
-    batched = True
-
-    def __init__(self, policy: Policy, share: float, n_actions: int):
-        self._policy, self._share, self._n, self._rng = policy, share, n_actions, np.random.default_rng(0)
-
-    def predict(self, observation: Any, *others: Any, **named: Any) -> Any:
-        """Actions and state of the policy, some actions at random."""
-        actions, state = self._policy.predict(observation, *others, **named)
-        at_random = self._rng.random(len(actions)) < self._share
-        return np.where(at_random, self._rng.integers(self._n, size=len(actions)), actions), state
-
-
-def agreement(id: str) -> list[str]:
-    """Correlation of return and measure by price of time, over all episodes of `SHARES` and of both agents.
-
-    In brackets that over solved ones. Time of unsolved episodes is the limit, as in the measure.
-    """
-    found, price = [], ENTRIES[id].price or 0.0
-    for share, is_bundled in product(SHARES, (False, True)):
-        bundled = load(file_of(id)) if is_bundled else None
-        batch = benchmark.make(id, EPISODES, "test", 1, **({} if bundled is None else {"actions": bundled.actions}))
-        space: Any = batch.single_action_space
-        swum = benchmark.swum(batch, Perturbed(bundled or greedy(batch), share, int(space.n)))
-        found.append([swum[name] for name in ("measure", "returns", "success")])
-    measure, returns, success = (np.concatenate(column) for column in zip(*found, strict=True))
-    told = []
-    for other in PRICES:
-        paid = returns + (price - other) * measure
-        every, solved = (np.corrcoef(paid[of], measure[of])[0, 1] for of in (slice(None), success))
-        told.append(f"{every:.2f} ({solved:.2f})")
-    return told
-
-
 def run(options: Options, results: Results) -> str | None:
-    """Put the cells of all files together, or swim the references, or the agreement."""
+    """Put the cells of all files together, or swim the references."""
     if options.references:
         swim_references()
-        return None
-    if options.agreement:
-        rows = [[f"`{id}`", *agreement(id)] for id, entry in ENTRIES.items() if entry.price is not None]
-        show(markdown(["id", *(f"{price:g} per second" for price in PRICES)], rows))
         return None
     places = list(METHODS)
     cells = benchmark.read(sorted(options.cells.glob("*/*/*.json")))
@@ -144,8 +97,9 @@ def rows_table(found: Any) -> str:
     cells = trained(found)
     if not cells:
         return "No row is trained yet."
-    picture = "![Scores against decisions and time](results/benchmark/curves.png)"
-    return f"{benchmark.tables(cells, benchmark.as_markdown)}\n{picture}"
+    names = {"scores": "Scores with intervals", "curves": "Scores against decisions and time"}
+    pictures = [f"![{what}](results/benchmark/{name}.png)" for name, what in names.items()]
+    return "\n\n".join([benchmark.tables(cells, benchmark.as_markdown).strip(), *pictures])
 
 
 def rules_table(found: Any) -> str:
@@ -169,26 +123,48 @@ def check_table(found: Any) -> str:
     )
 
 
+def draw_scores(found: Any, file: Path) -> None:
+    """Scores of all rows with their intervals, beside those of the rules."""
+    rows = [row for *_, rows in benchmark.groups(trained(found)) for row in rows]
+    ids = benchmark.scales()
+    scored = [(row.overall(ids), row) for row in rows if not np.isnan(row.overall(ids).mean)]
+    scored.sort(key=lambda each: each[0].mean)
+    figure, axis = subplots(1, 1, figsize=(7.2, 1.2 + 0.28 * len(scored)))
+    labels = []
+    for place, (score, row) in enumerate(scored):
+        colour, seeds = CYCLE[TRACKS.index(row.track)], sorted({len(cells) for cells in row.cells.values()})
+        axis.plot([score.low, score.high], [place, place], color=colour, lw=2.0)
+        axis.plot(score.mean, place, "o", color=colour)
+        labels.append(f"{row.agent}, {row.track} ({' to '.join(map(str, seeds[:1] + seeds[1:][-1:]))})")
+    for rule in benchmark.rows_of([*benchmark.read([REFERENCES])]):
+        at = rule.overall(ids).mean
+        axis.axvline(at, color=INK, lw=1.0, ls="--")
+        axis.annotate(rule.agent, (at, len(scored) - 0.4), ha="center", va="bottom", annotation_clip=False)
+    axis.set_yticks(range(len(scored)), labels)
+    axis.set(xlabel="score (numbers of seeds); lines are 95 % intervals over them", ylim=(-0.6, len(scored) - 0.4))
+    save_figure(figure, file)
+
+
 def draw_curves(found: Any, file: Path) -> None:
-    """Mean score of every row against decisions, and against processor time."""
-    figure = Figure(figsize=(9.0, 4.2), layout="constrained")
-    axes = figure.subplots(1, 2, sharey=True)
+    """Score of every row that has one against decisions, and against processor time."""
+    figure, axes = subplots(1, 2, figsize=(9.0, 4.2), sharey=True)
+    scales, colours = benchmark.scales(), dict(zip(METHODS, (*CYCLE, INK), strict=False))
     for row in (row for *_, rows in benchmark.groups(trained(found)) for row in rows):
-        curves = [(id, cell.curve) for id, own in row.cells.items() for cell in own if id in benchmark.scales()]
-        if not curves:
+        if np.isnan(row.overall(scales).mean):
             continue
-        points = []
+        curves, points = [(id, cell.curve) for id in scales for cell in row.cells[id]], []
         for at in zip(*(curve for _, curve in curves), strict=False):
-            scales = [benchmark.scales()[id] for id, _ in curves]
-            scores = [(g - point["measure"]) / (g - o) for (g, o), point in zip(scales, at, strict=True)]
-            points.append(
-                [np.mean([point[name] for point in at]) for name in ("decisions", "seconds")] + [np.mean(scores)]
-            )
-        decisions, seconds, scores = np.transpose(points)
-        for axis, x in zip(axes, (decisions / 1000.0, seconds), strict=True):
-            axis.plot(x, scores, marker="o", label=f"{row.agent}, {row.track}")
-    axes[0].set(xlabel="decisions [1000]", ylabel="mean score over ids and seeds")
-    axes[0].set_ylim(-1.0, 1.0)  # learners that rest score below, the oracle 1
+            of_ids: dict[str, list[float]] = {}
+            for (id, _), point in zip(curves, at, strict=True):
+                greedy, best = scales[id]
+                of_ids.setdefault(id, []).append((greedy - point["measure"]) / (greedy - best))
+            means = [np.mean([point[name] for point in at]) for name in ("decisions", "seconds")]
+            points.append([*means, interquartile_mean([*of_ids.values()]).mean])
+        if points:
+            style: dict[str, Any] = {"color": colours.get(row.agent), "ls": "-" if row.track == "symmetric" else "--"}
+            for axis, x in zip(axes, np.transpose(points) / [[1000.0], [1.0], [1.0]], strict=False):
+                axis.plot(x, np.transpose(points)[2], marker="o", label=f"{row.agent}, {row.track}", **style)
+    axes[0].set(xlabel="decisions [1000]", ylabel="score")
     axes[1].set(xlabel="processor time of a training [s]")
     figure.legend(*axes[0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=3)
     save_figure(figure, file)
@@ -196,7 +172,7 @@ def draw_curves(found: Any, file: Path) -> None:
 
 STUDY = Study(
     "methods", run, Options, "benchmark/benchmark.json",
-    pictures={"curves.png": draw_curves},
+    pictures={"scores.png": draw_scores, "curves.png": draw_curves},
     tables={
         "benchmark ids": ids_table, "benchmark rows": rows_table, "benchmark rules": rules_table,
         "benchmark check": check_table,

@@ -163,11 +163,12 @@ class Adaptive(Planner):
     def __init__(self, batch: Any):
         super().__init__(batch)
         n, n_limbs = self.robots.n_robots, self.robots.scene.robot.n_limbs
-        other = {Miswired: (-1.0,), FailBlind: (0.0,)}.get(type(self.robots.task), ())
-        beliefs = np.array(list(itertools.product((1.0, *other), repeat=n_limbs)))
+        others: dict[type, tuple[float, ...]] = {Miswired: (-1.0,), FailBlind: (0.0,)}
+        factors = 1.0, *others.get(type(self.robots.task), ())
+        beliefs = np.array(list(itertools.product(factors, repeat=n_limbs)))
         self._beliefs = beliefs[np.count_nonzero(beliefs == 0.0, axis=1) <= MOST_DEAD]  # factors of commands
         self._errors, self._flow, self._rate = np.zeros((n, len(self._beliefs))), np.zeros((n, 2)), np.zeros(n)
-        self._before: tuple[State, Floats, Floats] | None = None  # state, commands and velocity of the prey
+        self._before: tuple[State, Floats, Any] | None = None  # state, commands and velocity of the prey
         self._decisions = 0
 
     def predict(self, observation: Any, *_: Any, **__: Any) -> Any:
@@ -189,7 +190,7 @@ class Adaptive(Planner):
         velocities = states.velocities - self._flow[:, None]
         return states._replace(velocities=velocities, commands=None, phase=None)
 
-    def _learn(self, states: State, commands: Floats, before: NDArray[np.complex128], velocity: Any) -> None:
+    def _learn(self, states: State, commands: Floats, before: Any, velocity: Any) -> None:
         """Learn from a decision. states, commands: With which it began. before, velocity: Of the prey [m/s], x + iy."""
         robots, period, k = self.robots, self.robots.decision_period, len(self._beliefs)
         simulator = self._simulator(k)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -306,6 +306,11 @@ class Row(NamedTuple):
         """Scores of the seeds, of ids that have a scale."""
         return {id: list(map(score, self.cells[id])) for id in ENTRIES if id in self.cells and id in scales()}
 
+    def overall(self, ids: Collection[str]) -> Estimate:
+        """Interquartile mean of the scores over these ids; NaN for a row that has others."""
+        has_all = bool(ids) and self.scores.keys() == {*ids}
+        return interquartile_mean([self.scores[id] for id in ids]) if has_all else Estimate(np.nan, np.nan, np.nan)
+
     @property
     def smallest(self) -> float:
         """Smallest difference of the mean score over the ids that ten seeds can see; NaN below three seeds."""
@@ -377,11 +382,12 @@ def table_of(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
     first = [rows[0].scores[id] for id in scored] if rows[0].scores.keys() == {*scored} else []
     for row in rows:
         shown = [f"{_shown(row.measure(id))} ({len(row.cells[id])})" if id in row.cells else "–" for id in ids]
-        last = ["–", "–", "–"]
-        if scored and row.scores.keys() == {*scored}:
-            ours = [row.scores[id] for id in scored]
-            better = probability_of_improvement(ours, first) if first and row is not rows[0] else np.nan
-            last = [_shown(interquartile_mean(ours)), f"{row.smallest:.2g}", f"{better:.2f}"]
+        overall, smallest, better = row.overall(scored), np.nan, np.nan
+        if not np.isnan(overall.mean):
+            smallest = row.smallest
+            if first and row is not rows[0]:
+                better = probability_of_improvement([row.scores[id] for id in scored], first)
+        last = [_shown(overall), f"{smallest:.2g}", f"{better:.2f}"]
         lines.append([row.agent, *shown, *(text.replace("nan", "–") for text in last)])
     return titles, lines
 
