@@ -171,6 +171,14 @@ class Adaptive(Planner):
         self._before: tuple[State, Floats, Any] | None = None  # state, commands and velocity of the prey
         self._decisions = 0
 
+    @cached_property
+    def search(self) -> Search:
+        if not isinstance(self.robots.task, FailBlind):
+            return super().search
+        every = command_table("joint", self.robots.scene.robot.n_limbs)
+        few = every[np.count_nonzero(every, axis=1) <= every.shape[1] - MOST_DEAD]
+        return Search(np.tile(few, (self.robots.n_robots, 1, 1)))
+
     def predict(self, observation: Any, *_: Any, **__: Any) -> Any:
         task, robots = self.robots.task, self.robots
         velocity = task.prey(robots)[1] @ [1.0, 1j] if isinstance(task, Prey) else np.zeros(robots.n_robots, complex)
