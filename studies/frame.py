@@ -129,7 +129,7 @@ def commit_of(checkout: Path = Path()) -> str:
 def require_known(kind: str, asked: Collection[str], known: Collection[str]) -> None:
     """ValueError where an unknown name is asked for. kind: What is named, in the singular."""
     if unknown := set(asked) - set(known):
-        raise ValueError(f"Unknown {kind} {min(unknown)!r}: choose of {', '.join(known)}.")
+        raise ValueError(f"Unknown {kind} {min(unknown)!r}: choose of {'; '.join(known)}.")
 
 
 def rounded(value: float, digits: int = 4) -> float:

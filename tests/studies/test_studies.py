@@ -88,7 +88,7 @@ def test_what_does_not_fit_is_refused_and_the_file_stays(toy, tmp_path, capsys, 
 
 def test_the_command_lists_the_studies_and_refuses_others(toy, capsys):
     assert main([]) == 0 and re.search(r"^    toy +A toy.$", capsys.readouterr().out, re.MULTILINE)
-    assert main(["luck"]) == 2 and "Unknown study 'luck': choose of toy, contracts." in capsys.readouterr().err
+    assert main(["luck"]) == 2 and "Unknown study 'luck': choose of toy; contracts." in capsys.readouterr().err
     assert main(["contracts"]) == 2 and "nothing to run" in capsys.readouterr().err
     with assert_refused("Unknown seed '99'"):
         Options((99,))
