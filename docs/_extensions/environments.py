@@ -31,7 +31,7 @@ SHOWN = {
 }
 """Sections whose first table stands on the page of all environments, and where."""
 CLASSES = (SeastarSwimEnv, SeastarSwimVectorEnv)
-MADE_OF = ("greedy", "oracle")
+MADE_OF = ("greedy", "planner", "adaptive", "oracle")
 """Agents of the references, in the order of a page."""
 
 
