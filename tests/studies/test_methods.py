@@ -1,4 +1,4 @@
-"""The study of the benchmark: a page from cells, an oracle that is told what is hidden, and a rule that finds it out."""
+"""The study of the benchmark: a page from cells, an oracle that is told what is hidden, a rule that finds it out."""
 
 import numpy as np
 import pytest
