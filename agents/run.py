@@ -365,14 +365,18 @@ class Watch(BaseCallback):
         self.seconds["policy"] += self._lap() - simulator
         for name, share in self.shares().items():
             self.logger.record(f"time/share_{name}", share)
+        self._begin_curve()
+
+    def _on_training_end(self) -> None:
+        self._begin_curve()  # it may have been stopped within the first rollout
+        self.bar.close()
+
+    def _begin_curve(self) -> None:
+        """Measure the untrained policy, once. By now the film's process has compiled the code of a lap."""
         if self.is_untrained:
-            # Where the learning curve begins. Not before: the film's process has compiled the code of a lap meanwhile.
             self.is_untrained = False
             self.measure(untrained=True)
             self._lap()
-
-    def _on_training_end(self) -> None:
-        self.bar.close()
 
     def _lap(self) -> float:
         """Seconds since the last lap."""
@@ -400,7 +404,7 @@ class Watch(BaseCallback):
         return self.measure()
 
     def measure(self, untrained: bool = False) -> Swim:
-        """Log how the policy swims round the pentagon now, which nothing has trained yet if so; returns that swim."""
+        """Log how the policy swims round the pentagon now; returns that swim. untrained: No update was made yet."""
         strokes = 0 if untrained else self.learner.num_timesteps
         seconds = 0.0 if untrained else self._before.seconds + sum(self.seconds.values())
         limit = self.options.limit(self.pentagon.scene)

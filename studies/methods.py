@@ -14,7 +14,6 @@ import numpy as np
 from agents.methods import METHODS
 from seastar_gym.evaluation import benchmark
 from seastar_gym.evaluation.benchmark import ENTRIES, EPISODES, GREEDY, ORACLE, REFERENCES, TRACKS, Cell, contract
-from seastar_gym.evaluation.results import interquartile_mean
 from seastar_gym.evaluation.rollout import measure_of_task
 from seastar_gym.files import save_figure
 from studies.frame import Results, Study, commit_of, provenance, rounded
@@ -150,20 +149,19 @@ def draw_curves(found: Any, file: Path) -> None:
     figure, axes = subplots(1, 2, figsize=(9.0, 4.2), sharey=True)
     scales, colours = benchmark.scales(), dict(zip(METHODS, (*CYCLE, INK), strict=False))
     for row in (row for *_, rows in benchmark.groups(trained(found)) for row in rows):
-        if np.isnan(row.overall(scales).mean):
-            continue
-        curves, points = [(id, cell.curve) for id in scales for cell in row.cells[id]], []
-        for at in zip(*(curve for _, curve in curves), strict=False):
-            of_ids: dict[str, list[float]] = {}
-            for (id, _), point in zip(curves, at, strict=True):
-                greedy, best = scales[id]
-                of_ids.setdefault(id, []).append((greedy - point["measure"]) / (greedy - best))
-            means = [np.mean([point[name] for point in at]) for name in ("decisions", "seconds")]
-            points.append([*means, interquartile_mean([*of_ids.values()]).mean])
-        if points:
-            style: dict[str, Any] = {"color": colours.get(row.agent), "ls": "-" if row.track == "symmetric" else "--"}
-            for axis, x in zip(axes, np.transpose(points) / [[1000.0], [1.0], [1.0]], strict=False):
-                axis.plot(x, np.transpose(points)[2], marker="o", label=f"{row.agent}, {row.track}", **style)
+        cells: list[Any] = [cell for own in row.cells.values() for cell in own]
+        points: list[list[float]] = []
+        for k in range(min(len(cell.curve) for cell in cells)):
+            then = {
+                id: [cell._replace(measure=[cell.curve[k]["measure"]]) for cell in row.cells[id]] for id in row.cells
+            }
+            means = (np.mean([cell.curve[k][name] for cell in cells]) for name in ("decisions", "seconds"))
+            points.append([*means, row._replace(cells=then).overall(scales).mean])
+        style: dict[str, Any] = {"color": colours.get(row.agent), "ls": "-" if row.track == "symmetric" else "--"}
+        if points and not np.isnan(points[-1][-1]):  # it has all ids
+            decisions, seconds, scores = np.transpose(points)
+            for axis, x in zip(axes, (decisions / 1000.0, seconds), strict=True):
+                axis.plot(x, scores, marker="o", label=f"{row.agent}, {row.track}", **style)
     axes[0].set(xlabel="decisions [1000]", ylabel="score")
     axes[1].set(xlabel="processor time of a training [s]")
     figure.legend(*axes[0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=3)

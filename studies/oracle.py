@@ -158,6 +158,8 @@ class Adaptive(Planner):
 
     It simulates every decision again under all beliefs, and compares displacements and turns with those that it saw.
     Where nothing of that is hidden it is the planner.
+
+    flow: Velocity of the water that it believes in [m/s], shape (n_robots, 2).
     """
 
     def __init__(self, batch: Any):
@@ -167,9 +169,14 @@ class Adaptive(Planner):
         factors = 1.0, *others.get(type(self.robots.task), ())
         beliefs = np.array(list(itertools.product(factors, repeat=n_limbs)))
         self._beliefs = beliefs[np.count_nonzero(beliefs == 0.0, axis=1) <= MOST_DEAD]  # factors of commands
-        self._errors, self._flow, self._rate = np.zeros((n, len(self._beliefs))), np.zeros((n, 2)), np.zeros(n)
+        self._errors, self.flow, self._rate = np.zeros((n, len(self._beliefs))), np.zeros((n, 2)), np.zeros(n)
         self._before: tuple[State, Floats, Any] | None = None  # state, commands and velocity of the prey
         self._decisions = 0
+
+    @property
+    def believed(self) -> Floats:
+        """Factors of commands that it believes in, shape (n_robots, n_limbs): -1 if wired crosswise, 0 if dead."""
+        return np.asarray(self._beliefs[np.argmin(self._errors, axis=1)])
 
     @cached_property
     def search(self) -> Search:
@@ -184,18 +191,16 @@ class Adaptive(Planner):
         velocity = task.prey(robots)[1] @ [1.0, 1j] if isinstance(task, Prey) else np.zeros(robots.n_robots, complex)
         if self._before is not None:
             self._learn(*self._before, velocity)
-        states, cost, flow = self._in_water(robots.simulator.get_state()), self.cost(), self._flow[:, None]
-        believed = self.search.commands * self._beliefs[np.argmin(self._errors, axis=1)][:, None]
-        best = self._best(
-            states, lambda hubs, since: cost(hubs + since * flow, since), self.search._replace(commands=believed)
-        )
+        states, cost, flow = self._in_water(robots.simulator.get_state()), self.cost(), self.flow[:, None]
+        search = self.search._replace(commands=self.search.commands * self.believed[:, None])
+        best = self._best(states, lambda hubs, since: cost(hubs + since * flow, since), search)
         chosen = self.search.commands[np.arange(robots.n_robots), best]
         self._before = states, chosen, velocity
         return np.array([self._numbers[command.tobytes()] for command in chosen + 0.0]), None
 
     def _in_water(self, states: State) -> State:
         """States in the frame of the water that flows as it believes, none under way."""
-        velocities = states.velocities - self._flow[:, None]
+        velocities = states.velocities - self.flow[:, None]
         return states._replace(velocities=velocities, commands=None, phase=None)
 
     def _learn(self, states: State, commands: Floats, before: Any, velocity: Any) -> None:
@@ -204,14 +209,14 @@ class Adaptive(Planner):
         simulator = self._simulator(k)
         simulator.set_state(states.of_robots(np.repeat(np.arange(robots.n_robots), k)))
         simulator.advance(period, (commands[:, None] * self._beliefs).reshape(len(commands) * k, -1))
-        hubs = simulator.hub_position().reshape(-1, k, 2) + period * self._flow[:, None]
+        hubs = simulator.hub_position().reshape(-1, k, 2) + period * self.flow[:, None]
         missed = robots.simulator.hub_position()[:, None] - hubs
         c, s = axes_of(simulator).reshape(2, -1, k)
         turned = np.angle(np.exp(1j * robots.heading()[:, None]) / (c + 1j * s))
         self._errors += (missed**2).sum(axis=-1) / robots.scene.robot.limb_length**2 + turned**2
         if isinstance(robots.task, Station):
             self._decisions += 1
-            self._flow += missed[:, 0] / period / min(self._decisions, OF_CURRENT)
+            self.flow += missed[:, 0] / period / min(self._decisions, OF_CURRENT)
         turn = np.angle(velocity * before.conj()) / period
         self._rate = np.where(np.abs(turn) < LARGEST_TURN, turn, 0.0)
 

@@ -14,6 +14,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -224,6 +225,16 @@ def test_a_training_that_is_asked_to_end_leaves_a_usable_model_and_says_how_to_g
     assert f"Stopped after {trained} decisions" in output
     assert train.main(["--resume", str(folder), "--strokes", str(trained + 128)]) == 0
     assert "Learned against scripted" in (folder / "evaluation" / "report.html").read_text()
+
+
+def test_a_training_that_stops_in_its_first_rollout_has_measured_the_untrained_policy(
+    tmp_path, monkeypatch, short_swims
+):
+    asked, folder = threading.Event(), tmp_path / "run"
+    asked.set()
+    monkeypatch.setattr("train.stoppable", lambda: contextlib.nullcontext(asked))
+    assert train.main([*TINY, "--strokes", "256", "--out", str(folder)]) == 130
+    assert [trained for trained, *_ in run_folder.recorded(folder)] == [0, 16]
 
 
 def test_a_folder_is_taken_while_it_is_empty_and_never_written_over(finished, tmp_path, capsys):

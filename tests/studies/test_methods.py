@@ -46,17 +46,16 @@ def after_decisions(agent, id, n):
                                            ("SeastarFailBlind-v0", "limb_strengths", 12)])  # fmt: skip
 def test_the_adaptive_rule_finds_out_wirings_and_dead_limbs(id, hidden, n):
     policy, _, info = after_decisions("adaptive", id, n)
-    believed = policy._beliefs[np.argmin(policy._errors, axis=1)]
     is_changed = info[hidden] != 1.0
-    assert (believed[~is_changed] == 1.0).all()
-    assert (believed == info[hidden])[is_changed].mean() > 0.6  # it has not heated all others
+    assert (policy.believed[~is_changed] == 1.0).all()
+    assert (policy.believed == info[hidden])[is_changed].mean() > 0.6  # it has not heated all others
 
 
 def test_the_adaptive_rule_keeps_a_station_better_than_the_planner_as_it_knows_the_current():
     planned, (policy, batch, info) = (after_decisions(agent, STATION, 40) for agent in ("planner", "adaptive"))
     assert np.mean(info["distance"]) < 0.6 * np.mean(planned[2]["distance"])
     current = np.stack([batch.unwrapped._robots.drawn[f"fluid.current.u_{axis}"] for axis in "xy"], axis=1)
-    np.testing.assert_allclose(policy._flow, current, atol=0.1 * np.abs(current).max())
+    np.testing.assert_allclose(policy.flow, current, atol=0.1 * np.abs(current).max())
 
 
 def test_an_oracle_keeps_a_station_better_than_a_planner_and_that_better_than_the_greedy_rule():
