@@ -54,9 +54,9 @@ def run(options: Options, results: Results) -> str | None:
     if options.references:
         swim_references()
         return None
-    places = list(METHODS)
+    places = {name: place for place, name in enumerate(METHODS)}
     cells = benchmark.read(sorted(options.cells.glob("*/*/*.json")))
-    cells.sort(key=lambda cell: places.index(cell.agent) if cell.agent in places else len(places))
+    cells.sort(key=lambda cell: (cell.decisions or 0, places.get(cell.agent, len(places))))
     if not cells:
         return f"There are no cells in {options.cells}: python -m agents.tasks --benchmark trains them."
     results["cells"] = [
@@ -91,6 +91,15 @@ def trained(found: Any, first: int = 0) -> list[Cell]:
     return [cell for cell in cells_of(found) if cell.decisions is not None and cell.first == first]
 
 
+def named_rows(cells: list[Cell]) -> dict[str, benchmark.Row]:
+    """Rows by agent, track and length of training where it is not the shorter budget."""
+    return {
+        f"{row.agent}, {track}" + ("" if decisions == benchmark.BUDGETS[0] else f", {decisions:,} decisions"): row
+        for track, _, decisions, rows in benchmark.groups(cells)
+        for row in rows
+    }
+
+
 def rows_table(found: Any) -> str:
     """Tables of the rows that are trained."""
     cells = trained(found)
@@ -109,32 +118,28 @@ def rules_table(found: Any) -> str:
 
 def check_table(found: Any) -> str:
     """Means of the check episodes, in bold where they are outside the interval of the test episodes."""
-    before = {(row.agent, row.track): row for row in benchmark.rows_of(trained(found))}
-    lines = []
-    for row in benchmark.rows_of(trained(found, benchmark.FIRST["check"])):
+    before, lines = named_rows(trained(found)), []
+    for name, row in named_rows(trained(found, benchmark.FIRST["check"])).items():
         shown = dict.fromkeys(ENTRIES, "–")
         for id in row.cells:
-            mean, of_test = row.measure(id).mean, before[row.agent, row.track].measure(id)
+            mean, of_test = row.measure(id).mean, before[name].measure(id)
             shown[id] = f"{mean:.3g}" if of_test.low <= mean <= of_test.high else f"**{mean:.3g}**"
-        lines.append([row.agent, row.track, *shown.values()])
-    return markdown(
-        ["agent", "track", *(id.removeprefix("Seastar").removesuffix("-v0") for id in ENTRIES)], lines, (0, 1)
-    )
+        lines.append([name, *shown.values()])
+    return markdown(["agent, track", *(id.removeprefix("Seastar").removesuffix("-v0") for id in ENTRIES)], lines)
 
 
 def draw_scores(found: Any, file: Path) -> None:
     """Scores of all rows with their intervals, beside those of the rules."""
-    rows = [row for *_, rows in benchmark.groups(trained(found)) for row in rows]
     ids = benchmark.scales()
-    scored = [(row.overall(ids), row) for row in rows if not np.isnan(row.overall(ids).mean)]
-    scored.sort(key=lambda each: each[0].mean)
+    scored = [(row.overall(ids), row, name) for name, row in named_rows(trained(found)).items()]
+    scored = sorted((each for each in scored if not np.isnan(each[0].mean)), key=lambda each: each[0].mean)
     figure, axis = subplots(1, 1, figsize=(7.2, 1.2 + 0.28 * len(scored)))
     labels = []
-    for place, (score, row) in enumerate(scored):
+    for place, (score, row, name) in enumerate(scored):
         colour, seeds = CYCLE[TRACKS.index(row.track)], sorted({len(cells) for cells in row.cells.values()})
         axis.plot([score.low, score.high], [place, place], color=colour, lw=2.0)
         axis.plot(score.mean, place, "o", color=colour)
-        labels.append(f"{row.agent}, {row.track} ({' to '.join(map(str, seeds[:1] + seeds[1:][-1:]))})")
+        labels.append(f"{name} ({' to '.join(map(str, seeds[:1] + seeds[1:][-1:]))})")
     for rule in benchmark.rows_of([*benchmark.read([REFERENCES])]):
         at = rule.overall(ids).mean
         axis.axvline(at, color=INK, lw=1.0, ls="--")
@@ -148,7 +153,7 @@ def draw_curves(found: Any, file: Path) -> None:
     """Score of every row that has one against decisions, and against processor time."""
     figure, axes = subplots(1, 2, figsize=(9.0, 4.2), sharey=True)
     scales, colours = benchmark.scales(), dict(zip(METHODS, (*CYCLE, INK), strict=False))
-    for row in (row for *_, rows in benchmark.groups(trained(found)) for row in rows):
+    for name, row in named_rows(trained(found)).items():
         cells: list[Any] = [cell for own in row.cells.values() for cell in own]
         points: list[list[float]] = []
         for k in range(min(len(cell.curve) for cell in cells)):
@@ -161,7 +166,11 @@ def draw_curves(found: Any, file: Path) -> None:
         if points and not np.isnan(points[-1][-1]):  # it has all ids
             decisions, seconds, scores = np.transpose(points)
             for axis, x in zip(axes, (decisions / 1000.0, seconds), strict=True):
-                axis.plot(x, scores, marker="o", label=f"{row.agent}, {row.track}", **style)
+                axis.plot(x, scores, marker="o", label=name, **style)
+    for axis, ticks in zip(axes, ([25, 50, 100, 200, 500, 1000], [10, 30, 100, 300, 1000]), strict=True):
+        axis.set_xscale("log")
+        axis.set_xticks(ticks, [*map(str, ticks)])
+        axis.minorticks_off()
     axes[0].set(xlabel="decisions [1000]", ylabel="score")
     axes[1].set(xlabel="processor time of a training [s]")
     figure.legend(*axes[0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=3)

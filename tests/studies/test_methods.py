@@ -26,7 +26,7 @@ def test_cells_become_a_file_a_picture_and_a_table(tmp_path, monkeypatch, capsys
     assert main(["methods", "--cells", str(tmp_path), "--out", str(tmp_path / "page")]) == 0
     assert {file.name for file in (tmp_path / "page").iterdir()} == {"benchmark.json", "curves.png", "scores.png"}
     told = capsys.readouterr().out
-    assert "| PPO | 5 [4, 6] (3) | 0.625 [0.5, 0.75] |" in told and "| PPO | plain | **9** |" in told
+    assert "| PPO | 5 [4, 6] (3) | 0.625 [0.5, 0.75] |" in told and "| PPO, plain, 20 decisions | **9** |" in told
     assert methods.rows_table({}) == "No row is trained yet."
     assert all(id in methods.ids_table({}) for id in benchmark.ENTRIES)
 
