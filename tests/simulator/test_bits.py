@@ -200,7 +200,9 @@ def expected(name):
 
 
 def in_parts(simulator, duration, commands):
-    return finished(simulator.advance_in_parts(duration, commands, 7))[1]
+    times, report = finished(simulator.advance_in_parts(duration, commands, 7))
+    assert times[-1] == pytest.approx(duration)
+    return report
 
 
 def at_times(simulator, duration, commands):

@@ -66,7 +66,7 @@ def test_counting_simulates_nothing(tmp_path, capsys):
 
 def test_a_search_from_words_to_its_best(tmp_path, capsys):
     """Which does not write through a link."""
-    optuna = pytest.importorskip("optuna")
+    optuna, tmp_path = pytest.importorskip("optuna"), tmp_path / "is/not yet there"
     words = "robot.limb_length=0.05:0.15", "--optuna", "4", "--robots", "2", "--minimize", "--out", str(tmp_path)
     assert main([*words, *QUICK]) == 0
     found = read_results(tmp_path).column("speed").to_pylist()
