@@ -143,9 +143,9 @@ def draw_scores(found: Any, file: Path) -> None:
     for rule in benchmark.rows_of([*benchmark.read([REFERENCES])]):
         at = rule.overall(ids).mean
         axis.axvline(at, color=INK, lw=1.0, ls="--")
-        axis.annotate(rule.agent, (at, len(scored) - 0.3), rotation=90.0, ha="center", va="bottom", annotation_clip=False)
+        axis.annotate(rule.agent, (at, len(scored) - 0.3), rotation=90.0, ha="center", annotation_clip=False)
     axis.set_yticks(range(len(scored)), labels)
-    axis.set(xlabel="score (numbers of seeds); lines are 95 % intervals over them", ylim=(-0.6, len(scored) - 0.4))
+    axis.set(xlabel="score and its 95 % interval (numbers of seeds)", ylim=(-0.6, len(scored) - 0.4))
     save_figure(figure, file)
 
 
