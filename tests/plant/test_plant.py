@@ -221,6 +221,14 @@ def test_a_board_that_restarts_when_its_port_is_opened_is_greeted(ends):
     assert not plant.heated().any()
 
 
+def test_a_garbled_line_from_the_wires_ends_a_drive_before_anything_is_seen(ends):
+    far, _ = joined(ends, simulated(Sight(delay=5.0)))
+    assert far.sight() is None
+    ends[0].send(sealed("late 1").replace(b"1", b"2", 1))
+    with pytest.raises(PlantError, match="garbled"):
+        far.sight()
+
+
 def test_pulses_that_waited_for_a_busy_plant_are_not_heated(ends):
     plant = simulated()
     far, server = joined(ends, plant)
