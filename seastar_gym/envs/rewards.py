@@ -23,7 +23,15 @@ PULSE = 0.1
 @register_part
 @dataclass(frozen=True)
 class RewardWeights:
-    """Weights of the reward's terms, none negative, and `aim`, the shape of the rewarded route."""
+    """Weights of the reward's terms, none negative, and `aim`, the shape of the rewarded route.
+
+    progress: Reward per metre by which the rewarded route to the last waypoint became shorter [1/m].
+    waypoint: Reward per waypoint reached.
+    effort: Price of heating one wire for PULSE = 0.1 s.
+    aim: Distance from a waypoint's centre, as a fraction of its radius, at which the rewarded route passes it, 0 to 1.
+    heading: Reward per radian by which there is less left to turn [1/rad], where headings are asked for.
+    time: Price of a second [1/s].
+    """
 
     progress: Annotated[float, not_negative("1")] = 200.0
     """Reward per metre by which the rewarded route to the last waypoint became shorter [1/m]. One stroke of the best
