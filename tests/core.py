@@ -30,7 +30,7 @@ IMPORTS = """
 import gymnasium as gym
 import numpy as np
 import seastar_gym
-from seastar_gym import Body, Contact, Limb, Scene, Seastar, Simulator, UniformCurrent, Water
+from seastar_gym import Body, Contact, Limb, Scene, Seastar, Simulator, SmaWires, UniformCurrent, Water
 from seastar_gym.gradients import differentiate, record
 
 def stroke(n=1, **parts):
@@ -40,7 +40,8 @@ def stroke(n=1, **parts):
 
 def swim(env):
     env.reset(seed=0)
-    env.step(env.action_space.sample())
+    for _ in range(12):
+        env.step(env.action_space.sample())
 
 def forward_and_back():
     scene, commands = Scene.preset('fast'), np.ones((1, 5))
@@ -50,8 +51,9 @@ def forward_and_back():
 """
 KINDS = {
     "gradients": "forward_and_back()",
-    "an environment": "swim(gym.make('SeastarSwim-v0'))",
+    "environments": "swim(gym.make('SeastarSwim-v0')), swim(gym.make('SeastarFailBlind-v0'))",
     "a batch": "swim(gym.make_vec('SeastarSwimTimed-v0', 3, vectorization_mode='vector_entry_point'))",
+    "wires": "stroke(actuator=SmaWires()), stroke(8, actuator=SmaWires())",
     "hub hinges": "stroke(robot=Seastar(discretisation='chapter'))",
     "current": "stroke(fluid=Water(current=UniformCurrent(0.01, 0.0)))",
     "contact": "stroke(contact=Contact())",
