@@ -140,8 +140,8 @@ class Core:
             start(process, args, *more, **named)
 
         def load_overload(cache, sig, context):
-            if cache.is_of_package and cache.kind(sig) not in self.kinds:
-                self.leave("compiles another kind of scene")
+            if cache.is_of_package and (kind := cache.kind(sig)) not in self.kinds:
+                self.leave(f"compiles another kind of scene, {kind.partition('.py3')[0]}")
             return load(cache, sig, context)
 
         def leave(*_, **__):
