@@ -160,7 +160,7 @@ def draw_curves(found: Any, file: Path) -> None:
             then = {
                 id: [cell._replace(measure=[cell.curve[k]["measure"]]) for cell in row.cells[id]] for id in row.cells
             }
-            means = (np.mean([cell.curve[k][name] for cell in cells]) for name in ("decisions", "seconds"))
+            means = (np.mean([cell.curve[k][what] for cell in cells]) for what in ("decisions", "seconds"))
             points.append([*means, row._replace(cells=then).overall(scales).mean])
         style: dict[str, Any] = {"color": colours.get(row.agent), "ls": "-" if row.track == "symmetric" else "--"}
         if points and not np.isnan(points[-1][-1]):  # it has all ids

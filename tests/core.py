@@ -40,7 +40,7 @@ def stroke(n=1, **parts):
 
 def swim(env):
     env.reset(seed=0)
-    for _ in range(12):
+    for _ in range(12):  # beyond a second, from which on growth of energy is measured
         env.step(env.action_space.sample())
 
 def forward_and_back():
