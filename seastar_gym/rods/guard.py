@@ -279,19 +279,27 @@ def cut_velocities(rods, q, v, frame, motion, share, robots):
     move_roots(rods, q, v)
 
 
-KNOWN = 1e300  # energy [J]: the rigid motion of nodes that lie in one point is no number
+RIGID = 1.0 + 1e-6  # times the kinetic energy: a rigid motion with the same momenta has no more of it
 
 
 @rare_kernel
 def come_to_rest(rods, work, q, v, robots):
     """Leave the robots in the mask the rigid motion that has their momenta alone.
 
-    Returns the mask of those that have one.
+    Returns the mask of those that have one: not where all nodes lie in one point, nor where masses are so unlike that
+    rounding alone drives it. These keep their velocities.
     """
+    rows = 2 * rods.n_free
     frame = frame_velocity(rods, q, v)
+    before = moving_energy(rods, work, q, v, frame)
     motion = rigid_motion(rods, work, q, v, frame)
-    resting = robots & (motion[5] < KNOWN)
-    cut_velocities(rods, q, v, frame, motion, splat(0.0), resting)
+    for row in range(rows):
+        store(work.step, row, load(v, row))
+    cut_velocities(rods, q, v, frame, motion, splat(0.0), robots)
+    resting = robots & (moving_energy(rods, work, q, v, frame) <= RIGID * before)
+    for row in range(rows):
+        store(v, row, select(robots & ~resting, load(work.step, row), load(v, row)))
+    move_roots(rods, q, v)
     return resting
 
 

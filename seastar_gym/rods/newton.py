@@ -215,7 +215,7 @@ def move_node(work, node, solution, shortening, scale):
 
 
 SLENDER = 5000.0  # square of an edge's length over its radius: slenderer edges do not curve the potential more
-PREDICTABLE_STRAIN = 1e-3  # over EA times the length of all limbs: more energy strains or moves a robot violently
+PREDICTABLE_STRAIN = 1e-3  # over EA times length of all limbs, were they as the weakest: more is a violent motion
 
 MOST_CURVED = 10.0  # times CURVATURE: no Newton step is predictable where drag curves the potential more
 
@@ -258,8 +258,8 @@ def coefficients(
     shortest, thinnest = float(mesh.root_edges.min()), float(mesh.at_nodes.thickness.min())
     slenderness = min(1.0, (shortest / thinnest) ** 2 / SLENDER)
     rate = float(mesh.modulus_at_nodes.max()) / (density * shortest**2) * slenderness
-    length = mean(mesh.limb_lengths)
-    energy = PREDICTABLE_STRAIN * mean(stretching.EA) * mesh.n_limbs * length
+    length, EA = mean(mesh.limb_lengths), [mean(of_limb) for of_limb in stretching.EA.reshape(mesh.n_limbs, -1)]
+    energy = float(np.min(PREDICTABLE_STRAIN * np.array(EA) * mesh.n_limbs * np.asarray(mesh.limb_lengths)))
     area = mesh.per_node(mesh.at_nodes.inert)
     broadside = mean(mesh.per_node(drag_per_length(fluid_density, C_d, mesh.at_nodes.width)))
     drag_curvature = broadside / (density * float(area.min())) * float(mesh.dl.max())

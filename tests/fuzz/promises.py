@@ -233,8 +233,7 @@ def energy_noise(simulator: Simulator, robot: int, energy: float, h: float) -> f
     h: Of the shortest step [s]; velocities are differences of positions over it.
     """
     rods = make_rods(simulator.scene, robot if simulator.scene.n_robots else 0)
-    masses = rods.inertia.node[rods.inertia.node > 0.0]
-    length, mass = float(rods.scales.shortest_edge[0]), float(masses[masses < 1e9 * masses.min()].sum())
+    length, mass = float(rods.scales.shortest_edge[0]), float(rods.scales.free_mass[0])
     stretching, bending = rods.stretching.EA_over_l.max(), rods.bending.EI_over_dl.max()
     stiffness = (len(rods.inertia.node) - 1) * float(stretching + 4.0 * bending / length**2)
     move = 10.0 * EPSILON * (float(np.abs(simulator.positions[robot]).max()) + (rods.edges_per_limb + 1) * length)

@@ -114,6 +114,14 @@ def test_overlaps_are_a_robot_s_own(terms, seed):
     PROMISES["bits alone"](draw_case(Random(seed), terms, wild=True))
 
 
+@pytest.mark.parametrize("seed", [21, 7396])
+def test_energy_of_limbs_unlike_each_other(seed):
+    """A slender limb beside a thick one folded unseen, as it has little of the energy that was taken for violent; a
+    robot with a huge node came to rest with more energy than it had.
+    """
+    PROMISES["energy"](draw_case(Random(seed), PLAIN, wild=True))
+
+
 # The long run: `pytest tests/fuzz --fuzz-minutes 60 -s`, and its failures one by one, by `--fuzz-case`.
 
 
