@@ -193,7 +193,7 @@ def imitation(teacher: LearnedPolicy, options: Options, camera: Camera, folder: 
     print(f"A policy for {told(camera.sight)} learns from the run's, {decisions} decisions.", flush=True)
     with tqdm(total=decisions, unit=" decisions", unit_scale=True, disable=None) as bar:
         return distil(
-            teacher, VectorFrameStack(batch, PAST), decisions, options.seed, options.ppo.hidden,
+            teacher, VectorFrameStack(batch, PAST, options.ppo.symmetry), decisions, options.seed, options.ppo.hidden,
             lambda done: bar.update(done - bar.n),
         )  # fmt: skip
 

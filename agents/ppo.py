@@ -351,7 +351,7 @@ def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
     """Description of a policy with these widths of hidden layers that learns in an environment."""
     batch: Any = env.env.unwrapped
     memory = next((layer for layer in env.layers() if isinstance(layer, VectorFrameStack)), None)
-    symmetry = memory is not None or env.env_is_wrapped(VectorSymmetryReduction)[0]
+    symmetry = env.env_is_wrapped(VectorSymmetryReduction)[0] if memory is None else memory.symmetric
     about = Description(batch.actions, symmetry, batch.scene, hidden, batch.decision_period)
     past = 0 if memory is None else memory.frame_stack.past
     at = batch.layout

@@ -66,11 +66,11 @@ def camera_of(text: str | None) -> Camera | None:
 
 def trained_for(options: argparse.Namespace) -> dict[str, Any]:
     """Arguments of the environment that a policy was trained for, its robot's where it is a file, unless options name a
-    task or a scene."""
-    if options.task is not None or options.scene is not None:
+    task; a scene that they name comes later."""
+    if options.task is not None:
         return {}
     if options.agent == "learned":
-        return {"decision_period": LEARNED_PERIOD}
+        return {} if options.scene is not None else {"decision_period": LEARNED_PERIOD}
     policy = learned_policy(options.agent)
     if policy is None:
         return {"decision_period": period_of(options.agent)}

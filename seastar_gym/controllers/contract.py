@@ -109,7 +109,10 @@ def require_fit(
     ours = getattr(policy, "decision_period", getattr(sees, "decision_period", None))
     theirs = scene.actuator.period if decision_period is None else decision_period
     if ours is not None and not math.isclose(ours, theirs):
-        raise ValueError(f"The policy decides every {ours:g} s, the environment every {theirs:g} s: make them equal.")
+        raise ValueError(
+            f"The policy decides every {ours:g} s, the environment every {theirs:g} s: make them equal, by "
+            "decision_period or --decision-period."
+        )
     if sees is not None and sees.shape != (n_seen,):
         shown_by = "" if sight is None else f", by {told(sight)}"
         raise ValueError(

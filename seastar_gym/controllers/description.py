@@ -112,8 +112,6 @@ class Description(NamedTuple):
         if self.task is not None and (not isinstance(self.task, str) or self.task not in NAMES_OF_TASKS):
             raise ValueError(f"Its task must be one of {', '.join(NAMES_OF_TASKS)}, not {shown(self.task)}.")
         require_count("its past", self.past, 0, MOST_PAST)
-        if self.past and not self.symmetry:
-            raise ValueError("A policy without symmetry has no past.")
         if self.limb_mirror is not None:
             _require_mirror(self.limb_mirror)
         require_kind("its sight", self.sight, Sight | None, "a Sight, or null")
@@ -145,7 +143,8 @@ class Description(NamedTuple):
     @property
     def frame_stack(self) -> FrameStack | None:
         """What the policy sees of present and past observations; None for a policy without memory."""
-        return FrameStack(self.reduction, self.past) if self.past and self.reduction is not None else None
+        symmetry = self.reduction or Symmetry.none_of(self.layout, self.actions)
+        return FrameStack(symmetry, self.past) if self.past else None
 
     @property
     def input_size(self) -> int:

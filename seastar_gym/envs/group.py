@@ -36,6 +36,12 @@ def require_group(group: object) -> None:
         require_count("group", group, 1, MOST_LIMBS)
 
 
+def trivial_group(n_limbs: int) -> PointGroup:
+    """Group of a robot that nothing leaves as it is."""
+    limbs = tuple(range(n_limbs))
+    return PointGroup(1, None, (limbs, limbs))
+
+
 def n_limbs_of(group: Group) -> int:
     """Number of limbs of a robot with this group."""
     return len(group.orders[0]) if isinstance(group, PointGroup) else group

@@ -42,13 +42,14 @@ from seastar_gym.envs.group import (
     read_only,
     require_group,
     transform_commands,
+    trivial_group,
     turns,
 )
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.scene import Scene, checks
 from seastar_gym.scene.actuators.base import Actuator, Mirror, complete, is_actuator
-from seastar_gym.scene.checks import is_whole_number, require_choice, require_count, require_kind, shown
+from seastar_gym.scene.checks import is_whole_number, require_choice, require_count, require_flag, require_kind, shown
 from seastar_gym.scene.shape import SAME, PointGroup
 
 if TYPE_CHECKING:
@@ -76,11 +77,11 @@ def symmetry_of(scene: Scene) -> Group:
     Robots of the chapter's discretisation have all or none.
     """
     require_kind("scene", scene, Scene, "a Scene")
-    robot, nothing = scene.robot, tuple(range(scene.robot.n_limbs))
+    robot = scene.robot
     group = robot.point_group(_feels_directions(scene))
     if group.is_whole:
         return robot.n_limbs
-    return PointGroup(1, None, (nothing, nothing)) if robot.discretisation == "chapter" else group
+    return trivial_group(robot.n_limbs) if robot.discretisation == "chapter" else group
 
 
 def _feels_directions(scene: Scene) -> bool:
@@ -144,6 +145,11 @@ class Symmetry:
         """Symmetry of the robot of a scene that swims along waypoints."""
         mirror = memory_mirror(scene.actuator)
         return cls(symmetry_of(scene), mirror, Layout(scene.robot.n_limbs, len(mirror)), actions)
+
+    @classmethod
+    def none_of(cls, layout: Layout, actions: Actions = "limbs") -> Symmetry:
+        """That of a robot without any: observations and actions stay as they are."""
+        return cls(trivial_group(layout.n_limbs), tuple((k, 1) for k in range(layout.of_limb)), layout, actions)
 
     def sectors(self, observations: Floating) -> Elements:
         """Sectors of the current waypoints, 0 to 2 n_turns - 1, shape (...), in observations of shape (..., size).
@@ -385,11 +391,16 @@ def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
             yield f"{name} is drawn for every limb by itself"
 
 
-def symmetry_in(env: Any) -> Symmetry:
-    """Symmetry of an environment or a batch; ValueError if its scene is not symmetric."""
+def symmetry_in(env: Any, reduced: bool = True) -> Symmetry:
+    """Symmetry of an environment or a batch; ValueError if its scene is not symmetric.
+
+    reduced: Whether that is used. Otherwise any scene will do.
+    """
     inner = getattr(env, "unwrapped", env)
     if not isinstance(inner, RobotsEnv):
         raise ValueError(f"Symmetry is known of SeastarSwim-v0 and the timed environments alone, not of {inner!r}.")
+    if not reduced:
+        return Symmetry.none_of(inner.layout, inner.actions)
     require_symmetry(inner.scene, inner.randomization)
     return Symmetry(symmetry_of(inner.scene), observed_mirror(inner), inner.layout, inner.actions)
 
@@ -464,10 +475,13 @@ class VectorSymmetryReduction(_VectorWrapper):
     Observations in `info["final_obs"]` are turned and mirrored, too, each by its own element, and so are masks.
     """
 
+    symmetric = True
+    """Whether robots are turned and mirrored."""
+
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
         require_kind("env", env, gym.vector.VectorEnv, "a batch, as gym.make_vec gives it")
         super().__init__(env)
-        self._symmetry = symmetry_in(env)
+        self._symmetry = symmetry_in(env, self.symmetric)
         self.single_observation_space = ReducedBox.of(env.single_observation_space)
         self._elements = np.zeros(env.num_envs, np.intp)
 
@@ -515,10 +529,12 @@ class VectorFrameStack(VectorSymmetryReduction):
 
     At the beginning of an episode, the past is the first observation. Asked headings are not shown in the past.
 
-    past: Number of past observations.
+    past: Number of past observations. symmetry: Whether they are brought into one sector; otherwise scenes need none.
     """
 
-    def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any], past: int):
+    def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any], past: int, symmetry: bool = True):
+        require_flag("symmetry", symmetry)
+        self.symmetric = symmetry
         super().__init__(env)
         if self._symmetry.layout.asks_headings:
             raise ValueError("Asked headings have no place in this memory: take a task without them.")

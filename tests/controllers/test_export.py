@@ -57,6 +57,7 @@ def four(*lengths: float) -> Seastar:
 OWN = {
     "limbs": Description("limbs", True, Scene(actuator=SmaWires()), (16,)),
     "no-symmetry": Description("pairs", False, Scene(), (16, 8)),
+    "no-symmetry-with-memory": Description("pairs", False, Scene(four(0.12, 0.1, 0.11, 0.09)), (8,), past=2),
     "three-limbs": Description("limbs", True, Scene(Seastar(n_limbs=3, nodes_per_limb=4)), (8,), past=2),
     "two-long-limbs-opposite": Description("joint", True, Scene(four(0.12, 0.1, 0.12, 0.1)), ()),
     "two-long-limbs-adjacent": Description("pairs", True, Scene(four(0.12, 0.12, 0.1, 0.1)), (16,), past=1),

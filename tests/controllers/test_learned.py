@@ -152,7 +152,6 @@ CHANGED = [
       for rows in ([[1, 2]], [[1, 2, 10**400]], {"a": 1})),
     ({"training": {"commands": [3]}}, "the commands of its training must be texts"),
     ({"sha256": 3}, "the weights are not those"),
-    ({"past": 8, "symmetry": False}, "a policy without symmetry has no past"),
     ({"limb_mirror": [[0, 1]] * 1001}, "its limb_mirror must be a list of pairs"),
     *(({"limb_mirror": [pair]}, "not an index and a sign") for pair in ([0, 2], [0, 1, 1], [0, 1.0])),
     ({"limb_mirror": [[5, 1]]}, "an index of its limb_mirror must be a whole number from 0 to 0"),

@@ -7,7 +7,20 @@ from gymnasium.vector import AutoresetMode
 
 from episodes import assert_same, swum
 from hubs import TEN
-from seastar_gym import Attachment, Body, Numerics, Scene, Seastar, Sight, Simulator, SmaPulse, Uniform
+from seastar_gym import (
+    Attachment,
+    Body,
+    Limb,
+    Numerics,
+    Scene,
+    Seastar,
+    Sight,
+    Simulator,
+    SmaPulse,
+    Uniform,
+    UniformCurrent,
+    Water,
+)
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.layout import VELOCITY_SCALE, Layout
 from seastar_gym.envs.observation import observe
@@ -244,6 +257,16 @@ def test_memory_shows_the_reduced_observation_and_the_past_in_the_same_limbs(tas
         for before, told in zip(past, np.moveaxis(shown[:, size:].reshape(6, 2, -1), 1, 0), strict=True):
             carried = seen.symmetry.carry(before, memory._elements)
             np.testing.assert_array_equal(told, carried[:, seen.features])
+
+
+def test_memory_without_symmetry_shows_any_robot_as_it_is():
+    scene = Scene(Seastar(3, 5, limbs=(Limb(length=0.12), Limb(), Limb())), Water(current=UniformCurrent(0.001)))
+    memory = VectorFrameStack(batch("station", scene=scene), 1, symmetry=False)
+    before, _ = memory.reset(seed=1)
+    seen, size = memory.frame_stack, memory.frame_stack.layout.size
+    shown, *_ = memory.step(np.array([1, 2, 3, 4, 5, 6]))
+    np.testing.assert_array_equal(shown[:, :size], memory._latest)
+    np.testing.assert_array_equal(shown[:, size:], before[:, :size][:, seen.features])
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])

@@ -15,13 +15,17 @@ SHORT = "--strokes 8192 --save-freq 2048"
 
 
 @pytest.mark.parametrize(
-    "n_limbs, options", [(4, "--no-video"), (3, "--decision-period 0.5 --seed 3"), (8, "--seed 1 --no-video")]
+    "n_limbs, options",
+    [(4, "--no-video"), (3, "--decision-period 0.5 --seed 3 --no-symmetry"), (8, "--seed 1 --no-video")],
 )
 def test_a_robot_of_ones_own_is_trained_compared_filmed_played_and_published(story, n_limbs, options):
     scene = block("docs/own_robot.md", "n_limbs=4").replace("n_limbs=4", f"n_limbs={n_limbs}")
     scene = scene.replace("),) * 4", f"),) * {n_limbs}")
     if "decision-period" in options:
         scene = scene.replace("SmaPulse", "SmaWires")
+    symmetric = "--no-symmetry" not in options
+    if not symmetric:  # one limb is longer than the others
+        scene = scene.replace(f"),) * {n_limbs}", f"),) * {n_limbs - 1} + (Limb(length=0.09),)")
     story.has("my_scene.py", scene)
     run, checkpoint = story.folder / "runs/mine", story.folder / "runs/mine/checkpoints"
 
@@ -50,4 +54,6 @@ def test_a_robot_of_ones_own_is_trained_compared_filmed_played_and_published(sto
     # Its card says whose it is.
     story.types("python -m agents.cards --policies runs/mine/policy.safetensors")
     card = (run / "policy.md").read_text(encoding="utf-8")
-    assert f"a robot of {n_limbs} limbs" in card and json.loads((run / "policy.json").read_text())["symmetry"] is True
+    assert (
+        f"a robot of {n_limbs} limbs" in card and json.loads((run / "policy.json").read_text())["symmetry"] is symmetric
+    )

@@ -78,11 +78,13 @@ def film(folder, turn, seed):
 
 
 @pytest.mark.parametrize(
-    "n_limbs, period, seed, camera",
-    [(3, "0.2", 0, POSE), (4, "0.25", 1, MARKERS)],
-    ids=["three limbs", "four limbs, markers"],
+    "n_limbs, period, seed, camera, options",
+    [(3, "0.2", 0, POSE, ""), (4, "0.25", 1, MARKERS, "--no-symmetry")],
+    ids=["three limbs", "four limbs, markers, no symmetry"],
 )
-def test_a_robot_in_a_tank_is_filmed_fitted_trained_driven_and_put_on_a_board(story, n_limbs, period, seed, camera):
+def test_a_robot_in_a_tank_is_filmed_fitted_trained_driven_and_put_on_a_board(
+    story, n_limbs, period, seed, camera, options
+):
     def types(*words, more="", **how):
         line = command(PAGE, *words).replace("--decision-period 0.2", f"--decision-period {period}")
         line = re.sub(r"(tip3=tip3)", " ".join(f"tip{limb}=tip{limb}" for limb in range(3, n_limbs + 1)), line)
@@ -106,7 +108,7 @@ def test_a_robot_in_a_tank_is_filmed_fitted_trained_driven_and_put_on_a_board(st
         assert fitted[name.split(".")[0]][name.split(".")[1]] == pytest.approx(true, rel=0.04), name
 
     # A policy that sees everything cannot drive, and says what to do; that for the camera drives.
-    short = f"--strokes 16384 --save-freq 16384 --seed {seed} --no-video"
+    short = f"--strokes 16384 --save-freq 16384 --seed {seed} --no-video {options}"
     types("train.py --scene fitted.json", more=short)
     story.types("seastar drive runs/three/policy.safetensors", ends=2)
     assert "python train.py --resume runs/three --for-camera camera.json" in story.told
