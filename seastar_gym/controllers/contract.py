@@ -100,19 +100,19 @@ def require_fit(
     task: Of the environment. None means waypoints. sight: Through which the robot is seen, None for full sight.
     """
     n_seen = Layout.of(scene).size if n_seen is None else n_seen
-    if hasattr(policy, "require_fit"):
-        policy.require_fit(scene, actions, n_seen, task, sight)
     limbs = getattr(policy, "n_limbs", None)
     if limbs is not None and limbs != scene.robot.n_limbs:
         raise ValueError(f"The policy is for a robot of {limbs} limbs, the environment's has {scene.robot.n_limbs}.")
     sees: Any = getattr(policy, "observation_space", None)
     ours = getattr(policy, "decision_period", getattr(sees, "decision_period", None))
     theirs = scene.actuator.period if decision_period is None else decision_period
-    if ours is not None and not math.isclose(ours, theirs):
+    if ours is not None and not math.isclose(ours, theirs):  # robots have other wires then, and show other numbers
         raise ValueError(
             f"The policy decides every {ours:g} s, the environment every {theirs:g} s: make them equal, by "
             "decision_period or --decision-period."
         )
+    if hasattr(policy, "require_fit"):
+        policy.require_fit(scene, actions, n_seen, task, sight)
     if sees is not None and sees.shape != (n_seen,):
         shown_by = "" if sight is None else f", by {told(sight)}"
         raise ValueError(
