@@ -13,11 +13,14 @@ With --benchmark, LABEL=A,B,C are trainings of one learner, each of which swims 
 docs/benchmark.md, or those that --task names; --decisions is the length of the trainings. --out is a folder for the
 table as CSV, Markdown, LaTeX and JSON, to which another call adds. --merge adds the results of such files.
 
-A named agent that does not fit the robot is left out with a sentence, and the exit code is 2.
+On a path, the first policy of a file brings the robot that it was trained on, and how often it decides, where options
+name none. A named agent that does not fit the robot is left out with a sentence, and the exit code is 2.
 """
 
 import argparse
+import contextlib
 import itertools
+import math
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
@@ -27,9 +30,9 @@ from typing import TYPE_CHECKING, get_args
 from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy
-from seastar_gym.controllers.registry import DEFAULTS, HELP, fitting_agents, load_agents
+from seastar_gym.controllers.registry import DEFAULTS, HELP, fitting_agents, is_file, learned_policy, load_agents
 from seastar_gym.envs.commands import decisions_in
-from seastar_gym.envs.options import scene_at
+from seastar_gym.envs.options import make_scene, scene_at
 from seastar_gym.envs.paths import PATH_HELP, WAYPOINT_RADIUS, load_path
 from seastar_gym.evaluation import benchmark, scores
 from seastar_gym.evaluation.benchmark import Cell
@@ -65,8 +68,12 @@ def parser() -> argparse.ArgumentParser:
         "--fidelity", nargs="+", choices=get_args(Fidelity),
         help="accuracy, several with --sets (default: balanced, or that of the task)",
     )  # fmt: skip
-    found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
-    found.add_argument("--decision-period", type=float, help="time between decisions [s] (default: a stroke of 1 s)")
+    found.add_argument(
+        "--scene", type=Path, help="file of the robot's scene, .py or .json (default: a policy's, or the chapter's)"
+    )
+    found.add_argument(
+        "--decision-period", type=float, help="time between decisions [s] (default: a policy's, or a stroke of 1 s)"
+    )
     found.add_argument("--seconds", type=float, default=TIME_LIMIT, help=f"time limit [s] {DEFAULT}")
     radius = f"radius of the waypoints [m] {DEFAULT}"
     found.add_argument("--waypoint-radius", type=float, default=WAYPOINT_RADIUS, help=radius)
@@ -119,14 +126,28 @@ def fidelities(options: argparse.Namespace) -> list[Fidelity]:
     return options.fidelity or ["balanced"]
 
 
+def robot_of(options: argparse.Namespace, fidelity: Fidelity) -> tuple[Scene | None, float | None]:
+    """Scene, None for the chapter's, and time between decisions, None for a stroke: of the options, and where they name
+    none of the first policy of a file."""
+    own, period = scene_at(options.scene, fidelity), options.decision_period
+    for name in filter(is_file, options.agents or ()):
+        with contextlib.suppress(ValueError, OSError):  # it is left out with that sentence later
+            if (policy := learned_policy(name)) is not None:
+                stroke = math.isclose(policy.decision_period, policy.scene.actuator.period)
+                period = policy.decision_period if period is None and not stroke else period
+                is_chapters = not policy.differences(make_scene(None, fidelity, period))
+                return make_scene(policy.scene, fidelity) if own is None and not is_chapters else own, period
+    return own, period
+
+
 def compared(options: argparse.Namespace, command: str) -> int:
     """Let the agents swim the path; returns the exit code, 2 where one that was named does not fit.
 
     command: What was typed.
     """
     require_sound(options)
-    fidelity = fidelities(options)[0]
-    path, own = load_path(options.path), scene_at(options.scene, fidelity)
+    fidelity, path = fidelities(options)[0], load_path(options.path)
+    own, options.decision_period = robot_of(options, fidelity)
     agents, left_out = fitting_agents(options.agents, options.seed, fidelity, options.decision_period, own)
     print("".join(f"{sentence}\n" for sentence in left_out), end="", file=sys.stderr)
     evaluate(

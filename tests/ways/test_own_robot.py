@@ -40,9 +40,8 @@ def test_a_robot_of_ones_own_is_trained_compared_filmed_played_and_published(sto
     assert int(learned[1]) >= symmetric and greedy[1] == "5", story.told
 
     # It is compared again, as the page and the report say.
-    evaluate = command("docs/own_robot.md", "seastar evaluate --scene")
-    period = " ".join(options.split()[:2]) if "decision-period" in options else ""
-    story.types(f"{evaluate.replace('runs/FOLDER', 'runs/mine')} {period} --out again")
+    evaluate = command("docs/own_robot.md", "seastar evaluate --agents")
+    story.types(f"{evaluate.replace('runs/FOLDER', 'runs/mine')} --out again")
     assert "policy" in story.told and "greedy" in story.told
 
     # It swims and is played, without that anybody says again what it is.
