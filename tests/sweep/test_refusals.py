@@ -60,7 +60,7 @@ REFUSED = [
     (of_controllers("learned", axes=(Choices("gait", ("straight",)),)), "gait or a controller"),
     (of_controllers("learned", route=Route(decision_period=0.5)), "SmaWires"),
     (of_controllers("prey"), "trained for the task prey"),
-    (of_controllers("timed-0.2s"), "196 numbers"),
+    (of_controllers("timed-0.2s"), "decides every 0.2 s", "--decision-period"),
 ]  # fmt: skip
 
 
