@@ -143,8 +143,9 @@ class Description(NamedTuple):
     @property
     def frame_stack(self) -> FrameStack | None:
         """What the policy sees of present and past observations; None for a policy without memory."""
-        symmetry = self.reduction or Symmetry.none_of(self.layout, self.actions)
-        return FrameStack(symmetry, self.past) if self.past else None
+        if not self.past:
+            return None
+        return FrameStack(self.reduction or Symmetry.none_of(self.layout, self.actions), self.past)
 
     @property
     def input_size(self) -> int:

@@ -10,10 +10,12 @@ import pytest
 from PIL import Image
 
 from core import run
-from seastar_gym import Scene, Seastar, Sight
+from seastar_gym import Scene, Seastar, Sight, SmaWires
 from seastar_gym.cli import compile, played, screen
 from seastar_gym.cli.main import main
 from seastar_gym.cli.play import Steering, known_keys, typed
+from seastar_gym.controllers.description import Description
+from seastar_gym.controllers.learned import LearnedPolicy, save
 from seastar_gym.gaits import lagged_gait
 from seastar_gym.scene.serial import to_dict
 
@@ -256,6 +258,19 @@ def test_agents_are_compared_in_a_table_and_files(folder, capsys):
     Path("weak.py").write_text(WEAK)
     whole, weak = (compared(capsys, "--agents", "straight", "greedy", *own)[0] for own in ([], ["--scene", "weak.py"]))
     assert all(float(one[2]) < float(other[2]) for one, other in zip(whole, weak, strict=True))
+
+
+def test_a_policy_of_a_file_brings_its_robot_and_how_often_it_decides(folder, no_display, capsys):
+    scene = Scene(Seastar(3), actuator=SmaWires())
+    about = Description("pairs", True, scene, (), 0.5)
+    weights = {name: np.zeros(shape, np.float32) for name, shape in about.shapes().items()}
+    save(LearnedPolicy(about, weights), "own.safetensors")
+    rows, left_out = compared(capsys, "--agents", "own.safetensors", "greedy", "--seconds", "2")
+    assert [row[0] for row in rows] == ["own", "greedy"] and not left_out
+    Path("robot.json").write_text(json.dumps(scene.to_dict()))
+    for named in ([], ["--scene", "robot.json"]):
+        assert main(["swim", "--agent", "own.safetensors", *named, "--seconds", "0.5", "--film", "swim.gif"]) == 0
+        assert "0 of 5 waypoints in 0.5 s" in capsys.readouterr().out
 
 
 def test_a_report_has_the_curves_of_runs_and_how_it_was_made(folder, capsys):
