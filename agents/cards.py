@@ -23,6 +23,7 @@ from seastar_gym.command import answered, run_command
 from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy, bundled_file, load, save
 from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.swim import HELD_OUT_SEED, TIME_LIMIT, Swim, swim_many
+from seastar_gym.evaluation.trials import OWN
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
@@ -30,8 +31,6 @@ from seastar_gym.scene.numerics import Fidelity
 HELD_OUT_PATHS = 64
 """Number of random paths that a card counts, those on which `train.py --publish` compares policies."""
 FIDELITIES: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
-OWN = "its own"
-"""Name of the fidelity of a robot that is not the chapter's: that of its scene."""
 CHEAP = ("fast", "balanced", OWN)
 """Fidelities at which held-out paths are swum."""
 CHAPTERS = "the chapter's robot"

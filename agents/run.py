@@ -250,7 +250,7 @@ class Robot(NamedTuple):
 
 def asked_for(options: Options) -> Robot:
     """Robot that the options of a new run name. ValueError where it could not be kept in the run's folder."""
-    scene = scene_at(options.scene, options.fidelity)
+    scene = scene_at(options.scene, None, options.fidelity)
     if scene is not None:
         scene.to_dict()
     file = options.intervals
@@ -290,7 +290,10 @@ def keep(robot: Robot, folder: Path, file: Path | None) -> None:
 
 def physics(options: Options, folder: Path) -> list[str]:
     """Words of `seastar evaluate` for the robot and the decisions of the run with these options in a folder."""
-    words = ["--fidelity", options.fidelity] if options.scene is None else ["--scene", str(scene_in(folder))]
+    file = None if options.scene is None else scene_in(folder)
+    words = [] if file is None else ["--scene", str(file)]
+    if file is None or not load_scene(file).numerics.named:
+        words += ["--fidelity", options.fidelity]
     period = options.ppo.decision_period
     return words if period is None else [*words, "--decision-period", str(period)]
 
@@ -308,7 +311,7 @@ def robot_of(options: Options, folder: Path) -> Robot:
             raise ValueError(f"{file} is Python, which --resume executes with --run-scene only: see that it is yours.")
         find_modules_in(options.scene.parent)  # for modules that it imports
     return Robot(
-        None if file is None else load_scene(file),
+        scene_at(file, None, options.fidelity),
         None if options.intervals is None else read_intervals(folder / INTERVALS),
     )
 

@@ -14,12 +14,12 @@ import gymnasium as gym
 import numpy as np
 
 from seastar_gym.command import command_parser, main_of
+from seastar_gym.envs.options import FIDELITY_HELP, scene_at
 from seastar_gym.evaluation.rollout import make_task
 from seastar_gym.rods.potential import energies
 from seastar_gym.scene import Scene
 from seastar_gym.scene.number import numbers_of, with_numbers
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene import load_scene
 from seastar_gym.simulator import Simulator
 
 
@@ -31,7 +31,7 @@ def parser() -> argparse.ArgumentParser:
         help="ids of registered environments (default: SeastarSwim-v0)",
     )  # fmt: skip
     found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the task's)")
-    found.add_argument("--fidelity", choices=get_args(Fidelity), help="accuracy of the simulation")
+    found.add_argument("--fidelity", choices=get_args(Fidelity), help=FIDELITY_HELP)
     found.add_argument(
         "--per-robot", action="store_true",
         help="also for numbers that differ from robot to robot, as in sweeps and with randomization",
@@ -58,7 +58,8 @@ def of_one_robot(scene: Scene) -> Scene:
 
 def compile_all(options: argparse.Namespace) -> None:
     """Compile what the options ask for, and say where it is."""
-    asked = {"fidelity": options.fidelity, "scene": None if options.scene is None else load_scene(options.scene)}
+    scene = scene_at(options.scene, options.fidelity, "balanced")
+    asked = {"scene": scene, "fidelity": options.fidelity if scene is None else None}
     arguments = {name: value for name, value in asked.items() if value is not None}
     for task in options.tasks:
         begin = time.perf_counter()

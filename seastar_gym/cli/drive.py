@@ -92,9 +92,8 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
         "path": None if options.path is None else load_path(options.path),
     }  # fmt: skip
     arguments = own | {name: value for name, value in asked.items() if value is not None}
-    scene = scene_at(options.scene, fidelity)
-    if scene is None and policy is not None:
-        scene = policy.scene.at(options.fidelity)
+    own_scene = options.scene if options.scene is not None or policy is None else policy.scene
+    scene = scene_at(own_scene, options.fidelity, fidelity)
     return arguments | {"scene": scene or make_scene(None, fidelity, arguments["decision_period"])}
 
 
@@ -200,7 +199,7 @@ def drive(options: argparse.Namespace) -> int:
     devices = _devices(options)
     options.out = options.out or Path("runs") / time.strftime("drive_%Y-%m-%d_%H-%M-%S")
     require_no_logs(options.out)
-    robot = scene_at(_scene_of_plant(options), options.fidelity or "fast")
+    robot = scene_at(_scene_of_plant(options), options.fidelity, "fast")
     arguments = arguments_of(options)
     if devices and not options.dry:
         with opened(options, arguments, robot) as plant:  # which heats nothing

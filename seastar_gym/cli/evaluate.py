@@ -13,26 +13,34 @@ With --benchmark, LABEL=A,B,C are trainings of one learner, each of which swims 
 docs/benchmark.md, or those that --task names; --decisions is the length of the trainings. --out is a folder for the
 table as CSV, Markdown, LaTeX and JSON, to which another call adds. --merge adds the results of such files.
 
-On a path, the first policy of a file brings the robot that it was trained on, and how often it decides, where options
-name none. A named agent that does not fit the robot is left out with a sentence, and the exit code is 2.
+On paths, the first policy of a file brings the robot that it was trained on, and how often it decides, where options
+name none; --fidelity gives it another mesh and other numerics. On one path, a named agent that does not fit the robot
+is left out with a sentence, and the exit code is 2.
 """
 
 import argparse
-import contextlib
 import itertools
 import math
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, NamedTuple, get_args
 
 from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy
-from seastar_gym.controllers.registry import DEFAULTS, HELP, fitting_agents, is_file, learned_policy, load_agents
+from seastar_gym.controllers.registry import (
+    DEFAULTS,
+    HELP,
+    default_agents,
+    fitting_agents,
+    is_file,
+    learned_policy,
+    load_agents,
+)
 from seastar_gym.envs.commands import decisions_in
-from seastar_gym.envs.options import make_scene, scene_at
+from seastar_gym.envs.options import FIDELITY_HELP, make_scene, scene_at
 from seastar_gym.envs.paths import PATH_HELP, WAYPOINT_RADIUS, load_path
 from seastar_gym.evaluation import benchmark, scores
 from seastar_gym.evaluation.benchmark import Cell
@@ -66,7 +74,7 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {DEFAULT}")
     found.add_argument(
         "--fidelity", nargs="+", choices=get_args(Fidelity),
-        help="accuracy, several with --sets (default: balanced, or that of the task)",
+        help=f"{FIDELITY_HELP}, several with --sets (default: the scene's or task's own, otherwise balanced)",
     )  # fmt: skip
     found.add_argument(
         "--scene", type=Path, help="file of the robot's scene, .py or .json (default: a policy's, or the chapter's)"
@@ -111,14 +119,10 @@ def require_sound(options: argparse.Namespace) -> None:
     require_period(options.decision_period, "--decision-period")
     if options.sets is None and len(options.fidelity or ()) > 1:
         raise ValueError("Several fidelities are for --sets: name one.")
-    is_path = options.sets is None and options.task is None
-    if (options.video or options.report or options.trajectory) and (options.out is None or not is_path):
-        raise ValueError("A video, a report or a trajectory needs a folder, --out, and a path, no --sets or --task.")
-
-
-def limit_of(options: argparse.Namespace, scene: Scene | None = None) -> int:
-    """Time limit [decisions]."""
-    return decisions_in(options.seconds, options.decision_period, scene)
+    if (options.video or options.report or options.trajectory) and options.out is None:
+        raise ValueError("A video, a report or a trajectory needs a folder, --out.")
+    if (options.runs or options.trials is not None) and not options.report:
+        raise ValueError("--runs and --trials are what a report shows: name --report, too, or leave them out.")
 
 
 def fidelities(options: argparse.Namespace) -> list[Fidelity]:
@@ -126,18 +130,22 @@ def fidelities(options: argparse.Namespace) -> list[Fidelity]:
     return options.fidelity or ["balanced"]
 
 
-def robot_of(options: argparse.Namespace, fidelity: Fidelity) -> tuple[Scene | None, float | None]:
+def robot_of(options: argparse.Namespace, fidelity: Fidelity | None) -> tuple[Scene | None, float | None]:
     """Scene, None for the chapter's, and time between decisions, None for a stroke: of the options, and where they name
-    none of the first policy of a file."""
-    own, period = scene_at(options.scene, fidelity), options.decision_period
+    none of the first policy of a file. fidelity: Which was typed."""
+    scene, period = options.scene, options.decision_period
     for name in filter(is_file, options.agents or ()):
-        with contextlib.suppress(ValueError, OSError):  # it is left out with that sentence later
-            if (policy := learned_policy(name)) is not None:
-                stroke = math.isclose(policy.decision_period, policy.scene.actuator.period)
-                period = policy.decision_period if period is None and not stroke else period
-                is_chapters = not policy.differences(make_scene(None, fidelity, period))
-                return make_scene(policy.scene, fidelity) if own is None and not is_chapters else own, period
-    return own, period
+        try:
+            policy = learned_policy(name)
+        except (ValueError, OSError):
+            continue  # it is left out with that sentence later
+        if policy is not None:
+            stroke = math.isclose(policy.decision_period, policy.scene.actuator.period)
+            period = policy.decision_period if period is None and not stroke else period
+            if scene is None and policy.differences(make_scene(None, None, period)):
+                scene = policy.scene
+            break
+    return scene_at(scene, fidelity, "balanced"), period
 
 
 def compared(options: argparse.Namespace, command: str) -> int:
@@ -147,21 +155,21 @@ def compared(options: argparse.Namespace, command: str) -> int:
     """
     require_sound(options)
     fidelity, path = fidelities(options)[0], load_path(options.path)
-    own, options.decision_period = robot_of(options, fidelity)
+    own, options.decision_period = robot_of(options, options.fidelity and fidelity)
     agents, left_out = fitting_agents(options.agents, options.seed, fidelity, options.decision_period, own)
     print("".join(f"{sentence}\n" for sentence in left_out), end="", file=sys.stderr)
+    limit = decisions_in(options.seconds, options.decision_period, own)
     evaluate(
-        agents, path, seed=options.seed, max_strokes=limit_of(options, own), waypoint_radius=options.waypoint_radius,
-        scene=own, decision_period=options.decision_period, out=options.out, video=options.video,
-        trajectory=options.trajectory,
-        report=remarks(agents, options, command) if options.report else None,
+        agents, path, seed=options.seed, max_strokes=limit, waypoint_radius=options.waypoint_radius, scene=own,
+        decision_period=options.decision_period, out=options.out, video=options.video, trajectory=options.trajectory,
+        report=remarks(agents, options, command, own) if options.report else None,
         fidelity=fidelity if own is None else None, random_heading=options.random_heading,
     )  # fmt: skip
     return 2 if left_out and options.agents else 0
 
 
-def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: str) -> "Remarks":
-    """Remarks of the report: how the agents were trained, and how the report was made."""
+def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: str, own: Scene | None) -> "Remarks":
+    """Remarks of the report: how the agents were trained, and how it was made. own: Robot that is not the chapter's."""
     require_extra("Reports", "report", "plotly")
     from seastar_gym.evaluation.report import Curve, Remarks, read_progress, trials_table
 
@@ -170,7 +178,9 @@ def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: 
     if options.runs:
         progress = {folder.name: read_progress(folder) for folder in options.runs}
     commands = dict.fromkeys(command for how in trainings.values() for command in how.get("commands", ()))
-    swum = f'Computed at fidelity "{fidelities(options)[0]}".' if options.scene is None else f"Swum in {options.scene}."
+    swum = f'Computed at fidelity "{fidelities(options)[0]}".'
+    if own is not None:
+        swum = f"Swum in {options.scene or 'the scene of the first policy'}, with {own.numerics}."
     return Remarks(
         title=f"Evaluation: {options.path}",
         sentences=[swum],
@@ -183,14 +193,21 @@ def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: 
 def swum_often(options: argparse.Namespace) -> int:
     """Let the agents swim the sets; returns the exit code."""
     require_sound(options)
-    rows, period = list[Row](), options.decision_period
-    for fidelity in fidelities(options):
-        agents = load_agents(options.agents or OF_TRIALS, options.seed, fidelity, period)
+    rows, differences = list[Row](), dict[str, str]()
+    for typed in options.fidelity or [None]:
+        fidelity: Fidelity = typed or "balanced"
+        own, period = robot_of(options, typed)
+        robot = own or make_scene(None, fidelity, period)
+        names = options.agents or (OF_TRIALS if own is None else default_agents(own))
+        agents = load_agents(names, options.seed, fidelity, period, own)
         rows += trials(
             agents, options.sets, options.swims, fidelity=fidelity, seed=options.seed, decision_period=period,
-            threads=options.num_threads, max_strokes=limit_of(options),
+            threads=options.num_threads, max_strokes=decisions_in(options.seconds, period, own), scene=own,
         )  # fmt: skip
+        learned = {name: one for name, one in agents.items() if isinstance(one, LearnedPolicy)}
+        differences |= {name: found for name, one in learned.items() if (found := one.differences(robot))}
     print(as_text(rows, period))
+    print("".join(f"{name}: {found}\n" for name, found in differences.items()), end="")
     if options.out is not None:
         write_csv(rows, options.out)
     return 0
@@ -212,8 +229,6 @@ def measured_on_tasks(options: argparse.Namespace) -> int:
     require_count("--seeds", options.seeds, 1, 10_000)
     if options.decisions is not None:
         require_count("--decisions", options.decisions, 1, 1_000_000)
-    if options.sets is not None or options.scene is not None or options.decision_period is not None:
-        raise ValueError("A task has its own robot, paths and decisions: leave out --sets, --scene, --decision-period.")
     agents, tasks = options.agents or OF_TASKS, task_ids() if options.task == ["all"] else options.task
     labelled(agents)
     for task in tasks:
@@ -233,22 +248,8 @@ def measured_on_tasks(options: argparse.Namespace) -> int:
     return 0 if len(found) == len(tasks) * len(agents) else 2
 
 
-OF_BENCHMARK = {"agents", "benchmark", "task", "merge", "out", "decisions", "num_threads"}
-"""Options of the benchmark; it says everything else itself."""
-
-
-def require_options_of_benchmark(given: Sequence[str]) -> None:
-    """ValueError, with one sentence, where one was typed that the benchmark would not heed."""
-    own, untyped = parser(), object()
-    own.set_defaults(**dict.fromkeys(vars(own.parse_args([])), untyped))
-    typed = (name for name, value in vars(own.parse_args(given)).items() if value is not untyped)
-    if others := sorted({*typed} - OF_BENCHMARK):
-        raise ValueError(f"The benchmark says how it is swum: leave out --{others[0].replace('_', '-')}.")
-
-
-def measured_on_benchmark(options: argparse.Namespace, given: Sequence[str]) -> int:
-    """Let the agents swim the benchmark; returns the exit code, 2 where one did not fit. given: What was typed."""
-    require_options_of_benchmark(given)
+def measured_on_benchmark(options: argparse.Namespace) -> int:
+    """Let the agents swim the benchmark; returns the exit code, 2 where one did not fit."""
     ids = list(benchmark.ENTRIES) if options.task in (None, ["all"]) else options.task
     benchmark.require_ids(ids)
     agents, first, left_out = labelled(options.agents or ()), benchmark.FIRST[options.benchmark or "test"], 0
@@ -291,13 +292,56 @@ def known_cells(files: Sequence[Path], ids: Sequence[str], out: Path | None) -> 
     return cells
 
 
+class Mode(NamedTuple):
+    """What the command does. why: Sentence for options that it does not heed. heeds: Names of those that it does."""
+
+    why: str
+    heeds: str
+    run: Callable[[argparse.Namespace, str], int]
+
+
+PATH = Mode(
+    "One path is swum once",
+    "agents path fidelity scene decision_period seconds waypoint_radius random_heading seed out video report "
+    "trajectory runs trials",
+    compared,
+)
+MODES = {
+    "merge": (BENCHMARK := Mode(
+        "The benchmark says how it is swum", "agents benchmark task merge out decisions num_threads",
+        lambda options, _: measured_on_benchmark(options),
+    )),
+    "benchmark": BENCHMARK,
+    "task": Mode(
+        "A task has its own robot, paths and decisions", "agents task fidelity seeds decisions num_threads out",
+        lambda options, _: measured_on_tasks(options),
+    ),
+    "sets": Mode(
+        "Sets are paths with a radius and headings of their own",
+        "agents sets swims fidelity scene decision_period seconds seed num_threads out",
+        lambda options, _: swum_often(options),
+    ),
+}  # fmt: skip
+"""Modes by the option that asks for them, the first counts; `PATH` without any."""
+
+
+def require_heeded(mode: Mode, given: Sequence[str]) -> None:
+    """ValueError, with one sentence, where an option was typed that a mode would not heed."""
+    own, untyped = parser(), object()
+    own.set_defaults(**dict.fromkeys(vars(own.parse_args([])), untyped))
+    typed = {name for name, value in vars(own.parse_args(given)).items() if value is not untyped}
+    if others := sorted(typed.difference(mode.heeds.split())):
+        raise ValueError(f"{mode.why}: leave out --{others[0].replace('_', '-')}.")
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     options = parser().parse_args(given)
-    command = shlex.join(["seastar", "evaluate", *given])
-    if options.benchmark is not None or options.merge:
-        return answered(lambda: measured_on_benchmark(options, given))
-    if options.task is not None:
-        return answered(lambda: measured_on_tasks(options))
-    return answered(lambda: compared(options, command) if options.sets is None else swum_often(options))
+    mode = next((mode for name, mode in MODES.items() if getattr(options, name) not in (None, [])), PATH)
+
+    def answer() -> int:
+        require_heeded(mode, given)
+        return mode.run(options, shlex.join(["seastar", "evaluate", *given]))
+
+    return answered(answer)

@@ -17,13 +17,13 @@ from seastar_gym.command import DEFAULT, command_parser, main_of
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.registry import HELP, is_file, learned_policy, load_agent, period_of
 from seastar_gym.envs.commands import decisions_in
+from seastar_gym.envs.options import FIDELITY_HELP, scene_at
 from seastar_gym.envs.paths import PATH_HELP, load_path
 from seastar_gym.envs.sight import Camera, Sight, read_camera
 from seastar_gym.evaluation.rollout import make_task, require_seen, rollout
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene import load_scene
 
 LEARNED_PERIOD = 0.2
 """Time between decisions of the learned policy on a path, where no option says another [s]."""
@@ -37,7 +37,7 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--task", help="id of a registered environment (default: SeastarSwim-v0)")
     found.add_argument("--speed", type=float, default=4.0, help=f"multiple of real time {DEFAULT}")
     found.add_argument("--film", type=Path, help="file of a film, .mp4 or .gif, instead of a window")
-    found.add_argument("--fidelity", choices=get_args(Fidelity), help="accuracy of the simulation")
+    found.add_argument("--fidelity", choices=get_args(Fidelity), help=FIDELITY_HELP)
     found.add_argument(
         "--scene", type=Path, help="file of the robot's scene, .py or .json (default: the policy's, or the task's)"
     )
@@ -91,11 +91,12 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
         asked["action_delay"] = options.action_delay
     if options.path is not None:
         asked["path"] = load_path(options.path)
-    if options.scene is not None:
-        asked["scene"] = load_scene(options.scene)
     if options.random_heading:
         asked["random_heading"] = True
     asked = trained_for(options) | {name: value for name, value in asked.items() if value is not None}
+    file_or_policys = asked.get("scene") if options.scene is None else options.scene
+    if (scene := scene_at(file_or_policys, options.fidelity, "balanced")) is not None:
+        asked |= {"scene": scene, "fidelity": None}
     return {name: value for name, value in asked.items() if value is not None}
 
 

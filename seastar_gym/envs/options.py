@@ -103,12 +103,18 @@ def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None, decision_
     return scene.at(fidelity)
 
 
-def scene_at(file: FilePath | None, fidelity: Fidelity) -> Scene | None:
-    """Scene of a file as command lines name it, with its own numerics, or those of `fidelity` where it names none.
+FIDELITY_HELP = "accuracy of the simulation, also of a scene that names its own"
 
-    None for no file.
+
+def scene_at(scene: Scene | FilePath | None, fidelity: Fidelity | None, otherwise: Fidelity) -> Scene | None:
+    """Scene, or that of a file, as command lines swim it; None for none.
+
+    fidelity: Which was typed: it replaces the mesh and the numerics of a scene that names its numerics. None for none.
+    otherwise: Fidelity of a scene that names no numerics, where none was typed.
     """
-    if file is None:
+    if scene is None:
         return None
-    scene = load_scene(file)
-    return make_scene(scene, None if scene.numerics.named else fidelity)
+    found = scene if isinstance(scene, Scene) else load_scene(scene)
+    if found.numerics.named:
+        return found.at(fidelity, instead=fidelity is not None)
+    return found.at(otherwise if fidelity is None else fidelity)

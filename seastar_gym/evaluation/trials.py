@@ -16,11 +16,14 @@ from seastar_gym.evaluation.results import MEANS, Row, number, statistics, text_
 from seastar_gym.evaluation.swim import CURRENT_DIRECTIONS, DISTURBANCES, swim_many
 from seastar_gym.files import Row as CsvRow
 from seastar_gym.files import read_table
-from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.scene import Scene
+from seastar_gym.scene.numerics import PRESETS, Fidelity, Resolution
 
 NOMINAL: tuple[str, ...] = ("pentagon", "square", "triangle", "figure-eight")
 SETS = ("nominal", "random", "pentagon")
 """Sets of swims: the named paths undisturbed; random paths under every disturbance; the pentagon under every one."""
+OWN = "its own"
+"""Name of the fidelity of a robot whose mesh and numerics are those of none."""
 
 COLUMNS = {
     "path": "path",
@@ -50,35 +53,44 @@ def trials(
     decision_period: float | None = None,
     threads: int | None = None,
     max_strokes: int | None = None,
+    scene: Scene | None = None,
 ) -> list[Row]:
     """Rows of the results, one for every set of swims and agent.
 
     swims: Number of random paths of every set. seed: Of paths, headings and disturbances, the same for every agent.
     decision_period: Time between decisions [s]. None means a stroke. threads: Of the simulator; None means one for
-    every processor. max_strokes: Time limit [decisions]; None means that of 400 s.
+    every processor. max_strokes: Time limit [decisions]; None means that of 400 s. scene: Robot with its numerics. None
+    means the chapter's at `fidelity`.
     """
-    scene, rows = make_scene(None, fidelity, decision_period), list[Row]()
-    for path, label, n_swims in _sets(sets, swims):
+    robot = make_scene(None, fidelity, decision_period) if scene is None else scene
+    named, rows = fidelity if scene is None else fidelity_of(scene), list[Row]()
+    for path, label, n_swims in _sets(sets, swims, robot.robot.n_limbs):
         for agent, policy in agents.items():
             found = swim_many(
-                agent, policy, path, n_swims, scene, DISTURBANCES[label], seed=seed, threads=threads,
+                agent, policy, path, n_swims, robot, DISTURBANCES[label], seed=seed, threads=threads,
                 decision_period=decision_period, max_strokes=max_strokes, **camera_of(policy),
             )  # fmt: skip
-            row: Row = {"path": path, "disturbance": label, "agent": agent, "fidelity": fidelity, "swims": n_swims}
+            row: Row = {"path": path, "disturbance": label, "agent": agent, "fidelity": named, "swims": n_swims}
             for name, numbers in statistics(found).items():
                 row |= dict(zip((name, f"{name}_low", f"{name}_high"), numbers, strict=True))
             rows.append(row)
     return rows
 
 
-def _sets(asked: Sequence[str], swims: int) -> list[tuple[str, str, int]]:
+def fidelity_of(scene: Scene) -> str:
+    """Name of the fidelity whose mesh and numerics a scene has, or `OWN`."""
+    own = Resolution(scene.robot.discretisation, scene.robot.nodes_per_limb, scene.numerics)
+    return next((name for name, resolution in PRESETS.items() if resolution == own), OWN)
+
+
+def _sets(asked: Sequence[str], swims: int, n_limbs: int) -> list[tuple[str, str, int]]:
     """Path, disturbance and number of swims of every set that was asked for.
 
     The disturbed pentagon is swum for every combination of a current's direction and a weak limb.
     """
     nominal = [(path, "none", 1) for path in NOMINAL]
     random = [("random", name, swims) for name in DISTURBANCES]
-    pentagon = [("pentagon", name, 5 * CURRENT_DIRECTIONS) for name in DISTURBANCES if name != "none"]
+    pentagon = [("pentagon", name, n_limbs * CURRENT_DIRECTIONS) for name in DISTURBANCES if name != "none"]
     known = {"nominal": nominal, "random": random, "pentagon": pentagon}
     return [one for name in asked for one in known[name]]
 

@@ -33,6 +33,7 @@ from seastar_gym.scene.checks import (
     require_choice,
     require_count,
     require_file,
+    require_flag,
     require_numbers,
     shown,
 )
@@ -360,26 +361,32 @@ class Scene:
         discretisation, nodes_per_limb, numerics = PRESETS[fidelity]
         return cls(Seastar(nodes_per_limb=nodes_per_limb, discretisation=discretisation), numerics=numerics)
 
-    def at(self, fidelity: Fidelity | None = None) -> Scene:
+    def at(self, fidelity: Fidelity | None = None, instead: bool = False) -> Scene:
         """Scene with the nodes per limb, discretisation and numerics of a fidelity, as far as it names none itself.
 
         Held and loaded nodes are counted on a mesh, so a scene with any keeps its own. ValueError where scene and
         fidelity name different numerics.
 
         fidelity: None means that of the scene if it names its numerics, otherwise "balanced".
+        instead: Whether those of the fidelity replace what the scene names.
         """
+        require_flag("instead", instead)
         wanted = DEFAULT_FIDELITY if fidelity is None else fidelity
         require_choice("fidelity", wanted, get_args(Fidelity))
         discretisation, nodes_per_limb, numerics = PRESETS[wanted]
-        if self.numerics.named and fidelity is not None and self.numerics != numerics:
+        keeps = self.numerics.named and not instead
+        if keeps and fidelity is not None and self.numerics != numerics:
             raise ValueError(
                 f'fidelity="{fidelity}" contradicts the numerics that the scene names, {shown(self.numerics)}: '
                 "give one of them."
             )
         if self.held_nodes or self.loads:
             discretisation, nodes_per_limb = self.robot.discretisation, self.robot.nodes_per_limb
-        robot = self.robot.resolved(discretisation, nodes_per_limb)
-        return replace(self, robot=robot, numerics=self.numerics if self.numerics.named else numerics)
+        if instead:
+            robot = replace(self.robot, discretisation=discretisation, nodes_per_limb=nodes_per_limb)
+        else:
+            robot = self.robot.resolved(discretisation, nodes_per_limb)
+        return replace(self, robot=robot, numerics=self.numerics if keeps else numerics)
 
     @property
     def is_chapters(self) -> bool:

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from core import run
-from seastar_gym import Scene, Seastar, Sight, SmaWires
+from seastar_gym import Numerics, Scene, Seastar, Sight, SmaWires
 from seastar_gym.cli import compile, played, screen
 from seastar_gym.cli.main import main
 from seastar_gym.cli.play import Steering, known_keys, typed
@@ -143,7 +143,11 @@ REFUSED = [
     ("evaluate --seconds 0", "--seconds must be"),
     ("evaluate --waypoint-radius -1", "--waypoint-radius must be"),
     ("evaluate --fidelity fast balanced", "Several fidelities are for --sets"),
-    ("evaluate --sets nominal --video --out out", "needs a folder, --out, and a path, no --sets"),
+    ("evaluate --video", "needs a folder, --out"),
+    ("evaluate --runs .", "name --report, too"),
+    ("evaluate --swims 4", "leave out --swims"),
+    ("evaluate --sets nominal --path square", "leave out --path"),
+    ("evaluate --task SeastarSwim-v0 --seconds 20", "leave out --seconds"),
     ("evaluate --sets nominal --swims 0", "--swims must be"),
     ("evaluate --report --out out --runs .", "progress.csv"),
     ("evaluate --task CartPole-v1", "There is no task 'CartPole-v1': choose of SeastarSwim-v0, "),
@@ -261,14 +265,20 @@ def test_agents_are_compared_in_a_table_and_files(folder, capsys):
 
 
 def test_a_policy_of_a_file_brings_its_robot_and_how_often_it_decides(folder, no_display, capsys):
-    scene = Scene(Seastar(3), actuator=SmaWires())
+    numerics = Numerics("implicit-midpoint", 2.5e-3, damping=0.003)
+    scene = Scene(Seastar(3, 7), actuator=SmaWires(), numerics=numerics)
     about = Description("pairs", True, scene, (), 0.5)
     weights = {name: np.zeros(shape, np.float32) for name, shape in about.shapes().items()}
     save(LearnedPolicy(about, weights), "own.safetensors")
-    rows, left_out = compared(capsys, "--agents", "own.safetensors", "greedy", "--seconds", "2")
-    assert [row[0] for row in rows] == ["own", "greedy"] and not left_out
     Path("robot.json").write_text(json.dumps(scene.to_dict()))
-    for named in ([], ["--scene", "robot.json"]):
+    swims = {}
+    for named in ([], ["--scene", "robot.json"], ["--fidelity", "rapid"], ["--fidelity", "balanced"]):
+        rows, left_out = compared(capsys, "--agents", "own.safetensors", "greedy", "--seconds", "2", *named)
+        assert [row[0] for row in rows] == ["own", "greedy"] and not left_out
+        swims[" ".join(named)] = rows[1][1:]
+    own, of_file, rapid, balanced = swims.values()
+    assert own == of_file and len({tuple(own), tuple(rapid), tuple(balanced)}) == 3
+    for named in ([], ["--scene", "robot.json"], ["--fidelity", "fast"]):
         assert main(["swim", "--agent", "own.safetensors", *named, "--seconds", "0.5", "--film", "swim.gif"]) == 0
         assert "0 of 5 waypoints in 0.5 s" in capsys.readouterr().out
 

@@ -4,6 +4,7 @@ import inspect
 import itertools
 import json
 import re
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -207,13 +208,16 @@ def test_what_a_camera_sees_of_a_task_is_that_of_the_table():
     assert env.observation_space.shape == (at.size,)
 
 
-def test_a_scene_of_a_file_has_its_own_numerics_or_those_of_the_fidelity(tmp_path):
-    assert scene_at(None, "fast") is None
+def test_a_scene_of_a_file_has_the_fidelity_that_is_typed_otherwise_its_own_numerics(tmp_path):
+    assert scene_at(None, "fast", "balanced") is None
     (tmp_path / "plain.json").write_text(json.dumps(Scene().to_dict()))
-    assert scene_at(tmp_path / "plain.json", "fast") == Scene.preset("fast")
-    own = Scene(numerics=Numerics("sdirk2", 5e-3))
+    assert scene_at(tmp_path / "plain.json", None, "fast") == Scene.preset("fast")
+    own = Scene(Seastar(nodes_per_limb=9), numerics=Numerics("sdirk2", 5e-3))
     (tmp_path / "own.json").write_text(json.dumps(own.to_dict()))
-    assert scene_at(tmp_path / "own.json", "fast").numerics == own.numerics
+    assert scene_at(tmp_path / "own.json", None, "fast") == own.at()
+    assert scene_at(own, "reference", "fast") == Scene.preset("reference")
+    held = replace(own, held_nodes=(8,))
+    assert scene_at(held, "reference", "fast") == replace(held.at(), numerics=Numerics.preset("reference"))
 
 
 # The spec of an environment is written as JSON, and what is made from it is the same environment.

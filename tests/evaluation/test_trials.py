@@ -1,9 +1,11 @@
 """Disturbances are what they say, and many swims are measured as one is."""
 
+import json
+
 import numpy as np
 import pytest
 
-from seastar_gym import Scene
+from seastar_gym import Scene, Seastar
 from seastar_gym.cli.main import main
 from seastar_gym.controllers.open_loop import scripted
 from seastar_gym.controllers.search import GreedyPolicy
@@ -123,11 +125,16 @@ def test_swims_of_a_batch_are_those_of_one_robot(agent, path, period, strokes):
          ("path", "fidelity", "success", "0.0 [0.0, 0.0]")),
         (["--agents", "rest", "--sets", "nominal", "--fidelity", "fast", "--seconds", "2", "--decision-period", "0.5"],
          4, ("decisions", "of 0.5 s")),
+        (["--agents", "straight", "--sets", "nominal", "--scene", "robot.json", "--seconds", "2"], 4, ("its own",)),
         pytest.param(["--agents", "greedy", "pentagon", "--sets", *SETS, "--swims", "4", "--fidelity", "fast"],
                      2 * (4 + 6 + 5), ("success",), marks=pytest.mark.slow),
     ],
 )  # fmt: skip
-def test_the_command_line_writes_a_row_for_every_set_agent_and_fidelity(options, sets, words, tmp_path, capsys):
+def test_the_command_line_writes_a_row_for_every_set_agent_and_fidelity(
+    options, sets, words, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "robot.json").write_text(json.dumps(Scene(Seastar(3, 6)).to_dict()))
     file = tmp_path / "trials.csv"
     assert main(["evaluate", *options, "--num-threads", "1", "--out", str(file)]) == 0
     printed, rows = capsys.readouterr().out, read_trials(file)

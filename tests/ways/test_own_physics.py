@@ -3,6 +3,7 @@
 Another number of limbs than the page's has another drag, seed and time between decisions, too.
 """
 
+import json
 import re
 
 import pytest
@@ -30,6 +31,8 @@ def test_a_robot_with_a_force_of_its_own_is_trained_continued_and_compared(story
     story.types("python train.py --resume runs/mine --strokes 8192 --no-video", ends=2)
     assert "--run-scene" in story.told  # code of a run is executed for those only who say so
     story.types("python train.py --resume runs/mine --run-scene --strokes 8192 --no-video")
+    about = json.loads((story.folder / "runs/mine/policy.json").read_text("utf-8"))
+    assert about["scene"]["robot"]["nodes_per_limb"] == 7  # it still swims at "fast", which its file does not name
     period = "--decision-period 0.5" if "0.5" in options else ""
     story.types(f"seastar evaluate --scene runs/mine/scene.py --agents runs/mine/policy.safetensors greedy {period}")
     policy, greedy = re.findall(r"^(?:policy|greedy) .*? (\d) of 5 ", story.told, re.MULTILINE)
