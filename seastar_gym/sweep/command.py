@@ -194,10 +194,12 @@ def run_sweep(sweep: Sweep, options: argparse.Namespace) -> int:
 
 
 def keep_best(options: argparse.Namespace) -> None:
-    """Write the scene of the best design, and say which it is; nothing where no design has the objective."""
-    is_empty = not any(ResultFiles(options.out).names())
-    best = None if is_empty else best_result(options.out, options.objective, not options.minimize)
+    """Write the scene of the best design, and say which it is; nothing without results."""
+    if not any(ResultFiles(options.out).names()):
+        return
+    best = best_result(options.out, options.objective, not options.minimize)
     if best is None:
+        print(f"There is no best design: none has swum, uncrossed, and has {options.objective}.")
         return
     file, design = options.out / "best.json", ", ".join(f"{name}={shown(value)}" for name, value in best.design.items())
     write_json(file, best.scene.to_dict())

@@ -276,7 +276,7 @@ class Best(NamedTuple):
 def best_result(folder: str | os.PathLike[str], objective: str = "speed", is_largest_best: bool = True) -> Best | None:
     """Best of all results of a folder that have the objective, a column; None if there is none.
 
-    Robots whose limbs crossed do not count.
+    Robots whose limbs crossed do not count, nor those without speed, such as of a controller that reached no waypoint.
     """
     require_kind("objective", objective, str, "the name of a column")
     require_flag("is_largest_best", is_largest_best)
@@ -285,7 +285,8 @@ def best_result(folder: str | os.PathLike[str], objective: str = "speed", is_lar
         if objective not in table.column_names:
             continue
         values = sign * table[objective].to_numpy().astype(float)
-        values[~(table["smallest_opening_angle"].to_numpy() >= 0.0) | np.isnan(values)] = -np.inf
+        angle, speed = table["smallest_opening_angle"].to_numpy(), table["speed"].to_numpy()
+        values[~((angle >= 0.0) & (speed > 0.0)) | np.isnan(values)] = -np.inf
         row = int(values.argmax())
         if values[row] > (-np.inf if best is None else sign * best.value):
             told = json.loads(table.schema.metadata[b"seastar_gym"])

@@ -57,6 +57,11 @@ def test_a_sweep_from_words_to_a_table(tmp_path, capsys):
     assert "batches: 0; there before, batches: 2" in capsys.readouterr().out
 
 
+def test_designs_that_swam_nowhere_have_no_best(tmp_path, capsys):
+    assert main(["controller=rest", "--seconds", "2", "--out", str(tmp_path), *QUICK]) == 0
+    assert "There is no best design" in capsys.readouterr().out and not (tmp_path / "best.json").exists()
+
+
 def test_counting_simulates_nothing(tmp_path, capsys):
     words = "limb_length=0.05:0.15:100", "n_limbs=3,5", "density=500:2000:100", "youngs_modulus=1e5:1e7:50"
     assert main([*(f"robot.{word}" for word in words), "--robots", "1", "--count", "--out", str(tmp_path)]) == 0
