@@ -36,7 +36,7 @@ from agents.options import CONFIG, Options, config_of, faults_of
 from agents.ppo import policy_of
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.learned import save as save_policy
-from seastar_gym.envs.options import scene_at
+from seastar_gym.envs.options import own_scene, scene_at
 from seastar_gym.envs.randomization import DomainRandomization, Uniform
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.report import ResultsTable, read_progress
@@ -250,7 +250,7 @@ class Robot(NamedTuple):
 
 def asked_for(options: Options) -> Robot:
     """Robot that the options of a new run name. ValueError where it could not be kept in the run's folder."""
-    scene = scene_at(options.scene, None, options.fidelity)
+    scene = scene_at(own_scene(options.scene), None, options.fidelity)
     if scene is not None:
         scene.to_dict()
     file = options.intervals
@@ -311,7 +311,7 @@ def robot_of(options: Options, folder: Path) -> Robot:
             raise ValueError(f"{file} is Python, which --resume executes with --run-scene only: see that it is yours.")
         find_modules_in(options.scene.parent)  # for modules that it imports
     return Robot(
-        scene_at(file, None, options.fidelity),
+        scene_at(own_scene(file), None, options.fidelity),
         None if options.intervals is None else read_intervals(folder / INTERVALS),
     )
 

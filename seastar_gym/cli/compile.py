@@ -14,7 +14,7 @@ import gymnasium as gym
 import numpy as np
 
 from seastar_gym.command import command_parser, main_of
-from seastar_gym.envs.options import FIDELITY_HELP, scene_at
+from seastar_gym.envs.options import FIDELITY_HELP, own_scene, scene_at
 from seastar_gym.evaluation.rollout import make_task
 from seastar_gym.rods.potential import energies
 from seastar_gym.scene import Scene
@@ -58,7 +58,7 @@ def of_one_robot(scene: Scene) -> Scene:
 
 def compile_all(options: argparse.Namespace) -> None:
     """Compile what the options ask for, and say where it is."""
-    scene = scene_at(options.scene, options.fidelity, "balanced")
+    scene = scene_at(own_scene(options.scene), options.fidelity, "balanced")
     asked = {"scene": scene, "fidelity": options.fidelity if scene is None else None}
     arguments = {name: value for name, value in asked.items() if value is not None}
     for task in options.tasks:

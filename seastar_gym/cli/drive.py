@@ -26,7 +26,7 @@ from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.registry import HELP, learned_policy, load_agent, period_of
 from seastar_gym.envs.commands import Actions, decisions_in
-from seastar_gym.envs.options import make_scene, scene_at
+from seastar_gym.envs.options import make_scene, own_scene, scene_at
 from seastar_gym.envs.paths import PATH_HELP, WAYPOINT_RADIUS, load_path
 from seastar_gym.envs.seastar_swim import RenderMode
 from seastar_gym.envs.sight import FOR_CAMERA, Sight, told
@@ -78,6 +78,7 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
     """Arguments of the environment that the options, or else the policy, ask for, but for the plant."""
     require_number("--seconds", options.seconds, "s")
     require_period(options.decision_period, "--decision-period")
+    named = own_scene(options.scene)
     policy = learned_policy(options.policy, options.decision_period)
     fidelity: Fidelity = options.fidelity or "fast"
     own: dict[str, Any] = {"decision_period": period_of(options.policy) or 0.5, "sight": Sight(), "path": "pentagon"}
@@ -92,8 +93,7 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
         "path": None if options.path is None else load_path(options.path),
     }  # fmt: skip
     arguments = own | {name: value for name, value in asked.items() if value is not None}
-    own_scene = options.scene if options.scene is not None or policy is None else policy.scene
-    scene = scene_at(own_scene, options.fidelity, fidelity)
+    scene = scene_at(named or (None if policy is None else policy.scene), options.fidelity, fidelity)
     return arguments | {"scene": scene or make_scene(None, fidelity, arguments["decision_period"])}
 
 
@@ -199,7 +199,7 @@ def drive(options: argparse.Namespace) -> int:
     devices = _devices(options)
     options.out = options.out or Path("runs") / time.strftime("drive_%Y-%m-%d_%H-%M-%S")
     require_no_logs(options.out)
-    robot = scene_at(_scene_of_plant(options), options.fidelity, "fast")
+    robot = scene_at(own_scene(_scene_of_plant(options)), options.fidelity, "fast")
     arguments = arguments_of(options)
     if devices and not options.dry:
         with opened(options, arguments, robot) as plant:  # which heats nothing

@@ -40,7 +40,7 @@ from seastar_gym.controllers.registry import (
     load_agents,
 )
 from seastar_gym.envs.commands import decisions_in
-from seastar_gym.envs.options import FIDELITY_HELP, make_scene, scene_at
+from seastar_gym.envs.options import FIDELITY_HELP, make_scene, own_scene, scene_at
 from seastar_gym.envs.paths import PATH_HELP, WAYPOINT_RADIUS, load_path
 from seastar_gym.evaluation import benchmark, scores
 from seastar_gym.evaluation.benchmark import Cell
@@ -133,7 +133,7 @@ def fidelities(options: argparse.Namespace) -> list[Fidelity]:
 def robot_of(options: argparse.Namespace, fidelity: Fidelity | None) -> tuple[Scene | None, float | None]:
     """Scene, None for the chapter's, and time between decisions, None for a stroke: of the options, and where they name
     none of the first policy of a file. fidelity: Which was typed."""
-    scene, period = options.scene, options.decision_period
+    scene, period = own_scene(options.scene), options.decision_period
     for name in filter(is_file, options.agents or ()):
         try:
             policy = learned_policy(name)

@@ -16,6 +16,7 @@ from seastar_gym.controllers import learned
 from seastar_gym.controllers.export import to_c, to_onnx
 from seastar_gym.controllers.learned import BUNDLED, LearnedPolicy
 from seastar_gym.controllers.registry import learned_policy
+from seastar_gym.envs.options import own_scene
 from seastar_gym.files import write_atomically
 
 FORMATS = ("c", "onnx")
@@ -27,6 +28,7 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("policy", help="name or file of a learned policy")
     found.add_argument("--to", choices=FORMATS, required=True, help="format of the file that is written")
     found.add_argument("--out", type=Path, help="file that is written (default: POLICY.c or POLICY.onnx)")
+    found.add_argument("--scene", type=Path, help="Python file of a scene that registers parts of the policy's robot")
     points = "tracked points per limb with the hub, of c (default: the nodes of the policy's scene)"
     found.add_argument("--points", type=int, help=points)
     return found
@@ -45,6 +47,7 @@ def load_policy(name: str) -> LearnedPolicy:
 
 def export(options: argparse.Namespace) -> str:
     """Write the file; returns a sentence on it."""
+    own_scene(options.scene)
     policy = load_policy(options.policy)
     name = Path(options.policy).name.removesuffix(BUNDLED.suffix).removesuffix(".zip")
     out = Path(f"{name}.{options.to}") if options.out is None else options.out

@@ -17,7 +17,7 @@ from seastar_gym.command import DEFAULT, command_parser, main_of
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.registry import HELP, is_file, learned_policy, load_agent, period_of
 from seastar_gym.envs.commands import decisions_in
-from seastar_gym.envs.options import FIDELITY_HELP, scene_at
+from seastar_gym.envs.options import FIDELITY_HELP, own_scene, scene_at
 from seastar_gym.envs.paths import PATH_HELP, load_path
 from seastar_gym.envs.sight import Camera, Sight, read_camera
 from seastar_gym.evaluation.rollout import make_task, require_seen, rollout
@@ -93,9 +93,9 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
         asked["path"] = load_path(options.path)
     if options.random_heading:
         asked["random_heading"] = True
+    own = own_scene(options.scene)
     asked = trained_for(options) | {name: value for name, value in asked.items() if value is not None}
-    file_or_policys = asked.get("scene") if options.scene is None else options.scene
-    if (scene := scene_at(file_or_policys, options.fidelity, "balanced")) is not None:
+    if (scene := scene_at(own or asked.get("scene"), options.fidelity, "balanced")) is not None:
         asked |= {"scene": scene, "fidelity": None}
     return {name: value for name, value in asked.items() if value is not None}
 

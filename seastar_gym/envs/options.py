@@ -106,15 +106,19 @@ def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None, decision_
 FIDELITY_HELP = "accuracy of the simulation, also of a scene that names its own"
 
 
-def scene_at(scene: Scene | FilePath | None, fidelity: Fidelity | None, otherwise: Fidelity) -> Scene | None:
-    """Scene, or that of a file, as command lines swim it; None for none.
+def own_scene(file: FilePath | None) -> Scene | None:
+    """Scene of a file, None for none. It is read before policies, whose robots may have parts that it registers."""
+    return None if file is None else load_scene(file)
+
+
+def scene_at(scene: Scene | None, fidelity: Fidelity | None, otherwise: Fidelity) -> Scene | None:
+    """Scene as command lines swim it; None for none.
 
     fidelity: Which was typed: it replaces the mesh and the numerics of a scene that names its numerics. None for none.
     otherwise: Fidelity of a scene that names no numerics, where none was typed.
     """
     if scene is None:
         return None
-    found = scene if isinstance(scene, Scene) else load_scene(scene)
-    if found.numerics.named:
-        return found.at(fidelity, instead=fidelity is not None)
-    return found.at(otherwise if fidelity is None else fidelity)
+    if scene.numerics.named:
+        return scene.at(fidelity, instead=fidelity is not None)
+    return scene.at(otherwise if fidelity is None else fidelity)

@@ -151,7 +151,7 @@ def _read(value: object, where: str, depth: int = 0) -> Any:
         case {"kind": kind}:
             raise ValueError(
                 f"{where} is of the kind {shown(kind)}, which is not known: a class of your own has to be registered "
-                "with seastar_gym.register_part before it is read."
+                "with seastar_gym.register_part before it is read, in a shell by the Python file that --scene names."
             )
     raise ValueError(f"{where} must be a finite number, a text, a list or a part with its kind, not {shown(value)}.")
 

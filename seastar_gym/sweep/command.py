@@ -13,7 +13,8 @@ numerics.step, of a whole part (robot, fluid, actuator, numerics, contact), fide
 
 Without ranges, the sweep is the grid of all combinations. Numbers that robots may have of their own are simulated side
 by side. Every batch, of some hundred designs, has one file of results, OUT/parts/*/*.parquet. The same command goes on
-with the batches that have none. In the end OUT/best.json is the scene of the best design, for `train.py --scene`.
+with the batches that have none. In the end OUT/best.json is the scene of the best design, for `train.py --scene`;
+with parts of your own, OUT/best.py is.
 """
 
 import argparse
@@ -28,11 +29,11 @@ from tqdm import tqdm
 from seastar_gym.command import DEFAULT, INTERRUPTED, answered
 from seastar_gym.envs.paths import PATH_HELP, load_path
 from seastar_gym.evaluation.swim import TIME_LIMIT
-from seastar_gym.files import read_json, require_extra, within, write_json
+from seastar_gym.files import read_json, require_extra, within, write_atomically, write_json
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, shown
 from seastar_gym.scene.scene import load_scene
-from seastar_gym.scene.serial import KINDS, from_dict
+from seastar_gym.scene.serial import KINDS, from_dict, has_own_kinds
 from seastar_gym.simulator.device import DEVICES
 from seastar_gym.sweep.designs import PARTS, Axis, Batch, Choices, Range, Route, Sweep
 from seastar_gym.sweep.executors import add_options, executor_of
@@ -193,6 +194,15 @@ def run_sweep(sweep: Sweep, options: argparse.Namespace) -> int:
     return 1 if tally.problems else 0
 
 
+REGISTERED = """from seastar_gym import Scene
+from seastar_gym.scene.scene import load_scene
+
+load_scene({file!r})  # registers parts of the robot
+scene = Scene.from_dict({scene!r})
+"""
+"""Python of a scene with parts that a file registers."""
+
+
 def keep_best(options: argparse.Namespace) -> None:
     """Write the scene of the best design, and say which it is; nothing without results."""
     if not any(ResultFiles(options.out).names()):
@@ -203,6 +213,9 @@ def keep_best(options: argparse.Namespace) -> None:
         return
     file, design = options.out / "best.json", ", ".join(f"{name}={shown(value)}" for name, value in best.design.items())
     write_json(file, best.scene.to_dict())
+    if options.scene is not None and has_own_kinds(best.scene):
+        file = file.with_suffix(".py")
+        write_atomically(file, REGISTERED.format(file=str(options.scene.absolute()), scene=best.scene.to_dict()))
     unit = (UNITS | OF_CONTROLLERS)[options.objective]
     print(f"Best {options.objective}: {best.value:.6g} {unit}, of {design}. Its scene: {file}.")
 

@@ -40,6 +40,7 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks import name_of
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.envs.waypoints import AlongPath
+from seastar_gym.scene.scene import load_scene
 
 TYPES = {"float": float, "int": int, "bool": bool, "str": str}
 OF_TASKS = (Miswired, Prey, Station, FailBlind, ObstTrap, Prizes, SimToReal)
@@ -211,10 +212,10 @@ def test_what_a_camera_sees_of_a_task_is_that_of_the_table():
 def test_a_scene_of_a_file_has_the_fidelity_that_is_typed_otherwise_its_own_numerics(tmp_path):
     assert scene_at(None, "fast", "balanced") is None
     (tmp_path / "plain.json").write_text(json.dumps(Scene().to_dict()))
-    assert scene_at(tmp_path / "plain.json", None, "fast") == Scene.preset("fast")
+    assert scene_at(load_scene(tmp_path / "plain.json"), None, "fast") == Scene.preset("fast")
     own = Scene(Seastar(nodes_per_limb=9), numerics=Numerics("sdirk2", 5e-3))
     (tmp_path / "own.json").write_text(json.dumps(own.to_dict()))
-    assert scene_at(tmp_path / "own.json", None, "fast") == own.at()
+    assert scene_at(load_scene(tmp_path / "own.json"), None, "fast") == own.at()
     assert scene_at(own, "reference", "fast") == Scene.preset("reference")
     held = replace(own, held_nodes=(8,))
     assert scene_at(held, "reference", "fast") == replace(held.at(), numerics=Numerics.preset("reference"))

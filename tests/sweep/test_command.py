@@ -12,6 +12,7 @@ import pytest
 from seastar_gym.command import INTERRUPTED
 from seastar_gym.scene import Scene, Seastar
 from seastar_gym.scene.actuators.wires import SmaWires
+from seastar_gym.scene.scene import load_scene
 from seastar_gym.scene.serial import to_dict
 from seastar_gym.sweep.command import axis_of, main
 from seastar_gym.sweep.designs import Choices, Range
@@ -55,6 +56,16 @@ def test_a_sweep_from_words_to_a_table(tmp_path, capsys):
     assert Scene.from_dict(json.loads(told)["scene"]).numerics == Scene.preset("fast").numerics
     assert main([*words, *QUICK]) == 0
     assert "batches: 0; there before, batches: 2" in capsys.readouterr().out
+
+
+def test_the_best_design_with_parts_of_one_s_own_is_python_that_registers_them(tmp_path):
+    (tmp_path / "own.py").write_text(
+        "from own_terms import Trap\nfrom seastar_gym import Scene\nscene = Scene(terms=(Trap(c=1e-3),))"
+    )
+    words = "robot.limb_length=0.1,0.12", "--scene", str(tmp_path / "own.py"), "--out", str(tmp_path)
+    assert main([*words, *QUICK]) == 0
+    assert load_scene(tmp_path / "best.py") == load_scene(tmp_path / "best.json")
+    assert f"load_scene({str(tmp_path / 'own.py')!r})" in (tmp_path / "best.py").read_text()
 
 
 def test_designs_that_swam_nowhere_have_no_best(tmp_path, capsys):
