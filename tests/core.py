@@ -47,7 +47,7 @@ def forward_and_back():
     scene, commands = Scene.preset('fast'), np.ones((1, 5))
     differentiate(scene, commands, ['commands'])
     swum = record(scene, commands)
-    swum.gradient({'positions': np.ones(swum.swim.positions.shape)}, ['commands'])
+    swum.gradient({'positions': np.ones(swum.swim.positions.shape)}, ['commands', 'robot.density'])
 """
 KINDS = {
     "gradients": "forward_and_back()",
