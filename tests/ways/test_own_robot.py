@@ -1,7 +1,4 @@
-"""From a scene file of one's own to a policy that swims it, is filmed, played, trained on and published.
-
-Another number of limbs than the page's has another actuator, seed and time between decisions, too.
-"""
+"""From a scene of one's own, the page's or another, to a policy that is filmed, played, trained on and published."""
 
 import json
 import re
