@@ -24,6 +24,7 @@ PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PROJECT = PYPROJECT["project"]
 OURS = {"seastar_gym", "agents", "studies", "train"}
 NOT_REQUIRED = {*OURS, "rclpy", "geometry_msgs", "std_msgs", "cv2"}  # examples of ROS 2 and of OpenCV
+OF_PACKAGE = ["render", "studies", "train", "search", "ray", "slurm", "dask", "tracks", "export", "gpu", "plant"]
 # Where the import name does not say it.
 DISTRIBUTION_OF = {
     "cupy": "cupy-cuda13x",
@@ -69,10 +70,8 @@ def installed_with(found: list[Requirement]) -> set[str]:
         if key not in seen and not ONLY_WITH_CUDA.match(key[0]):
             seen.add(key)
             inner = map(Requirement, importlib.metadata.requires(requirement.name) or [])
-            extras = requirement.extras or {""}
-            waiting += [
-                one for one in inner if not one.marker or any(one.marker.evaluate({"extra": e}) for e in extras)
-            ]
+            asked = [{"extra": extra} for extra in requirement.extras or {""}]
+            waiting += [one for one in inner if not one.marker or any(map(one.marker.evaluate, asked))]
     return {name for name, _ in seen}
 
 
@@ -93,10 +92,7 @@ def imports_of(*paths: Path) -> set[str]:
 @pytest.mark.parametrize(
     ("folders", "extras"),
     [
-        (
-            ["seastar_gym"],
-            ["render", "studies", "train", "search", "ray", "slurm", "dask", "tracks", "export", "gpu", "plant"],
-        ),
+        (["seastar_gym"], OF_PACKAGE),
         (["studies"], ["train", "sweep", "test"]),
         (["agents", "train.py"], ["train"]),
         (["tests"], ["test", "browser", "ray", "learners"]),

@@ -209,9 +209,8 @@ def test_a_straight_robot_falls_and_coasts_by_quadratic_drag(told):
         reference, what = 1e3 * known.falling_speed(K, 1.0, time), f"{name}, a = 1 m/s² [mm/s]"
         rows.append(Row(what, reference, 1e3 * translated(time, 0.0, 1.0)[0], 1e-6 * reference, shown=time == 5.0))
     for time in (0.1, 1.0, 10.0):
-        for what, exact, ours in zip(
-            ("speed [mm/s]", "distance [mm]"), known.coasting(K, 0.1, time), translated(time, 0.1, 0.0), strict=True
-        ):
+        both, names = (known.coasting(K, 0.1, time), translated(time, 0.1, 0.0)), ("speed [mm/s]", "distance [mm]")
+        for what, exact, ours in zip(names, *both, strict=True):
             name = what.replace(" ", f" after coasting {time:g} s ")
             rows.append(Row(name, 1e3 * exact, 1e3 * ours, 5e-3 * exact, time == 1.0))
     told("drag", rows)
@@ -237,9 +236,8 @@ def bending_pulse(robot):
     pulse = amplitude * np.exp(-0.5 * (from_start / WIDTH) ** 2 + 2j * np.pi / WAVE * from_start)
     speed = np.fft.ifft(-1j * k**2 * known.beam_constant(robot) * np.fft.fft(pulse))
     before = np.stack([pulse.real[:n], speed.real[:n]], axis=1)
-    simulator = Simulator(
-        Scene(robot, None, known.pause(TIME), Numerics("implicit-midpoint", STEP, newton_tolerance=1e-13))
-    )
+    numerics = Numerics("implicit-midpoint", STEP, newton_tolerance=1e-13)
+    simulator = Simulator(Scene(robot, None, known.pause(TIME), numerics))
     state = simulator.get_state()
     state.positions[0, :n, 1], state.velocities[0, :n, 1] = before.T
     simulator.set_state(state)
@@ -252,10 +250,8 @@ def pulse_frequency(robot, k, before, after):
 
     The known amount by which the implicit midpoint rule lowers it is corrected.
     """
-    omega, wave = (
-        k**2 * known.beam_constant(robot),
-        np.exp(-1j * k * robot.edge_length * np.arange(robot.nodes_per_limb)),
-    )
+    omega = k**2 * known.beam_constant(robot)
+    wave = np.exp(-1j * k * robot.edge_length * np.arange(robot.nodes_per_limb))
     # Of what runs to the tip; what runs back has the opposite velocity and cancels.
     start, end = (wave @ (heights + 1j * speeds / omega) for heights, speeds in (before.T, after.T))
     gained = -np.angle(end / start)

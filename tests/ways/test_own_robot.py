@@ -50,6 +50,5 @@ def test_a_robot_of_ones_own_is_trained_compared_filmed_played_and_published(sto
     # Its card says whose it is.
     story.types("python -m agents.cards --policies runs/mine/policy.safetensors")
     card = (run / "policy.md").read_text(encoding="utf-8")
-    assert (
-        f"a robot of {n_limbs} limbs" in card and json.loads((run / "policy.json").read_text())["symmetry"] is symmetric
-    )
+    assert f"a robot of {n_limbs} limbs" in card
+    assert json.loads((run / "policy.json").read_text())["symmetry"] is symmetric
