@@ -25,14 +25,8 @@ PROJECT = PYPROJECT["project"]
 OURS = {"seastar_gym", "agents", "studies", "train"}
 NOT_REQUIRED = {*OURS, "rclpy", "geometry_msgs", "std_msgs", "cv2"}  # examples of ROS 2 and of OpenCV
 OF_PACKAGE = ["render", "studies", "train", "search", "ray", "slurm", "dask", "tracks", "export", "gpu", "plant"]
-# Where the import name does not say it.
-DISTRIBUTION_OF = {
-    "cupy": "cupy-cuda13x",
-    "PIL": "pillow",
-    "pygame": "pygame-ce",
-    "serial": "pyserial",
-    "yaml": "pyyaml",
-}
+# Distributions of imports whose names do not say it.
+NAMED = {"cupy": "cupy-cuda13x", "PIL": "pillow", "pygame": "pygame-ce", "serial": "pyserial", "yaml": "pyyaml"}
 # Torch's wheels for CUDA name these; its wheels for the CPU do not.
 ONLY_WITH_CUDA = re.compile(r"(nvidia|cuda|triton)\b")
 
@@ -86,7 +80,7 @@ def imports_of(*paths: Path) -> set[str]:
             modules.add(node.module)
     own = {path.stem for folder in ("tests", "docs", "examples") for path in (ROOT / folder).rglob("*")}
     packages = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names - own - NOT_REQUIRED
-    return {canonicalize_name(DISTRIBUTION_OF.get(package, package)) for package in packages}
+    return {canonicalize_name(NAMED.get(package, package)) for package in packages}
 
 
 @pytest.mark.parametrize(

@@ -51,10 +51,7 @@ def order(errors, robots):
 
 @pytest.fixture
 def told(request):
-    """Function that holds rows to their bounds, which are not generous, and to what the page has: (name, rows).
-
-    Last digits of ours depend on the machine.
-    """
+    """Function that holds rows to their bounds, which are not generous, and to what the page has: (name, rows)."""
 
     def hold(name, rows):
         off = np.array([abs(row.ours - row.reference) for row in rows])
@@ -78,10 +75,8 @@ TO_REST = Numerics("implicit-euler", step=0.5, newton_tolerance=1e-12)
 
 
 def loaded_tip(robot, k, held):
-    """Tip (x, y) [m] of limb 1 at rest, where every limb has a tip load of k EI / L^2 in +y.
-
-    Held nodes are heavy, not fixed: minutes under these loads would move them visibly.
-    """
+    """Tip (x, y) [m] of limb 1 at rest, where every limb has a tip load of k EI / L^2 in +y. Held nodes are heavy, not
+    fixed: minutes under these loads would move them visibly."""
     ends = range(robot.nodes_per_limb - 1, robot.n_nodes, robot.nodes_per_limb - 1)
     loads = tuple((end, 0.0, k * known.stiffness(robot)[0] / robot.limb_length**2) for end in ends)
     simulator = Simulator(Scene(robot, Water(), known.pause(8.0), TO_REST, held_nodes=held, loads=loads))
@@ -226,10 +221,8 @@ SLOWER = {"continuum": (4.0, 9e-4, 3e-3), "chapter": (2.0, 0.1, 0.4)}
 
 
 def bending_pulse(robot):
-    """State before and after a pulse ran along limb 1 for TIME: heights [m] and speeds [m/s] across, shape (N, 2).
-
-    Waves under a Gaussian; the initial velocity is that of the wave that runs to the tip.
-    """
+    """State before and after a pulse ran along limb 1 for TIME: heights [m] and speeds [m/s] across, shape (N, 2). Of
+    waves under a Gaussian, with the initial velocity of the wave that runs to the tip."""
     n, amplitude = robot.nodes_per_limb, 1e-6 * WAVE
     k = 2.0 * np.pi * np.fft.fftfreq(4 * n, robot.edge_length)
     from_start = robot.edge_length * np.arange(4 * n) - START
@@ -246,10 +239,8 @@ def bending_pulse(robot):
 
 
 def pulse_frequency(robot, k, before, after):
-    """Angular frequency [rad/s] of the wavenumber k [1/m], from the phase that this component gained in TIME.
-
-    The known amount by which the implicit midpoint rule lowers it is corrected.
-    """
+    """Angular frequency [rad/s] of the wavenumber k [1/m], from the phase that this component gained in TIME, corrected
+    for the known amount by which the implicit midpoint rule lowers it."""
     omega = k**2 * known.beam_constant(robot)
     wave = np.exp(-1j * k * robot.edge_length * np.arange(robot.nodes_per_limb))
     # Of what runs to the tip; what runs back has the opposite velocity and cancels.
