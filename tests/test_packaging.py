@@ -24,14 +24,9 @@ PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PROJECT = PYPROJECT["project"]
 OURS = {"seastar_gym", "agents", "studies", "train"}
 NOT_REQUIRED = {*OURS, "rclpy", "geometry_msgs", "std_msgs", "cv2"}  # examples of ROS 2 and of OpenCV
-# Where the import name does not say it.
-DISTRIBUTION_OF = {
-    "cupy": "cupy-cuda13x",
-    "PIL": "pillow",
-    "pygame": "pygame-ce",
-    "serial": "pyserial",
-    "yaml": "pyyaml",
-}
+OF_PACKAGE = ["render", "studies", "train", "search", "ray", "slurm", "dask", "tracks", "export", "gpu", "plant"]
+# Distributions of imports whose names do not say it.
+NAMED = {"cupy": "cupy-cuda13x", "PIL": "pillow", "pygame": "pygame-ce", "serial": "pyserial", "yaml": "pyyaml"}
 # Torch's wheels for CUDA name these; its wheels for the CPU do not.
 ONLY_WITH_CUDA = re.compile(r"(nvidia|cuda|triton)\b")
 
@@ -69,10 +64,8 @@ def installed_with(found: list[Requirement]) -> set[str]:
         if key not in seen and not ONLY_WITH_CUDA.match(key[0]):
             seen.add(key)
             inner = map(Requirement, importlib.metadata.requires(requirement.name) or [])
-            extras = requirement.extras or {""}
-            waiting += [
-                one for one in inner if not one.marker or any(one.marker.evaluate({"extra": e}) for e in extras)
-            ]
+            asked = [{"extra": extra} for extra in requirement.extras or {""}]
+            waiting += [one for one in inner if not one.marker or any(map(one.marker.evaluate, asked))]
     return {name for name, _ in seen}
 
 
@@ -87,16 +80,13 @@ def imports_of(*paths: Path) -> set[str]:
             modules.add(node.module)
     own = {path.stem for folder in ("tests", "docs", "examples") for path in (ROOT / folder).rglob("*")}
     packages = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names - own - NOT_REQUIRED
-    return {canonicalize_name(DISTRIBUTION_OF.get(package, package)) for package in packages}
+    return {canonicalize_name(NAMED.get(package, package)) for package in packages}
 
 
 @pytest.mark.parametrize(
     ("folders", "extras"),
     [
-        (
-            ["seastar_gym"],
-            ["render", "studies", "train", "search", "ray", "slurm", "dask", "tracks", "export", "gpu", "plant"],
-        ),
+        (["seastar_gym"], OF_PACKAGE),
         (["studies"], ["train", "sweep", "test"]),
         (["agents", "train.py"], ["train"]),
         (["tests"], ["test", "browser", "ray", "learners"]),

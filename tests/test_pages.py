@@ -19,7 +19,6 @@ import seastar_gym
 from documented import documented
 from seastar_gym import Numerics, Scene
 from seastar_gym.accuracy import measure
-from seastar_gym.accuracy import measure as endurance
 from seastar_gym.envs import paths
 from seastar_gym.evaluation import swim as many
 from seastar_gym.scene import numerics
@@ -44,8 +43,7 @@ NOTEBOOK = ROOT / "examples" / "first_hour.ipynb"
 
 @pytest.fixture
 def short_form(monkeypatch, tmp_path):
-    """Episodes of LONGEST steps, trainings of one rollout, certificates of one setting, no window, a folder of one's
-    own, and no path or scheme that outlives the page."""
+    """Short episodes and trainings, certificates of one setting, no window, and nothing that outlives the page."""
     from stable_baselines3 import PPO
 
     make, learn = gym.make, PPO.learn
@@ -64,7 +62,7 @@ def short_form(monkeypatch, tmp_path):
     monkeypatch.setattr(measure, "NODES", (12,))
     monkeypatch.setattr(measure, "SHORT", Numerics("implicit-midpoint", 1e-3, 1e-8))
     monkeypatch.setattr(measure, "NUMERICS", (Numerics("implicit-midpoint", 2.5e-3, 1e-6),))
-    monkeypatch.setattr(endurance, "LONG", 40)
+    monkeypatch.setattr(measure, "LONG", 40)
     monkeypatch.setattr(measure, "MANY_NODES", 17)
     monkeypatch.setattr(paths, "PATHS", dict(paths.PATHS))
     monkeypatch.setattr(numerics, "SCHEME_NAMES", [*numerics.SCHEME_NAMES])
@@ -195,9 +193,8 @@ def made(monkeypatch):
     """Generated pages in Markdown, by their files."""
     monkeypatch.syspath_prepend(str(ROOT / "docs" / "_extensions"))
     pages = {name: importlib.import_module(name).pages() for name in ("environments", "reference")}
-    return {
-        ROOT / "docs" / place / f"{name}.md": text for place, found in pages.items() for name, text in found.items()
-    }
+    every = ((place, name, text) for place, found in pages.items() for name, text in found.items())
+    return {ROOT / "docs" / place / f"{name}.md": text for place, name, text in every}
 
 
 def test_every_id_and_every_documented_name_has_its_place_on_a_page(made):

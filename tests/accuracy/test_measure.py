@@ -10,7 +10,6 @@ import pytest
 from currents import CURRENTS
 from seastar_gym import Body, Numerics, Scene, Seastar, Simulator, SmaWires, UniformCurrent
 from seastar_gym.accuracy import commands, measure, resonance
-from seastar_gym.accuracy import measure as endurance
 from seastar_gym.accuracy.certificate import at, resolved
 from seastar_gym.scene.numerics import Resolution
 from seastar_gym.scene.robot import SILICONE
@@ -161,12 +160,12 @@ def test_equal_limbs_that_turn_alike_and_end_at_rest_gather_no_energy(n_limbs):
     simulator = Simulator(scene)
     simulator.stroke(-np.ones((1, n_limbs)))
     assert simulator.kinetic_energy()[0] < 1e-20
-    assert endurance.energy_growth(scene) <= 1.01
+    assert measure.energy_growth(scene) <= 1.01
 
 
 def test_the_energy_of_a_swim_that_fails_grows_without_bound(monkeypatch):
     monkeypatch.setattr(Simulator, "stroke", lambda *_: SimpleNamespace(status=np.array([1] + [0] * 16)))
-    assert endurance.energy_growth(SCENE) == np.inf
+    assert measure.energy_growth(SCENE) == np.inf
 
 
 @pytest.mark.parametrize("body", [None, pytest.param(Body(radius=0.02, mass=0.02), marks=pytest.mark.slow)])
@@ -180,7 +179,7 @@ def test_a_uniform_current_is_a_translation(body):
     np.testing.assert_allclose(in_current - np.arange(1, 11)[:, None, None] * [0.05, -0.02], hub, atol=1e-7)
     lengths = measure.path_lengths(moving, in_current)
     np.testing.assert_allclose(lengths, measure.path_lengths(still, hub), atol=1e-7)
-    assert endurance.energy_growth(moving) == pytest.approx(endurance.energy_growth(still), rel=1e-3)
+    assert measure.energy_growth(moving) == pytest.approx(measure.energy_growth(still), rel=1e-3)
 
 
 @pytest.mark.parametrize("kind", ["uniform", "vortex", "grid"])

@@ -35,9 +35,8 @@ def batch(n_robots, **arguments):
 def test_it_foretells_where_other_robots_come_to_rest(fitted):
     env, simulator = batch(64), Simulator(SCENE, 64, threads=1)
     observations, _ = env.reset(seed=5)
-    assert (
-        np.abs(SCENE.robot.limb_length * ppo.coasted(fitted, observations)).max() < 2e-4
-    )  # who is at rest goes nowhere
+    at_rest = SCENE.robot.limb_length * ppo.coasted(fitted, observations)
+    assert np.abs(at_rest).max() < 2e-4  # goes nowhere
     env.action_space.seed(6)
     for _ in range(7):
         observations, *_ = env.step(env.action_space.sample())

@@ -201,9 +201,8 @@ def test_a_resumed_learner_is_where_it_was(tmp_path):
 
 def test_the_same_seed_and_the_same_file_train_the_same_policy(file):
     pairs = [make_learner(seed=seed).learn(128) for seed in (1, 1, 2)]
-    pairs += [
-        learner_file.resume(file, make_learner().get_env()).learn(64, reset_num_timesteps=False) for _ in range(2)
-    ]
+    for _ in range(2):
+        pairs.append(learner_file.resume(file, make_learner().get_env()).learn(64, reset_num_timesteps=False))
     first, second, other, resumed, again = map(numbers_of, pairs)
     for number, same in [*zip(first, second, strict=True), *zip(resumed, again, strict=True)]:
         np.testing.assert_array_equal(number, same)

@@ -27,9 +27,8 @@ def ours(id):
     if row.task is not None:
         return ppo.Hyperparameters(**{"decision_period": row.decision_period, **OWN[row.task]})
     if row.decision_period < 1.0:  # the trainings of docs/training.md
-        return ppo.Hyperparameters(
-            decision_period=row.decision_period, discount=0.9, rollout=32, num_envs=64, gae_lambda=0.95
-        )
+        timed = {"discount": 0.9, "rollout": 32, "num_envs": 64, "gae_lambda": 0.95}
+        return ppo.Hyperparameters(decision_period=row.decision_period, **timed)
     return ppo.Hyperparameters()
 
 

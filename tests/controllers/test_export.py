@@ -63,12 +63,20 @@ OWN = {
     "two-long-limbs-adjacent": Description("pairs", True, Scene(four(0.12, 0.12, 0.1, 0.1)), (16,), past=1),
     "limbs-all-unlike": Description("limbs", True, Scene(four(0.12, 0.1, 0.11, 0.09)), (16,)),
 }
-"""Policies of kinds that are not bundled: without symmetry, with half a turn and a mirror, with a mirror that is not
-along limb 1, with nothing, and of a network without hidden layers."""
+"""Kinds that are not bundled: no symmetry, half a turn and a mirror, a mirror not along limb 1, no hidden layers."""
 
 
 def policy_of(name: str) -> LearnedPolicy:
     return random_policy(OWN[name]) if name in OWN else load_policy(name)
+
+
+def built(folder: Path, policy: str, main: str, *flags: str) -> str:
+    """File of what the compiler makes of C that includes that of a policy."""
+    (folder / "policy.c").write_text(policy)
+    (folder / "main.c").write_text(main)
+    strict = "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"
+    subprocess.run(["cc", *strict, *flags, str(folder / "main.c"), "-o", str(folder / "made"), "-lm"], check=True)
+    return str(folder / "made")
 
 
 class Compiled:
@@ -76,11 +84,7 @@ class Compiled:
 
     def __init__(self, policy: LearnedPolicy, folder, points: int | None = None):
         text = to_c(policy, "tested", points)
-        (folder / "policy.c").write_text(text)
-        flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-shared", "-fPIC"]
-        library = folder / "policy.so"
-        subprocess.run(["cc", *flags, str(folder / "policy.c"), "-o", str(library), "-lm"], check=True)
-        self._c, self.policy = ctypes.CDLL(str(library)), policy
+        self._c, self.policy = ctypes.CDLL(built(folder, text, text, "-O2", "-shared", "-fPIC")), policy
         self.defined = {name: int(number) for name, number in re.findall(r"#define SEASTAR_(\w+) (\d+)$", text, re.M)}
         past = max(1, self.defined["PAST"]) * self.defined["SIZE"]
         self._robot = type("Robot", (ctypes.Structure,), {"_fields_": [("begun", ctypes.c_int),
@@ -182,11 +186,7 @@ def random_past(policy: LearnedPolicy, observations: np.ndarray, seed: int = 1):
 
 
 def check(compiled: Compiled, robots: list, observations: np.ndarray, past, chosen: np.ndarray) -> int:
-    """Assert that C sees and does what Python does, one after the other.
-
-    past: What robots remember, shape (n, past, size). chosen: Actions of Python. Returns how many decisions were nearer
-    than rounding.
-    """
+    """Assert that C sees, by what robots remember, and does as Python does; how many decisions rounding may change."""
     policy, n_limbs = compiled.policy, compiled.policy.scene.robot.n_limbs
     expected = input_of(policy, observations, past)
     each = zip(robots, observations, strict=True)
@@ -246,30 +246,7 @@ def test_c_decides_as_numpy_does_for_random_observations(name, tmp_path):
         np.testing.assert_array_equal(np.array(robots[7].past).reshape(past.shape[1:]), later[0][7])
 
 
-PROGRAM = """
-#include <stdio.h>
-#include "policy.c"
-
-static float observation[SEASTAR_SIZE], past[SEASTAR_PAST > 0 ? SEASTAR_PAST : 1][SEASTAR_SIZE];
-
-int main(void)
-{
-    struct seastar robot;
-    int action[SEASTAR_NUMBERS];
-    float commands[SEASTAR_LIMBS];
-    while (fread(observation, sizeof observation, 1, stdin) == 1) {
-        seastar_begin(&robot);
-        if (SEASTAR_PAST > 0 && fread(past, sizeof past, 1, stdin) == 1) {
-            memcpy(robot.past, past, sizeof past);
-            robot.begun = 1;
-        }
-        seastar_act(&robot, observation, action, commands);
-        for (int limb = 0; limb < SEASTAR_LIMBS; limb++)
-            printf("%g ", commands[limb]);
-    }
-    return 0;
-}
-"""
+PROGRAM = Path(__file__).with_name("commands.c")
 SANITISERS = "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"
 ODD = np.array([np.nan, np.inf, -np.inf, 3.4e38, -1e31, 1e30, 1e20, 1e-45, -1e-40, 0.0], np.float32)
 
@@ -304,13 +281,10 @@ def commands_and_margins(policy: LearnedPolicy, observations: np.ndarray, past: 
 @pytest.mark.parametrize("name", [*TASKS, *OWN])
 def test_c_rests_as_numpy_does_by_what_cannot_be_and_no_sanitiser_finds_anything(name, tmp_path):
     policy = policy_of(name)
-    (tmp_path / "policy.c").write_text(to_c(policy, name))
-    (tmp_path / "main.c").write_text(PROGRAM)
-    flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic", *SANITISERS]
-    subprocess.run(["cc", *flags, str(tmp_path / "main.c"), "-o", str(tmp_path / "main"), "-lm"], check=True)
+    program = built(tmp_path, to_c(policy, name), PROGRAM.read_text(encoding="utf-8"), "-O1", *SANITISERS)
     observations, past = odd_observations(policy, 2000)
     rows = [observations] if past is None else [observations, past.reshape(2000, -1)]
-    done = subprocess.run([str(tmp_path / "main")], input=np.concatenate(rows, axis=1).tobytes(), capture_output=True)
+    done = subprocess.run([program], input=np.concatenate(rows, axis=1).tobytes(), capture_output=True)
     assert done.returncode == 0, done.stderr.decode()
     commands, sure = commands_and_margins(policy, observations, past)
     found = np.array(done.stdout.split(), float).reshape(commands.shape)
@@ -354,11 +328,10 @@ def test_a_policy_that_does_not_see_its_limbs_needs_a_pose_alone(tmp_path):
     for _ in range(3):
         observations = env.step(env.action_space.sample())[0]
     simulator, targets = inner.simulator, inner.task.targets(inner._robots)
-    for hub, theta, target, expected in zip(
-        simulator.hub_position(), heading_of(simulator), targets, observations, strict=True
-    ):
+    poses = np.column_stack([simulator.hub_position(), heading_of(simulator)])
+    for pose, target, expected in zip(poses, targets, observations, strict=True):
         limbs, further = expected[layout.actuators].astype(float), expected[layout.further].astype(float)
-        found = compiled.observe_pose(np.array([*hub, theta]), limbs, further, np.ascontiguousarray(target))
+        found = compiled.observe_pose(pose, limbs, further, np.ascontiguousarray(target))
         np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
 
 
@@ -382,12 +355,9 @@ def test_fewer_points_may_be_tracked_and_velocities_of_three_pictures_are_of_sec
 
 @needs_compiler
 def test_the_program_of_the_page_runs(tmp_path):
-    (program,) = re.findall(r"```c\n(.*?)```", (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8"), re.S)
-    (tmp_path / "main.c").write_text(program)
-    (tmp_path / "policy.c").write_text(to_c(policy_of("timed-0.2s"), "timed-0.2s", 3))
-    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
-    subprocess.run(["cc", *flags, str(tmp_path / "main.c"), "-o", str(tmp_path / "main"), "-lm"], check=True)
-    done = subprocess.run([str(tmp_path / "main")], check=True, capture_output=True, text=True)
+    (main,) = re.findall(r"```c\n(.*?)```", (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8"), re.S)
+    program = built(tmp_path, to_c(policy_of("timed-0.2s"), "timed-0.2s", 3), main)
+    done = subprocess.run([program], check=True, capture_output=True, text=True)
     commands = [float(word) for word in done.stdout.split()]
     assert len(commands) == 5 and set(commands) <= {-1.0, 0.0, 1.0}
 

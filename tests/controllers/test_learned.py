@@ -233,10 +233,9 @@ SEEN = {
 @pytest.mark.parametrize("trained", SEEN)
 def test_a_policy_knows_its_camera_and_swims_in_what_shows_the_same(trained, given, tmp_path):
     options = {"num_envs": 1, "scene": WIRES, "decision_period": 0.2}
-    batch = VectorSymmetryReduction(
-        ppo.make_training_batch(ppo.Hyperparameters(**SMALL), "line", True, **options, **SEEN[trained])
-    )
-    save(random_policy(ppo.describe(adapter.BatchVecEnv(batch), (4,))), tmp_path / "policy.safetensors")
+    batch = ppo.make_training_batch(ppo.Hyperparameters(**SMALL), "line", True, **options, **SEEN[trained])
+    about = ppo.describe(adapter.BatchVecEnv(VectorSymmetryReduction(batch)), (4,))
+    save(random_policy(about), tmp_path / "policy.safetensors")
     policy = load(tmp_path / "policy.safetensors")
     assert camera_of(policy).get("sight") == SEEN[trained].get("sight") and policy.description.path == "line"
     env = SeastarSwimEnv("line", scene=WIRES, decision_period=0.2, actions="pairs", **SEEN[given])

@@ -87,9 +87,8 @@ def test_a_model_that_sees_reduced_observations_is_refused_where_they_are_not(tm
     with assert_refused("ReducedPolicy(policy, env)"):
         swim("mine", model, env_of(), max_strokes=1)
     swim("mine", ReducedPolicy(model, env_of()), env_of(), max_strokes=1)
-    (tmp_path / "mine_in_a_module.py").write_text(
-        f"from stable_baselines3 import PPO\ndef make(env):\n    return PPO.load({file!r}, device='cpu')\n"
-    )
+    code = f"from stable_baselines3 import PPO\ndef make(env):\n    return PPO.load({file!r}, device='cpu')\n"
+    (tmp_path / "mine_in_a_module.py").write_text(code)
     monkeypatch.syspath_prepend(tmp_path)
     assert track_of(load_agent("mine_in_a_module:make", env_of())) == "symmetric"
     heavy = Scene(gravity=(0.0, -1.0), numerics=FAST.numerics)

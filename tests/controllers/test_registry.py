@@ -223,10 +223,8 @@ def test_a_model_says_how_often_it_decides(wrap, tmp_path):
 
     learned = stable_baselines3.A2C("MlpPolicy", wrap(wires(0.5)), policy_kwargs={"net_arch": [8]}, device="cpu")
     learned.save(tmp_path / "model.zip")
-    for period, fits in (
-        (0.5, nullcontext()),
-        (0.2, assert_refused("decides every 0.5 s, the environment every 0.2 s")),
-    ):
+    refused = assert_refused("decides every 0.5 s, the environment every 0.2 s")
+    for period, fits in ((0.5, nullcontext()), (0.2, refused)):
         with fits:
             swim("mine", load_agent(str(tmp_path / "model.zip"), wires(period)), wires(period), max_strokes=1)
 

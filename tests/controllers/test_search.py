@@ -103,18 +103,13 @@ STATES = {
     **{name: (Scene(actuator=ACTUATORS[name], numerics=FAST.numerics), 1e-3)
        for name in ("thermal", "wires", "limited pulse")},
 }  # fmt: skip
-"""Scenes, and by how much the way of the next stroke may differ from that of a state that was observed.
-
-More nodes than stations are interpolated, so undamped limbs ring otherwise: by some per mille of a stroke.
-"""
+"""Scenes, and by how much the way of the next stroke may differ from that of a state that was observed: more nodes
+than stations are interpolated, so undamped limbs ring otherwise."""
 
 
 @pytest.mark.parametrize("scene, allowed", STATES.values(), ids=STATES)
 def test_an_observation_is_the_whole_state(scene, allowed):
-    """From the state read off the observations, the same commands go the same way, as seen in the body frame.
-
-    The roots of limbs on a body are part of it; so are robots whose actuators remember.
-    """
+    """From the state read off the observations, the same commands go the same way, as seen in the body frame."""
     env, observations = swum(1 if scene.robot.has_body else 3, 1 if scene.robot.has_body else 4, scene)
     state, hub = state_of(observations, scene), env.simulator.hub_position()
     if scene.robot.has_body:
@@ -204,9 +199,8 @@ def test_over_periods_of_gaits_it_decides_once_a_second_and_swims_round_a_corner
     chosen = []
     choose = planner.choose
     planner.choose = lambda observations: chosen.append(choose(observations)) or chosen[-1]
-    env = SeastarSwimEnv(
-        path=[[0.04, 0.0], [0.04, 0.04]], actions=planner.actions, fidelity="balanced", decision_period=0.05
-    )
+    corner = [[0.04, 0.0], [0.04, 0.04]]
+    env = SeastarSwimEnv(corner, planner.actions, "balanced", decision_period=0.05)
     done = swim("gait-planner", planner, env, max_strokes=400)
     assert done.finished and done.time[-1] < 9.0
     assert len(chosen) == np.ceil(done.time[-1])

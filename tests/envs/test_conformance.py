@@ -330,9 +330,7 @@ def test_a_batch_takes_and_gives_whatever_gymnasiums_own_does(id, mode):
 @pytest.mark.parametrize("id", [SWIM, "SeastarPrey-v0"])
 def test_make_vec_takes_its_own_arguments_for_one_robot_as_for_many(id, forms):
     batch = gym.make_vec(id, **{"fidelity": "fast", "num_envs": 1} | forms)
-    singles = gym.make_vec(
-        id, **{"fidelity": "fast", "vectorization_mode": "sync"} | {**forms, "vectorization_mode": "sync"}
-    )
+    singles = gym.make_vec(id, **{"fidelity": "fast"} | forms | {"vectorization_mode": "sync"})
     assert_alike(batch.reset(seed=3), singles.reset(seed=3), "reset")
     for _ in range(2):
         actions = singles.action_space.sample()
@@ -440,9 +438,8 @@ def test_a_batch_goes_on_to_the_same_bits_in_a_pickle_and_a_copy_and_comes_back_
     assert made_again.spec == batch.spec and made_again.autoreset_mode is AutoresetMode.SAME_STEP
     batch.action_space.seed(4)
     assert_same_steps(batch.reset(seed=3), made_again.reset(seed=3))
-    assert_same_steps(
-        *(twin.step(actions) for actions in [batch.action_space.sample()] for twin in (batch, made_again))
-    )
+    actions = batch.action_space.sample()
+    assert_same_steps(batch.step(actions), made_again.step(actions))
     twins = [batch, pickle.loads(pickle.dumps(batch)), copy.deepcopy(batch)]
     for _ in range(4):
         actions = batch.action_space.sample()
@@ -572,21 +569,16 @@ def first_decisions(name: str) -> list[dict[str, list]]:
         rows.append({"reward": [reward], "ends": [terminated, truncated], **numbers(info)})
         if terminated:
             break
-    rows[-1] |= {
-        "observation": observation,
-        "scenery": env.unwrapped.task.scenery(env.unwrapped._robots, 0).points.ravel(),
-    }
+    scenery = env.unwrapped.task.scenery(env.unwrapped._robots, 0)
+    rows[-1] |= {"observation": observation, "scenery": scenery.points.ravel()}
     return rows
 
 
 def changes(rows: list[dict]) -> list[dict[str, list]]:
     """What differs from the row before, to five digits."""
     short = [{name: [float(f"{x:.5g}") for x in values] for name, values in row.items()} for row in rows]
-    before = [{}, *short[:-1]]
-    return [
-        {name: values for name, values in row.items() if values != last.get(name)}
-        for row, last in zip(short, before, strict=True)
-    ]
+    pairs = zip(short, [{}, *short[:-1]], strict=True)
+    return [{name: values for name, values in row.items() if values != last.get(name)} for row, last in pairs]
 
 
 @pytest.mark.parametrize("name", [*(id for id in IDS if id not in OF_USERS), *RECORDED])

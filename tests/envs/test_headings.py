@@ -71,10 +71,8 @@ def test_turns_are_seen_and_on_the_last_leg_the_next_is_the_current_one():
 
 
 def test_the_reward_is_the_decrease_of_what_is_left_to_turn():
-    weights = RewardWeights(heading=3.0)
-    env = SeastarSwimEnv(
-        CORNERS, "pairs", "fast", decision_period=0.5, headings=HeadingTargets((0.3, -3.0, 2.0)), reward=weights
-    )
+    asked = {"headings": HeadingTargets((0.3, -3.0, 2.0)), "reward": RewardWeights(heading=3.0)}
+    env = SeastarSwimEnv(CORNERS, "pairs", "fast", decision_period=0.5, **asked)
     _, info = env.reset(seed=0)
     assert info["reward_heading"] == 0.0
     left = [0.3 + (2.0 * math.pi - 3.3) + (2.0 * math.pi - 5.0)]
@@ -88,9 +86,8 @@ def test_the_reward_is_the_decrease_of_what_is_left_to_turn():
 
 def test_a_reached_waypoint_leaves_the_turns_after_it():
     """Passing on costs or earns no more than the tolerance."""
-    env = SeastarSwimEnv(
-        [[0.001, 0.0], [0.3, 0.0]], "pairs", "fast", decision_period=0.5, headings=HeadingTargets((0.1, 1.1), 0.2)
-    )
+    path, headings = [[0.001, 0.0], [0.3, 0.0]], HeadingTargets((0.1, 1.1), 0.2)
+    env = SeastarSwimEnv(path, "pairs", "fast", decision_period=0.5, headings=headings)
     env.reset(seed=0)
     info = env.step(0)[4]
     assert info["waypoint_index"] == 1 and info["heading_error"] == pytest.approx(1.1)

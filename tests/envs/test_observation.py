@@ -64,11 +64,9 @@ def test_every_index_holds_what_the_table_says(scene):
     for _ in range(3):
         simulator.stroke(rng.uniform(-1.0, 1.0, (n_robots, n_limbs)))
     targets = rng.uniform(-1.0, 1.0, (n_robots, 4))
-    found = observations_of(simulator, targets)
+    found, q, v = observations_of(simulator, targets), simulator.positions, simulator.velocities
     for robot in range(n_robots):
-        expected = expected_observation(
-            scene.robot, simulator.positions[robot], simulator.velocities[robot], targets[robot, :2], targets[robot, 2:]
-        )
+        expected = expected_observation(scene.robot, q[robot], v[robot], targets[robot, :2], targets[robot, 2:])
         np.testing.assert_allclose(found[robot], expected, rtol=0.0, atol=1e-12)
 
 

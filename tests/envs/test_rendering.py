@@ -1,6 +1,5 @@
 """Pictures show what the robot does, need no display, and depend on nothing but what they are given."""
 
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -177,12 +176,6 @@ def test_the_view_keeps_proportions_stands_still_and_follows_a_robot_that_leaves
 def test_paths_that_stay_in_place_and_empty_and_long_trails_are_drawn(path):
     for trail in (np.zeros((0, 2)), np.random.default_rng(0).normal(0.0, 0.1, (5000, 2))):
         assert renderer_of(path).draw(frame_of(trail=trail)).any()
-
-
-def test_without_pygame_one_sentence_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pygame", None)
-    with pytest.raises(ImportError, match=r'pip install "seastar-gym\[render\]"'):
-        renderer_of()
 
 
 # Windows

@@ -465,9 +465,8 @@ def test_what_a_task_shows_of_its_own_is_carried_by_the_symmetry(id):
             np.testing.assert_allclose(theirs, symmetry_in(env).carry(seen, [element]), atol=2e-4)
             action = np.array([action])
             env.step(action[0]), other.step(symmetry_in(env).carry_actions(action, [element])[0])
-        np.testing.assert_array_equal(
-            transform_commands(env._robots.last_commands, [element]), other._robots.last_commands
-        )
+        carried = transform_commands(env._robots.last_commands, [element])
+        np.testing.assert_array_equal(carried, other._robots.last_commands)
 
 
 def _carry(ours, theirs, element):

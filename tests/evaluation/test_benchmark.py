@@ -1,7 +1,6 @@
 """The benchmark: one contract for an id, results that merge, and tables that say how many seeds they have."""
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -154,21 +153,13 @@ def test_what_the_benchmark_would_not_heed_is_refused(sentence, capsys):
     assert sentence in told and told.count("\n") == 1
 
 
-def test_results_of_another_contract_than_that_of_this_version_are_refused(tmp_path, capsys):
-    write([cell("mine", PREY, 0, 1.0, contract="old")], tmp_path / "a.json")
-    assert main(["evaluate", "--merge", str(tmp_path / "a.json")]) == 2
-    assert f"a.json and this version are of different contracts of {PREY}" in capsys.readouterr().err
-
-
-def test_files_of_different_contracts_are_refused_in_a_sentence(tmp_path, capsys):
-    for name in "ab":
-        write([cell("mine", PREY, 0, 1.0, contract=name)], tmp_path / f"{name}.json")
-    (tmp_path / "c.json").write_text('{"runs": 3}')
-    files = [str(tmp_path / f"{name}.json") for name in "abc"]
-    assert main(["evaluate", "--merge", *files[:2]]) == 2
-    assert f"{files[0]} and {files[1]} are of different contracts of {PREY}" in capsys.readouterr().err
-    with assert_refused("c.json is no file of the benchmark"):
-        read(files[2:])
+def test_files_of_another_contract_than_others_or_than_this_version_are_refused_in_a_sentence(tmp_path, capsys):
+    files = [str(tmp_path / f"{name}.json") for name in "ab"]
+    for file in files:
+        write([cell("mine", PREY, 0, 1.0, contract=file)], file)
+    for merged, other in ((files, files[1]), (files[:1], "this version")):
+        assert main(["evaluate", "--merge", *merged]) == 2
+        assert f"{files[0]} and {other} are of different contracts of {PREY}" in capsys.readouterr().err
 
 
 def test_tables_are_written_in_every_form(tmp_path, scales):
@@ -181,18 +172,6 @@ def test_tables_are_written_in_every_form(tmp_path, scales):
     assert "| ppo_lstm | 2.33 [1, 4] (3) |" in (tmp_path / "benchmark.md").read_text("utf-8")
     assert (tmp_path / "benchmark.csv").read_text().splitlines()[1].startswith(f"ppo_lstm,plain,,0,{PREY},3,")
     assert len(json.loads((tmp_path / "benchmark.json").read_text())["cells"]) == 6
-
-
-# Tracks
-
-
-def test_a_policy_says_its_track():
-    for policy, track in (
-        (pretrained(), "symmetric"),
-        (scripted("rest"), "plain"),
-        (SimpleNamespace(symmetric=True), "symmetric"),
-    ):
-        assert benchmark.track_of(policy) == track
 
 
 # Contracts

@@ -60,9 +60,8 @@ def test_a_current_carries_the_robots_its_own_way_and_the_waypoints_stay(mm_per_
         hubs.append(hubs_of(task))
     angles = 2.0 * np.pi * np.arange(N) / 8
     last_strokes = (hubs[-1] - hubs[-11]) / 10.0
-    np.testing.assert_allclose(
-        last_strokes, speed * np.stack([np.cos(angles), np.sin(angles)], axis=1), atol=0.2 * speed
-    )
+    flow = speed * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    np.testing.assert_allclose(last_strokes, flow, atol=0.2 * speed)
     seen = task.observe()
     np.testing.assert_allclose(np.hypot(*seen[:, at.hub_velocity].T) * 0.025, speed, rtol=0.2)
     to_waypoint = np.linalg.norm([0.1437, 0.0] - hubs[-1], axis=1)

@@ -51,10 +51,7 @@ def order(errors, robots):
 
 @pytest.fixture
 def told(request):
-    """Function that holds rows to their bounds, which are not generous, and to what the page has: (name, rows).
-
-    Last digits of ours depend on the machine.
-    """
+    """Function that holds rows to their bounds, which are not generous, and to what the page has: (name, rows)."""
 
     def hold(name, rows):
         off = np.array([abs(row.ours - row.reference) for row in rows])
@@ -78,10 +75,8 @@ TO_REST = Numerics("implicit-euler", step=0.5, newton_tolerance=1e-12)
 
 
 def loaded_tip(robot, k, held):
-    """Tip (x, y) [m] of limb 1 at rest, where every limb has a tip load of k EI / L^2 in +y.
-
-    Held nodes are heavy, not fixed: minutes under these loads would move them visibly.
-    """
+    """Tip (x, y) [m] of limb 1 at rest, where every limb has a tip load of k EI / L^2 in +y. Held nodes are heavy, not
+    fixed: minutes under these loads would move them visibly."""
     ends = range(robot.nodes_per_limb - 1, robot.n_nodes, robot.nodes_per_limb - 1)
     loads = tuple((end, 0.0, k * known.stiffness(robot)[0] / robot.limb_length**2) for end in ends)
     simulator = Simulator(Scene(robot, Water(), known.pause(8.0), TO_REST, held_nodes=held, loads=loads))
@@ -209,9 +204,8 @@ def test_a_straight_robot_falls_and_coasts_by_quadratic_drag(told):
         reference, what = 1e3 * known.falling_speed(K, 1.0, time), f"{name}, a = 1 m/s² [mm/s]"
         rows.append(Row(what, reference, 1e3 * translated(time, 0.0, 1.0)[0], 1e-6 * reference, shown=time == 5.0))
     for time in (0.1, 1.0, 10.0):
-        for what, exact, ours in zip(
-            ("speed [mm/s]", "distance [mm]"), known.coasting(K, 0.1, time), translated(time, 0.1, 0.0), strict=True
-        ):
+        both, names = (known.coasting(K, 0.1, time), translated(time, 0.1, 0.0)), ("speed [mm/s]", "distance [mm]")
+        for what, exact, ours in zip(names, *both, strict=True):
             name = what.replace(" ", f" after coasting {time:g} s ")
             rows.append(Row(name, 1e3 * exact, 1e3 * ours, 5e-3 * exact, time == 1.0))
     told("drag", rows)
@@ -227,19 +221,16 @@ SLOWER = {"continuum": (4.0, 9e-4, 3e-3), "chapter": (2.0, 0.1, 0.4)}
 
 
 def bending_pulse(robot):
-    """State before and after a pulse ran along limb 1 for TIME: heights [m] and speeds [m/s] across, shape (N, 2).
-
-    Waves under a Gaussian; the initial velocity is that of the wave that runs to the tip.
-    """
+    """State before and after a pulse ran along limb 1 for TIME: heights [m] and speeds [m/s] across, shape (N, 2). Of
+    waves under a Gaussian, with the initial velocity of the wave that runs to the tip."""
     n, amplitude = robot.nodes_per_limb, 1e-6 * WAVE
     k = 2.0 * np.pi * np.fft.fftfreq(4 * n, robot.edge_length)
     from_start = robot.edge_length * np.arange(4 * n) - START
     pulse = amplitude * np.exp(-0.5 * (from_start / WIDTH) ** 2 + 2j * np.pi / WAVE * from_start)
     speed = np.fft.ifft(-1j * k**2 * known.beam_constant(robot) * np.fft.fft(pulse))
     before = np.stack([pulse.real[:n], speed.real[:n]], axis=1)
-    simulator = Simulator(
-        Scene(robot, None, known.pause(TIME), Numerics("implicit-midpoint", STEP, newton_tolerance=1e-13))
-    )
+    numerics = Numerics("implicit-midpoint", STEP, newton_tolerance=1e-13)
+    simulator = Simulator(Scene(robot, None, known.pause(TIME), numerics))
     state = simulator.get_state()
     state.positions[0, :n, 1], state.velocities[0, :n, 1] = before.T
     simulator.set_state(state)
@@ -248,14 +239,10 @@ def bending_pulse(robot):
 
 
 def pulse_frequency(robot, k, before, after):
-    """Angular frequency [rad/s] of the wavenumber k [1/m], from the phase that this component gained in TIME.
-
-    The known amount by which the implicit midpoint rule lowers it is corrected.
-    """
-    omega, wave = (
-        k**2 * known.beam_constant(robot),
-        np.exp(-1j * k * robot.edge_length * np.arange(robot.nodes_per_limb)),
-    )
+    """Angular frequency [rad/s] of the wavenumber k [1/m], from the phase that this component gained in TIME, corrected
+    for the known amount by which the implicit midpoint rule lowers it."""
+    omega = k**2 * known.beam_constant(robot)
+    wave = np.exp(-1j * k * robot.edge_length * np.arange(robot.nodes_per_limb))
     # Of what runs to the tip; what runs back has the opposite velocity and cancels.
     start, end = (wave @ (heights + 1j * speeds / omega) for heights, speeds in (before.T, after.T))
     gained = -np.angle(end / start)

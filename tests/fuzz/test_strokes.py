@@ -64,6 +64,7 @@ class Trial(NamedTuple):
     slow: bool = False
 
 
+SEEN = [PLAIN, CONTACT, FLUID, frozenset({CHAPTER})]
 EVERYWHERE = ("strokes end", "bits alone", "bits in other lanes")
 TRIALS = {
     "strokes end finite or with a failure that is told and in bounded work": Trial(("strokes end",), 27),
@@ -74,9 +75,7 @@ TRIALS = {
     "from a state that is set again within a stroke": Trial(("bits of pieces",), 15),
     "free robots in vacuum keep their momentum": Trial(("momentum",), 30, [PLAIN, CONTACT]),
     "implicit euler without commands creates no energy": Trial(("energy",), 30, [PLAIN]),
-    "alike turned, mirrored and elsewhere": Trial(
-        ("frames",), 32, [PLAIN, CONTACT, FLUID, frozenset({CHAPTER})], wild=False
-    ),
+    "alike turned, mirrored and elsewhere": Trial(("frames",), 32, SEEN, wild=False),
     "alike seen from a moving frame": Trial(("moving frame",), 45, [PLAIN, CONTACT, FLUID], wild=False),
     "water with contact and nothing else": Trial(EVERYWHERE, 10, [CONTACT], change=in_water),
     "contact in vacuum": Trial(EVERYWHERE, 10, [CONTACT], change=in_vacuum),
@@ -108,17 +107,13 @@ def test_promises_are_kept(trial):
 
 @pytest.mark.parametrize("terms, seed", [(CONTACT, 26_110_000_015), (CONTACT | {OWN}, 892_955_996)])
 def test_overlaps_are_a_robot_s_own(terms, seed):
-    """Pairs that only others have on the list were counted, too, where one of them touched; and slopes are computed
-    once more for a robot that is done, while others are not.
-    """
+    """Not of pairs that only others have on the list, nor of slopes that others need once more."""
     PROMISES["bits alone"](draw_case(Random(seed), terms, wild=True))
 
 
 @pytest.mark.parametrize("seed", [21, 7396])
 def test_energy_of_limbs_unlike_each_other(seed):
-    """A slender limb beside a thick one folded unseen, as it has little of the energy that was taken for violent; a
-    robot with a huge node came to rest with more energy than it had.
-    """
+    """A slender limb beside a thick one, which has little of the energy; one with a huge node that comes to rest."""
     PROMISES["energy"](draw_case(Random(seed), PLAIN, wild=True))
 
 

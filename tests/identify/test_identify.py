@@ -109,7 +109,7 @@ def test_coordinates_that_were_not_seen_do_not_count(measurement):
     assert few.values[0] == pytest.approx(all_of_them.values[0], rel=0.02)
 
 
-def test_the_command_line_fits_a_scene_of_ones_own_and_writes_it(tmp_path, monkeypatch, capsys):
+def test_the_command_line_fits_a_scene_of_ones_own_and_writes_it(tmp_path, monkeypatch):
     robot = Seastar(nodes_per_limb=4, n_limbs=3)
     scene = Scene(robot, numerics=Numerics("implicit-midpoint", 0.02, newton_tolerance=1e-6))
     synthetic(scene, {"actuator.peak_angle": 0.5}, n_strokes=1).to_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
@@ -124,9 +124,6 @@ def test_the_command_line_fits_a_scene_of_ones_own_and_writes_it(tmp_path, monke
     assert replace(fitted, actuator=scene.actuator) == scene
     low, high = json.loads((tmp_path / "intervals.json").read_text())["actuator.peak_angle"]
     assert low < fitted.actuator.peak_angle < high < 1.1 * low
-    (tmp_path / "none.py").write_text("robot = 3")
-    assert main([*command[:3], "none.py"]) == 2
-    assert capsys.readouterr().err == "none.py must define `scene`, a Scene.\n"
 
 
 def test_every_number_of_a_body_on_limbs_that_bend_can_be_fitted_and_drawn():

@@ -66,11 +66,8 @@ def test_a_scene_that_lacks_something_is_told_and_its_intervals_are_not_trained_
     assert found.is_doubted and "the scene lacks something" in found.report()
     picture, node, off = found.farthest
     there = found.residuals[seen.time.tolist().index(picture), seen.nodes.index(node)]
-    assert (
-        f"node {node} at {picture:.3f} s" in found.report()
-        and np.hypot(*there) == pytest.approx(off)
-        and off > 3.0 * found.noise
-    )
+    assert f"node {node} at {picture:.3f} s" in found.report()
+    assert np.hypot(*there) == pytest.approx(off) and off > 3.0 * found.noise
     seen.to_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
     (tmp_path / "scene.json").write_text(json.dumps(RINGING.to_dict()))
     file = tmp_path / "intervals.json"
@@ -95,10 +92,7 @@ def test_a_scene_that_lacks_something_is_told_and_its_intervals_are_not_trained_
         (lambda m: replace(m, positions=m.positions[:, [0, 1, 3, 2]]), ["at rest", "Mirrored"]),
         (lambda m: replace(m, time=1e3 * m.time, command_times=1e3 * np.arange(6.0)), ["40 s apart", "milliseconds"]),
         (lambda m: replace(m, command_times=1e3 * np.arange(6.0)), ["0.04 s apart", "1000 s, for", "milliseconds"]),
-        (
-            lambda m: replace(m, time=m.time + 1.7e9, command_times=np.arange(6.0)),
-            ["1.7e+09 s", "of 0 s", "one clock."],
-        ),
+        (lambda m: replace(m, time=m.time + 1.7e9, command_times=np.arange(6.0)), ["1.7e+09 s", "of 0 s", "clock."]),
     ],
     ids=["mm", "cm", "scaled", "mirrored", "turned", "moved", "swapped", "milliseconds", "commands", "clocks"],
 )

@@ -5,6 +5,7 @@ import pickle
 import sys
 import zlib
 from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,57 +19,11 @@ from seastar_gym.identify.tracks import Track, read_deeplabcut, read_motive, rea
 from seastar_gym.identify.tracks.track import Seen, from_rest, homography, mapped, read_homography, seen_nodes, turned
 
 POSE = "time,x,y,theta\n0,0.1,0.2,0.3\n0.033,,,\n0.067,nan,NaN,nan\n0.1,0.11,0.2,0.31\n"
-DEEPLABCUT = """\
-scorer,DLC_resnet50_seastarMar1shuffle1_50000,DLC_resnet50_seastarMar1shuffle1_50000,\
-DLC_resnet50_seastarMar1shuffle1_50000,DLC_resnet50_seastarMar1shuffle1_50000,\
-DLC_resnet50_seastarMar1shuffle1_50000,DLC_resnet50_seastarMar1shuffle1_50000
-bodyparts,hub,hub,hub,tip one,tip one,tip one
-coords,x,y,likelihood,x,y,likelihood
-0,100.5,200.25,0.99,300.0,200.0,0.98
-1,101.0,201.0,0.3,301.0,201.0,0.97
-2,,,,302.0,202.0,0.6
-"""
-SEVERAL = """\
-scorer,s,s,s,s,s,s
-individuals,a,a,a,b,b,b
-bodyparts,hub,hub,hub,hub,hub,hub
-coords,x,y,likelihood,x,y,likelihood
-0,1,2,1.0,3,4,1.0
-"""
-SLEAP = """\
-track,frame_idx,instance.score,hub.x,hub.y,hub.score,tip.x,tip.y,tip.score
-track_0,0,0.93,101.5,55.25,0.97,140.0,60.0,0.88
-track_0,3,0.51,103.0,57.0,0.20,141.0,61.0,0.30
-track_0,1,0.90,102.0,56.0,0.9,,,
-"""
-MOTIVE = """\
-Format Version,1.23,Take Name,Take 1,Take Notes,,Capture Frame Rate,120.000000,Export Frame Rate,120.000000,\
-Capture Start Time,2024-03-01 10.00.00.000 AM,Capture Start Frame,0,Total Frames in Take,3,Total Exported Frames,3,\
-Rotation Type,Quaternion,Length Units,Millimeters,Coordinate Space,Global
-
-,Type,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,\
-Rigid Body Marker,Rigid Body Marker,Rigid Body Marker,Rigid Body Marker,Marker,Marker,Marker
-,Name,Seastar,Seastar,Seastar,Seastar,Seastar,Seastar,Seastar,Seastar,\
-"Seastar:Marker 001","Seastar:Marker 001","Seastar:Marker 001","Seastar:Marker 001",\
-"Seastar:Marker 001","Seastar:Marker 001","Seastar:Marker 001"
-,ID,1,1,1,1,1,1,1,1,2,2,2,2,2,2,2
-,,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error,\
-Position,Position,Position,Marker Quality,Position,Position,Position
-Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,,X,Y,Z,,X,Y,Z
-0,0.000000,0.0,0.0,0.0,1.0,10.0,500.0,20.0,0.1,1,2,3,1.0,1.5,500.0,-3.5
-1,0.008333,,,,,,,,,,,,,,,
-2,0.016667,0.0,0.5,0.0,0.8660254,11.0,500.0,19.0,0.1,1,2,3,1.0,1.5,500.0,-4.5
-"""
-MOTIVE_WITH_PARENTS = """\
-Format Version,1.25,Take Name,Take 2,Capture Frame Rate,120.0,Rotation Type,Quaternion,Length Units,Meters,
-,Type,,Marker,Marker,Marker
-,Name,,Tip,Tip,Tip
-,ID,,"4CF0B31A","4CF0B31A","4CF0B31A"
-,Parent,,,,
-,,,Position,Position,Position
-Frame,Time (Seconds),TimeCode,X,Y,Z
-0,0.000000,15:26:46:12.02,0.25,0.5,1.0
-"""
+TRACKS = Path(__file__).parents[1] / "data" / "tracks"
+DEEPLABCUT, SEVERAL, SLEAP, MOTIVE, MOTIVE_WITH_PARENTS = (
+    (TRACKS / f"{name}.csv").read_text(encoding="utf-8")
+    for name in ("deeplabcut", "deeplabcut_two_animals", "sleap", "motive", "motive_with_parents")
+)
 
 
 def written(folder, name, text):
@@ -102,8 +57,7 @@ READ = {
 
 @pytest.mark.parametrize("name", READ)
 def test_files_are_read_in_the_order_of_their_pictures_and_what_was_not_seen_is_nan(tmp_path, name, golden):
-    """Motive's from above in metres: half a turn about the upward axis is one to the left, and the measured marker is
-    taken, not the solver's."""
+    """Motive's from above in metres: half a turn about the upward axis is to the left; measured markers are taken."""
     text, read = READ[name]
     track = read((sleap_h5 if name.endswith("h5") else written)(tmp_path, name, text))
     with np.printoptions(precision=9, suppress=True):
@@ -333,9 +287,8 @@ def converted(tmp_path, text, *given):
 
 def with_body(tmp_path):
     """Options of a robot with a body, whose orientation is tracked."""
-    (tmp_path / "body.py").write_text(
-        "from seastar_gym import Body, Scene, Seastar\nscene = Scene(Seastar(body=Body(radius=0.02)))\n"
-    )
+    scene = "from seastar_gym import Body, Scene, Seastar\nscene = Scene(Seastar(body=Body(radius=0.02)))\n"
+    (tmp_path / "body.py").write_text(scene)
     return ["--scene", str(tmp_path / "body.py")]
 
 

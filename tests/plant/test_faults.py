@@ -1,7 +1,5 @@
-"""Drives in which something goes wrong at a random time: wires are cold soon, never too hot, never both of a limb.
-
-The clock is simulated; driver, guard, lines and server are those of real drives.
-"""
+"""Drives in which something goes wrong at a random time: wires are cold soon, never too hot, never both of a limb. The
+clock is simulated; driver, guard, lines and server are those of real drives."""
 
 import contextlib
 import itertools
@@ -103,9 +101,8 @@ class Drive:
         return now
 
     def plant_fails(self):
-        self.tank.fails = [OSError(5, "gone"), MemoryError(), PlantError("Gone."), ValueError("Gone.")][
-            self.rng.integers(4)
-        ]
+        failures = OSError(5, "gone"), MemoryError(), PlantError("Gone."), ValueError("Gone.")
+        self.tank.fails = failures[self.rng.integers(4)]
         now = self.tank.time
         assert not self.swim(0.5)
         return now

@@ -37,9 +37,8 @@ def tank(folder):
             numbers = [str(file) for file in files]
             own = [file for file in files if isinstance(file, int)]
             environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-            process = subprocess.Popen(
-                [sys.executable, ROLES, role, *numbers], pass_fds=own, env=environment, text=True, **options
-            )
+            command = [sys.executable, ROLES, role, *numbers]
+            process = subprocess.Popen(command, pass_fds=own, env=environment, text=True, **options)
             stack.callback(process.wait)
             stack.callback(process.kill)
             return process

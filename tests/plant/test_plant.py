@@ -297,9 +297,7 @@ def test_whatever_ends_a_step_stops_the_wires(where, monkeypatch):
         raise KeyboardInterrupt
 
     if where != "action":
-        monkeypatch.setattr(
-            *((plant, "sight") if where == "sight" else (env.unwrapped.simulator, "hub_position")), fail
-        )
+        monkeypatch.setattr(plant if where == "sight" else env.unwrapped.simulator, where, fail)
     with pytest.raises((KeyboardInterrupt, ValueError)):
         env.step(99 if where == "action" else 3)
     monkeypatch.undo()
@@ -328,9 +326,7 @@ WITH_BODY = replace(SCENE, robot=Seastar(n_limbs=3, nodes_per_limb=7, body=Body(
 
 
 @pytest.mark.parametrize("late", [0.0, 0.03])
-@pytest.mark.parametrize(
-    ("scene", "nodes"), [(SCENE, (0, 6, 12, 18, 24, 30)), (WITH_BODY, (0, 6, 12, 18, ORIENTATION))]
-)
+@pytest.mark.parametrize("scene, nodes", [(SCENE, (0, 6, 12, 18, 24, 30)), (WITH_BODY, (0, 6, 12, 18, ORIENTATION))])
 def test_logs_tell_when_commands_were_given_and_what_the_robot_did(scene, nodes, late, tmp_path):
     """The robot begins turned; its logs are in the frame in which it lay."""
     sight = Sight(rate=50.0, delay=0.1, sees=1)

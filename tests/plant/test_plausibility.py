@@ -216,9 +216,8 @@ def test_nothing_of_a_drive_that_can_be_is_dropped(seed):
     rng = np.random.default_rng(seed)
     noise, turn_noise = (0.0, 0.0) if seed % 4 == 0 else rng.uniform(0.0, [2e-3, 0.03])
     rate, delay, period = float(rng.choice([30, 60, 120])), rng.uniform(0.0, 0.15), float(rng.choice([0.2, 0.5]))
-    sight = Sight(
-        rate, delay, jitter=0.01, dropout=0.01, noise=noise, turn_noise=turn_noise, sees=("pose", 1)[seed % 2]
-    )
+    bad = {"jitter": 0.01, "dropout": 0.01, "noise": noise, "turn_noise": turn_noise}
+    sight = Sight(rate, delay, **bad, sees=("pose", 1)[seed % 2])
     simulator = Simulator(SCENE)
     simulator.reset(heading=rng.uniform(-3.1, 3.1))
     tank = SimulatedPlant(simulator, sight, seed)

@@ -1,7 +1,4 @@
-"""The reference sketch for a microcontroller does what a driver asks over a pseudo-terminal, and no more.
-
-Faults at random times are played to it on a clock of their own.
-"""
+"""The sketch for a microcontroller does what a driver asks over a pseudo-terminal, and no more, whatever goes wrong."""
 
 import os
 import shutil
@@ -18,9 +15,8 @@ from faults import COLD_WITHIN, LIES, Heated, garbage, greedy
 from seastar_gym.plant.guard import LATENESS, Heat, Limits
 from seastar_gym.plant.lines import LinePlant, sealed
 
-pytestmark = pytest.mark.skipif(
-    not (shutil.which("g++") and hasattr(os, "openpty")), reason="There is no compiler, or no pseudo-terminal, here."
-)
+CANNOT = not (shutil.which("g++") and hasattr(os, "openpty"))
+pytestmark = pytest.mark.skipif(CANNOT, reason="There is no compiler, or no pseudo-terminal, here.")
 HERE = Path(__file__).parent
 SKETCH = HERE.parents[1] / "examples"
 

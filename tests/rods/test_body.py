@@ -88,9 +88,8 @@ def make(body, fluid=Water(), relaxation_time=None, gravity=None, contact=False,
         return scene, rods, Rigid(**rigid)
     corners = np.array(body.outline) if body.outline else np.zeros((1, 2))
     limbs = tuple(robot.limbs_that_may_touch())
-    return scene, rods, Touching(
-        **rigid, corners=corners, radius=body.radius, limbs=limbs, opening_angle=ANGLE, ahead=ahead
-    )  # fmt: skip
+    met = {"corners": corners, "radius": body.radius, "limbs": limbs, "opening_angle": ANGLE}
+    return scene, rods, Touching(**rigid, **met, ahead=ahead)
 
 
 def random_stage(oracle: Rigid, gamma: float, seed: int, kind: str | None = None) -> SimpleNamespace:
@@ -286,9 +285,8 @@ def test_limbs_on_a_body_meet_where_they_are(side, limb):
     """On either side and in front of a tip, however they are numbered, since they may go round each other's tips."""
     nodes, away = MEETING[side]
     places = on_hub(FAR, LINE, nodes) if limb == 2 else on_hub(FAR, nodes, LINE)
-    np.testing.assert_allclose(
-        directions(forces(UNEVEN, places, places)[0, 3 * (limb + 1)]), directions(np.array(away)), atol=1e-9
-    )
+    found = forces(UNEVEN, places, places)[0, 3 * (limb + 1)]
+    np.testing.assert_allclose(directions(found), directions(np.array(away)), atol=1e-9)
 
 
 @pytest.mark.parametrize("name", BODIES)

@@ -45,10 +45,8 @@ class Copy:
 
     def start(self, code: str = ENERGY, **environment: str) -> subprocess.Popen[str]:
         path = {"PYTHONPATH": str(self.folder), "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": str(self.cache)}
-        env, pipe = {**os.environ, **path, **environment}, subprocess.PIPE
-        return subprocess.Popen(
-            [sys.executable, "-c", code], cwd=self.folder, env=env, stdout=pipe, stderr=pipe, text=True
-        )
+        env, told = {**os.environ, **path, **environment}, dict.fromkeys(("stdout", "stderr"), subprocess.PIPE)
+        return subprocess.Popen([sys.executable, "-c", code], cwd=self.folder, env=env, **told, text=True)
 
     def run(self, code: str = ENERGY, **environment: str) -> list[float]:
         return numbers(self.start(code, **environment))

@@ -1,7 +1,4 @@
-"""Strokes of hard scenes arrive, end where they did, and cost what they did.
-
-What is right, other tests say. Here whatever changes a step is noticed: a threshold, a first guess, a term.
-"""
+"""Strokes of hard scenes arrive, end where they did, and cost what they did: whatever changes a step is noticed."""
 
 import json
 from functools import partial
@@ -61,9 +58,8 @@ def test_hard_scenes_arrive_where_they_did_and_cost_what_they_did(request, name)
     if request.config.getoption("--update"):
         known = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
         KEPT.parent.mkdir(exist_ok=True)
-        KEPT.write_text(
-            json.dumps({**known, name: [*counts, *ends]}, indent=1, sort_keys=True) + "\n", encoding="utf-8"
-        )
+        known[name] = [*counts, *ends]
+        KEPT.write_text(json.dumps(known, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     kept = json.loads(KEPT.read_text(encoding="utf-8"))[name]
     violent = kept[0] > 10
     np.testing.assert_allclose(counts, kept[: len(COUNTED)], rtol=0.02 if violent else 1e-3, atol=2.0)

@@ -1,5 +1,4 @@
-"""The guard's parts: cuts keep the momenta; hinges that go through their poles are seen. What it promises of strokes:
-simulator/test_conservation.py."""
+"""The guard's parts: cuts keep the momenta; hinges that go through their poles are seen."""
 
 from types import SimpleNamespace
 
@@ -66,9 +65,8 @@ def held(share: float, largest_cut: float = LARGEST_CUT, robots: Mask = EVERYONE
 
     def kinetic_energies(velocities: np.ndarray) -> np.ndarray:
         seen = velocities - FRAME.T[:, None]
-        return np.array(
-            [0.5 * np.einsum("nd,ndme,me", one, inertia(star, at), one) for at, one in zip(q, seen, strict=True)]
-        )
+        each = zip(q, seen, strict=True)
+        return np.array([0.5 * np.einsum("nd,ndme,me", one, inertia(star, at), one) for at, one in each])
 
     rigid, kinetic = plain(rigid_motion(rods, work, *state, SEEN_FROM)[5]), kinetic_energies(v)
     potential = np.array([oracle.elastic_energy(STAR, one, np.zeros(5)) for one in q])
@@ -122,9 +120,8 @@ def test_a_robot_that_comes_to_rest_keeps_its_momenta_and_the_energy_of_its_rigi
     work = make_work(rods, 1)
     work.q[:] = state[0]
     freeze_fluid(rods, work)
-    np.testing.assert_array_equal(
-        plain(come_to_rest(rods, work, *state, Mask(chosen))), rests := chosen & (np.arange(N_LANES) != in_a_point)
-    )
+    rests = chosen & (np.arange(N_LANES) != in_a_point)
+    np.testing.assert_array_equal(plain(come_to_rest(rods, work, *state, Mask(chosen))), rests)
     after = nodes(state[1])
     np.testing.assert_array_equal(after[~rests], v[~rests])
     for at, before, rest in zip(q[rests], v[rests], after[rests], strict=True):

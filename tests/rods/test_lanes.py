@@ -1,7 +1,4 @@
-"""Kernels on `Lanes` compute, for every robot, the numbers that float64 arithmetic gives, to the last bit.
-
-Whatever kernels may ask of lanes is asked of the plain twin, too.
-"""
+"""Kernels on `Lanes` compute the numbers of float64 arithmetic for every robot, to the last bit; so does their twin."""
 
 import sys
 from fractions import Fraction
@@ -69,9 +66,8 @@ def by_numpy(line: str, operands) -> np.ndarray:
 
 def kernel_of(twin: str, template: str, body: str, lines: list[str], form=PLAIN):
     """A function made of one line of `template` for every line: `store` its value in a row of its own."""
-    stores = "".join(
-        f"        store(out, {len(lines)} * r + {k}, {template.format(line)})\n" for k, line in enumerate(lines)
-    )
+    line_of = f"        store(out, {len(lines)} * r + {{}}, {{}})\n".format
+    stores = "".join(line_of(k, template.format(line)) for k, line in enumerate(lines))
     source = f"def function(a_rows, b_rows, c_rows, out_rows):\n{body}{stores}"
     namespace = dict(vars(numpy_lanes if twin == "plain" else lanes))
     exec(source, namespace)
@@ -123,12 +119,8 @@ def test_product_sums_are_rounded_once(run_all, twin):
     a, b = rng.standard_normal((2, 400 * N_LANES))
     c = -a * b * (1.0 + 2.0 ** -rng.integers(20, 60, a.size))  # cancels: the second rounding would show
     operands = SimpleNamespace(a=rows_of(a), b=rows_of(b), c=rows_of(c))
-    lines = [
-        "add_product(c, a, b)",
-        "subtract_product(c, a, -b)",
-        "add_product(0.5, a, b)",
-        "subtract_product(c, 3, b)",
-    ]
+    lines = ["add_product(c, a, b)", "subtract_product(c, a, -b)", "add_product(0.5, a, b)"]
+    lines += ["subtract_product(c, 3, b)"]
     found = run_all("{}", lines, operands).reshape(len(lines), -1)
     twice = c + a * b
     assert np.count_nonzero(found[0] != twice) > 300
@@ -192,11 +184,8 @@ def test_load_reads_per_robot_and_shared_rows_and_store_writes_lanes_or_one_numb
         if fields.flag:
             store(out, fields.count, 0.25)
 
-    per_robot, shared, out = (
-        np.random.default_rng(0).random((2, N_LANES)),
-        np.array([1.5, 2.5, 3.5]),
-        np.ones((6, N_LANES)),
-    )
+    shared, out = np.array([1.5, 2.5, 3.5]), np.ones((6, N_LANES))
+    per_robot = np.random.default_rng(0).random((2, N_LANES))
     function(Bundle(4, True, per_robot, shared), out)
     np.testing.assert_array_equal(out[0], per_robot[1])
     np.testing.assert_array_equal(out[1:].T, np.tile([3.5, 1.5, 7.0, 0.25, 1.0], (N_LANES, 1)))

@@ -42,10 +42,7 @@ WATER = Water(950.0, 1.3, 0.1, Vortex(0.02, 0.1, -0.05, 0.06), 0.8)
 
 
 def scenes():
-    """Name, scene, and velocities of some robots at the start [m/s], by which steps are halved and limbs meet.
-
-    Few nodes and a short stroke: every scheme, a fluid with all terms, limbs that meet.
-    """
+    """Name, scene, and velocities of some robots at the start [m/s], by which steps are halved and limbs meet."""
     pulse, midpoint = SmaPulse(0.6, 0.02, 0.02), Numerics("implicit-midpoint", 0.01)
     for scheme, nodes, blow in (("implicit-euler", 4, 20.0), ("sdirk2", 3, 0.3), ("implicit-midpoint", 3, 0.3)):
         yield scheme, Scene(Seastar(nodes_per_limb=nodes), actuator=pulse, numerics=Numerics(scheme, 0.02)), blow

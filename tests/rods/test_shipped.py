@@ -67,9 +67,8 @@ def shipped(tmp_path_factory):
 
 def test_nothing_is_compiled_or_written_where_code_came_with_the_package_and_bits_are_the_same(shipped, tmp_path):
     own = {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(compiling.PACKAGE.parent)}
-    run = subprocess.run(
-        [sys.executable, "-c", START, str(shipped)], env=os.environ | own, check=True, capture_output=True, text=True
-    )
+    command = [sys.executable, "-c", START, str(shipped)]
+    run = subprocess.run(command, env=os.environ | own, check=True, capture_output=True, text=True)
     assert "compiles" not in run.stderr and not [each for each in tmp_path.rglob("*") if each.suffix == ".nbc"]
     env = gym.make(ID)
     env.reset(seed=0)

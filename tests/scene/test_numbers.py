@@ -95,9 +95,8 @@ def test_what_is_declared_is_what_was(golden):
         with pytest.raises(ValueError, match="not Ellipsis") as refused:
             each.number.require(f"{each.number.whose}{name}", ...)
         flags = [flag.replace("_", " ") for flag, holds in each._asdict().items() if holds is True]
-        lines.append(
-            f"{kind.__name__}: {str(refused.value).removesuffix(', not Ellipsis.')}. {', '.join(flags)}".strip()
-        )
+        sentence = str(refused.value).removesuffix(", not Ellipsis.")
+        lines.append(f"{kind.__name__}: {sentence}. {', '.join(flags)}".strip())
     golden("declared.txt", "\n".join(sorted(lines)))
 
 

@@ -1,5 +1,4 @@
-"""What no scene can have is refused in one sentence. Numbers by themselves are in test_numbers.py; here, what they are
-to each other, and what is no number."""
+"""What no scene can have is refused in one sentence: what numbers are to each other, and what is no number."""
 
 import math
 from functools import partial
@@ -49,8 +48,7 @@ def pointing(*angles):
 
 
 def at_hub(*directions):
-    """Limbs attached at the hub itself, which have to be in order as those without a body: who may touch is told by
-    the angles from each limb to the next."""
+    """Limbs attached at the hub itself, which have to be in order as those without a body."""
     return Seastar(3, 5, body=Body(attachments=tuple(Attachment(0.0, 0.0, angle) for angle in directions)))
 
 

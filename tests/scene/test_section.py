@@ -128,9 +128,8 @@ def test_a_robot_swims_as_one_of_discs_with_the_same_numbers(section):
     """Discs of the section's thickness, whose material and water make up for the rest."""
     found = cut_of(section)
     disc = np.pi * found.thickness**2
-    robot = Seastar(
-        5, 7, rod_radius=found.thickness, youngs_modulus=E * found.area / disc, density=1000.0 * found.inert / disc
-    )
+    material = {"youngs_modulus": E * found.area / disc, "density": 1000.0 * found.inert / disc}
+    robot = Seastar(5, 7, rod_radius=found.thickness, **material)
     ratio = found.width / (2.0 * found.thickness)
     water = replace(
         WATER, drag_coefficient=ratio * WATER.drag_coefficient,

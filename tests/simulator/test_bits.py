@@ -1,7 +1,5 @@
-"""A robot has the same bits alone, in any company, lane and thread, with pauses, from a copy and on another device.
-
-Random scenes are asked the same in tests/fuzz. Here every kind of scene and every option is asked once, by name.
-"""
+"""A robot has the same bits alone, in any company, lane and thread, with pauses, from a copy and on another device;
+every kind of scene and every option is asked once, by name. Random scenes are asked the same in tests/fuzz."""
 
 import os
 import pickle

@@ -201,9 +201,7 @@ def test_energy_grows_in_no_step(scheme, robot, fluid, runs):
 
 
 def test_sdirk_in_vacuum_and_implicit_midpoint_in_water_have_a_bound_of_energy():
-    """The midpoint rule at the steps of its fidelities only: it keeps the energy of small oscillations; a step far
-    longer than those may store more than there was.
-    """
+    """The midpoint rule at the steps of its fidelities only: a far longer one may store more than there was."""
     for step, speed in WILD:
         assert energies(Numerics("sdirk2", step), None, speed=speed).max() <= 1.25, (step, speed)
     for fidelity, speed in product(("balanced", "accurate", "reference"), WILD_SPEEDS):

@@ -119,8 +119,7 @@ def test_limbs_in_contact_do_not_cross(scene, commands, parts, share):
 
 def test_pressed_limbs_rest_where_statics_says():
     """All nodes are held but the tip of limb 1, and a load F presses it against limb 2: where it comes to rest, contact
-    pushes with what bending of the last hinge leaves of F, EI/dl over the edge length squared times the way of the tip.
-    """
+    pushes with what bending of the last hinge leaves of F, EI/dl over the edge length squared times the tip's way."""
     gap, force, opening = 0.04, 0.02, 0.0385
     limbs = Limb(direction=0.0), Limb(direction=gap)
     robot = Seastar(nodes_per_limb=10, n_limbs=2, limbs=limbs, relaxation_time=0.0)
@@ -151,9 +150,7 @@ def test_pressed_limbs_rest_where_statics_says():
 
 @pytest.mark.parametrize("damping", [0.0, 0.003])
 def test_paths_of_pressed_limbs_converge_with_the_nodes(damping):
-    """With 10 nodes within 2 % of the path and with 19 within 1 %, where cones at the hub err by up to 15 % and 5 %;
-    without numerical damping, too: contact itself feeds no energy to the limbs.
-    """
+    """With 10 nodes within 2 % of the path and with 19 within 1 %; contact itself feeds no energy to the limbs."""
     commands = np.array([[0.0, 1.0, -1.0, 1.0, -1.0], [1.0, -1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0, 1.0]])
 
     def swim(nodes):
@@ -170,10 +167,7 @@ def test_paths_of_pressed_limbs_converge_with_the_nodes(damping):
 
 @pytest.mark.parametrize("angle", [0.3, 0.2])
 def test_limbs_pressed_onto_each_other_come_to_stand_at_the_opening_angle(angle):
-    """Two neighbours turned slowly until their clamps have one direction: beyond where they touch they are straight.
-
-    Cones come to stand farther apart, those of 0.3 rad at 0.33 with these nodes.
-    """
+    """Two neighbours turned slowly until their clamps have one direction: beyond where they touch they are straight."""
     scene = Scene(
         Seastar(nodes_per_limb=37), actuator=SmaPulse(heating_time=20.0, cooling_time=20.0),
         numerics=Numerics("sdirk2", 0.02), contact=Contact(opening_angle=angle),
@@ -324,9 +318,8 @@ def test_who_may_touch():
     """Neighbours, of equal limbs; if lengths differ, every pair: limbs 1 and 3 reach over a short limb 2."""
 
     def pairs(robot):
-        return {
-            tuple(each) for each in make_rods(Scene(robot, contact=Contact())).contact.pairs.reshape(-1, 2).tolist()
-        }
+        found = make_rods(Scene(robot, contact=Contact())).contact.pairs
+        return {*map(tuple, found.reshape(-1, 2).tolist())}
 
     short = Seastar(nodes_per_limb=10, limbs=(Limb(), Limb(length=0.03), Limb(), Limb(), Limb()))
     assert {(0, 1), (0, 2), (4, 1)} <= pairs(short) and len(pairs(TEN)) == 5

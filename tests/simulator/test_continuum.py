@@ -97,10 +97,8 @@ def swum(robot: Seastar, commands=STRAIGHT, strokes: int = 2, **scene) -> np.nda
 
 def test_a_profile_at_the_root_is_the_rotation_at_the_hub_in_the_limit():
     robot, at_hub = Seastar(nodes_per_limb=6), swum(Seastar(nodes_per_limb=6))
-    off = [
-        np.abs(swum(replace(robot, along=AlongLimb(profile=(1.0, *(0.0,) * points)))) - at_hub).max()
-        for points in (100, 1000)
-    ]
+    profiles = (AlongLimb(profile=(1.0, *(0.0,) * points)) for points in (100, 1000))
+    off = [np.abs(swum(replace(robot, along=along)) - at_hub).max() for along in profiles]
     assert off[0] < 0.02 * np.abs(at_hub - robot.nodes()).max()
     assert off[1] == pytest.approx(0.1 * off[0], rel=0.05)
 
@@ -113,10 +111,8 @@ def test_a_robot_that_stiffens_violently_gains_no_energy_but_the_actuators():
     command, q, start, energy = np.array([1.0, -1.0, 1.0]), star.rest, 0.0, 0.0
     for _ in range(5):
         for time in simulator.stroke_in_parts([command], 4):
-            put_in = oracle.elastic_energy(
-                star.at(command * oracle.pulse(time - 1e-12, peak, 0.02, 0.02)), q, np.zeros(3)
-            )
-            put_in -= oracle.elastic_energy(star.at(command * oracle.pulse(start, peak, 0.02, 0.02)), q, np.zeros(3))
+            turned = (star.at(command * oracle.pulse(t, peak, 0.02, 0.02)) for t in (time - 1e-12, start))
+            put_in = np.subtract(*(oracle.elastic_energy(each, q, np.zeros(3)) for each in turned))
             now = float(simulator.elastic_energy()[0] + simulator.kinetic_energy()[0])
             assert now <= energy + put_in + 1e-9 * abs(now)
             energy, q, start = now, simulator.positions[0], time % 0.04

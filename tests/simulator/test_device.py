@@ -1,8 +1,5 @@
-"""A device with a thread for each robot swims to the processor's bits: its twin "scalar" always, "cuda" with a GPU.
-
-A device's code is that of one mesh, so there are few scenes here and in test_bits.py: `python -m studies.gpu` has all
-others.
-"""
+"""A device with a thread for each robot swims to the processor's bits: its twin "scalar" always, "cuda" with a GPU. Its
+code is that of one mesh, so there are few scenes here and in test_bits.py: `python -m studies.gpu` has all others."""
 
 import pickle
 import re
@@ -24,16 +21,7 @@ from seastar_gym.lanes.device import Program
 from seastar_gym.simulator.device import DEVICES, DeviceBatch
 from seastar_gym.sweep.command import main as sweep_command
 from strokes import assert_same, finished
-from studies.gpu import (
-    EVERYTHING,
-    NOT_ON_DEVICES,
-    batch_on,
-    compared,
-    environments,
-    observed,
-    on_processor,
-    scenes,
-)
+from studies.gpu import EVERYTHING, NOT_ON_DEVICES, batch_on, compared, environments, observed, on_processor, scenes
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="devices have compiled code alone")
 
@@ -41,6 +29,7 @@ SMALL = Scene(Seastar(nodes_per_limb=4), actuator=SmaPulse(0.4), numerics=Numeri
 OF_EACH = replace(SMALL, robot=replace(SMALL.robot, youngs_modulus=np.linspace(0.8e6, 1.2e6, 35)))
 AT_FAST = ("pairs", "continuous", "headings", "camera")
 """Environments of the same scene, whose code is compiled once."""
+ENVS = environments()
 N_ROBOTS = 35
 """Robots of a batch: more than one group of a device or a processor, the last of which is not full."""
 
@@ -135,11 +124,7 @@ def test_parts_of_a_stroke_are_the_whole_and_one_that_is_dropped_is_undone(devic
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[] if name.partition(", ")[2] in AT_FAST else pytest.mark.slow)
-        for name in environments()
-    ],
+    "name", [pytest.param(each, marks=[pytest.mark.slow] * (each.partition(", ")[2] not in AT_FAST)) for each in ENVS]
 )
 def test_environments_observe_and_are_rewarded_alike(device, name):
     assert observed(name, device)["same"]
@@ -248,9 +233,8 @@ OBSERVED = "three limbs", "eight limbs in contact", "limbs in a row on a body"
 
 @pytest.mark.parametrize("name", [*CODES, *OBSERVED, pytest.param(f"sdirk2, {EVERYTHING}", marks=pytest.mark.slow)])
 def test_the_code_for_gpus_rounds_every_operation_by_itself_and_calls_nothing(name):
-    code = (
-        code_of_observations(scenes()[name]) if name in OBSERVED else code_of_swims(CODES.get(name) or scenes()[name])
-    )
+    code_of = code_of_observations if name in OBSERVED else code_of_swims
+    code = code_of(CODES.get(name) or scenes()[name])
     found = set(OF_DOUBLES.findall(code))
     assert {"add.rn.f64", "mul.rn.f64", "fma.rn.f64", "div.rn.f64", "sqrt.rn.f64"} <= found
     assert {name for name in found - ROUNDED_TO_NEAREST if not EXACT.fullmatch(name)} == set()

@@ -204,10 +204,8 @@ def test_limbs_that_touch_push_each_other_as_the_oracle_says():
     """Limbs 1 and 2 folded onto each other: the stage ends where all forces and those of the touches balance."""
     h, opening = 2e-4, 0.3
     robot, star = alike(5, 4)
-    numerics = Numerics("implicit-euler", h, newton_tolerance=1e-13)
-    simulator = Simulator(
-        Scene(robot, Water(), SmaPulse(0.0, 2.0 * h, 2.0 * h), numerics, contact=Contact(opening_angle=opening))
-    )
+    numerics, contact = Numerics("implicit-euler", h, newton_tolerance=1e-13), Contact(opening_angle=opening)
+    simulator = Simulator(Scene(robot, Water(), SmaPulse(0.0, 2.0 * h, 2.0 * h), numerics, contact=contact))
     rng, q_0 = np.random.default_rng(0), star.rest.copy()
     for limb, angle in ((0, 0.588), (1, -0.588)):
         own, (c, s) = [star.node(limb, i) for i in range(1, 4)], (np.cos(angle), np.sin(angle))

@@ -76,10 +76,8 @@ def test_an_own_energy_swings_the_hub_as_an_oscillator():
 def test_an_own_scheme_has_its_order(scheme, order):
     rate = 0.05 / mass_per_length(trapped(Trap()))
     exact = START[0] * math.exp(-rate * 0.2)
-    errors = [
-        abs(thrown(trapped(Trap(c=0.05), scheme=scheme, step=step), 0.2).velocities[0, 0, 0] - exact)
-        for step in (0.02, 0.01, 0.005)
-    ]
+    scenes = (trapped(Trap(c=0.05), scheme=scheme, step=step) for step in (0.02, 0.01, 0.005))
+    errors = [abs(thrown(scene, 0.2).velocities[0, 0, 0] - exact) for scene in scenes]
     assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx([order] * 2, abs=0.15)
 
 
@@ -129,11 +127,8 @@ def test_compiled_code_is_found_by_what_the_users_code_says_and_names(tmp_path, 
     """Two users' files of one name are two, an edited one is another, a moved one is the same."""
     first = digest_of(tmp_path / "a", monkeypatch)
     assert digest_of(tmp_path / "b", monkeypatch) == first
-    others = {
-        digest_of(tmp_path / "c", monkeypatch, half="0.50001"),
-        digest_of(tmp_path / "d", monkeypatch, rate="2.0"),
-    }
-    assert len({first, *others}) == 3
+    edited = digest_of(tmp_path / "c", monkeypatch, half="0.50001")
+    assert len({first, edited, digest_of(tmp_path / "d", monkeypatch, rate="2.0")}) == 3
 
 
 def wrong(energy=None, dissipation=None, of_node=lambda mesh: mesh.dl):

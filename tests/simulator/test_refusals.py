@@ -1,6 +1,4 @@
-"""What cannot be is refused in one sentence, before anything moves. Odd values and declared numbers are generated in
-tests/test_odd_values.py and tests/scene/test_numbers.py: here is what arguments say of each other, and of a scene.
-"""
+"""What arguments cannot say of each other, and of a scene, is refused in one sentence, before anything moves."""
 
 import math
 from dataclasses import replace

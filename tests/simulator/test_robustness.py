@@ -1,7 +1,4 @@
-"""Whatever scene is accepted, its strokes end in finite, converged states, or say which robot failed, and why.
-
-Random scenes with all terms stand in tests/fuzz. Here are those that are known to be hard.
-"""
+"""Scenes that are known to be hard: no step that has not converged is accepted. Those with all terms: tests/fuzz."""
 
 import math
 

@@ -134,10 +134,8 @@ def test_commands_on_pages_exist_or_have_the_commit_that_has_them():
 
 
 def test_errors_on_pages_are_those_that_info_tells():
-    """Largest and typical errors of random and of repeated commands, every second and every 0.2 s, and the speed.
-
-    Promised is the largest with a margin, and is quoted of repeated commands. README has the largest of all.
-    """
+    """Largest and typical errors of random and of repeated commands, every second and every 0.2 s, and the speed. What
+    is promised, the largest with a margin, is quoted of repeated commands. README has the largest of all."""
     for page, presets in {"README.md": ["fast", "balanced", "reference"], "accuracy.md": get_args(Fidelity)}.items():
         lines = [line for block in BLOCK.finditer(TEXTS[page]) for line in block[3].splitlines()]
         rows = {found[1]: line for line in lines if (found := re.search(r"`(?:fidelity=\")?(\w+)\"?`", line))}

@@ -100,9 +100,8 @@ def test_a_search_from_words_to_its_best(tmp_path, capsys):
 def command(tmp_path, *words):
     seastar = "from seastar_gym.cli.main import run; run()"
     arguments = [sys.executable, "-c", seastar, "sweep", *words, "--out", str(tmp_path)]
-    return subprocess.Popen(
-        arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )  # fmt: skip
+    told = dict.fromkeys(("stdout", "stderr"), subprocess.PIPE)
+    return subprocess.Popen(arguments, cwd=ROOT, **told, text=True, start_new_session=True)
 
 
 def finished(tmp_path, n_batches, process):

@@ -18,9 +18,7 @@ def test_a_class_with_predict_swims_beside_the_policy_and_the_script(story):
     story.has("nearest.py", block(page, "class Nearest") + block(page, "def make(env)"))
     story.types(command(page, "seastar evaluate --agents nearest:make") + " planner --fidelity fast")
     assert rows(story.told) == dict.fromkeys(["nearest:make", "learned", "pentagon", "planner"], "5")
-    table = command(page, "seastar evaluate --task all --agents nearest:make").replace(
-        "--task all", "--task SeastarSwim-v0"
-    )
+    table = command(page, "seastar evaluate --task all --agents nearest:make").replace(" all ", " SeastarSwim-v0 ")
     story.types(f"{table} pentagon planner --fidelity fast --seeds 2 --decisions 20")
     assert re.findall(r"^(\S+) +SeastarSwim-v0 ", story.told, re.MULTILINE) == [
         "nearest:make", "learned", "pentagon", "planner"]  # fmt: skip

@@ -1,7 +1,4 @@
-"""From a force in a file of one's own to a policy that swims with it.
-
-Another number of limbs than the page's has another drag, seed and time between decisions, too.
-"""
+"""From a force in a file of one's own to a policy that swims with it, with the page's numbers and others."""
 
 import json
 import re

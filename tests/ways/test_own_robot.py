@@ -1,7 +1,4 @@
-"""From a scene file of one's own to a policy that swims it, is filmed, played, trained on and published.
-
-Another number of limbs than the page's has another actuator, seed and time between decisions, too.
-"""
+"""From a scene of one's own, the page's or another, to a policy that is filmed, played, trained on and published."""
 
 import json
 import re
@@ -53,6 +50,5 @@ def test_a_robot_of_ones_own_is_trained_compared_filmed_played_and_published(sto
     # Its card says whose it is.
     story.types("python -m agents.cards --policies runs/mine/policy.safetensors")
     card = (run / "policy.md").read_text(encoding="utf-8")
-    assert (
-        f"a robot of {n_limbs} limbs" in card and json.loads((run / "policy.json").read_text())["symmetry"] is symmetric
-    )
+    assert f"a robot of {n_limbs} limbs" in card
+    assert json.loads((run / "policy.json").read_text())["symmetry"] is symmetric

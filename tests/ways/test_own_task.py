@@ -1,7 +1,4 @@
-"""From a task in a file of one's own to an id, its promises kept, a training and a row in a table.
-
-Another price, seed and time between decisions than the page's go the same way.
-"""
+"""From a task of one's own, the page's or another, to an id, its promises kept, a training and a row in a table."""
 
 import json
 

@@ -9,6 +9,7 @@ import json
 import re
 import shutil
 import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,25 +22,6 @@ PIXEL, MIDDLE = 4e-4, (640.0, 360.0)  # [m], [px]
 POSE = {"rate": 30, "delay": {"kind": "Uniform", "low": 0.05, "high": 0.15}, "jitter": 0.01, "noise": 5e-4,
         "turn_noise": 0.01, "sees": "pose"}  # fmt: skip
 MARKERS = {"rate": 60, "delay": 0.08, "noise": 1e-3, "sees": 1, "action_delay": 0.02}
-BOARD = """
-#include <stdio.h>
-#include "policy.c"
-
-int main(void)
-{
-    float observation[SEASTAR_SIZE], commands[SEASTAR_LIMBS];
-    int action[SEASTAR_NUMBERS];
-    struct seastar robot;
-    seastar_begin(&robot);
-    for (;;) {
-        for (int k = 0; k < SEASTAR_SIZE; k++)
-            if (scanf("%f", &observation[k]) != 1)
-                return 0;
-        seastar_act(&robot, observation, action, commands);
-        printf("%d\\n", action[0]);
-    }
-}
-"""
 DECIDE = """
 import numpy as np
 from seastar_gym.controllers.learned import load
@@ -129,7 +111,7 @@ def test_a_robot_in_a_tank_is_filmed_fitted_trained_driven_and_put_on_a_board(
     actions = story.runs(DECIDE).split()
     if shutil.which("gcc") is None:
         pytest.skip("there is no C compiler gcc")
-    story.has("board.c", BOARD)
+    story.has("board.c", Path(__file__).with_name("board.c").read_text("utf-8"))
     compiler = ["gcc", "-std=c99", "-Wall", "-Werror", "board.c", "-o", "board", "-lm"]
     subprocess.run(compiler, cwd=story.folder, check=True)
     seen = (story.folder / "seen.txt").read_bytes()

@@ -57,9 +57,8 @@ SQUARE = 0.6 * np.sin(np.pi * BENCH) ** 2
 
 
 def bench(head, times, angles, separator=",", decimal="."):
-    rows = (
-        f"{t!r}{separator}{a!r}".replace(".", decimal) for t, a in zip(times.tolist(), angles.tolist(), strict=True)
-    )
+    pairs = zip(times.tolist(), angles.tolist(), strict=True)
+    rows = (f"{t!r}{separator}{a!r}".replace(".", decimal) for t, a in pairs)
     return "\n".join([head, *rows]) + "\n"
 
 
