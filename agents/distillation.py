@@ -149,6 +149,8 @@ def policy_for_camera(options: Options, arguments: Sequence[str]) -> int:
     if file.stem in TAKEN:
         raise ValueError(f"The run has a folder {file.stem} already: give {file} another name.")
     place = folder / file.stem
+    if (place / "policy.safetensors").exists():
+        raise ValueError(f"{place} has a policy already: give {file} another name, or remove that folder.")
     with held(folder, new=False):
         teacher, command = finished_policy(options, folder), shlex.join(["python", "train.py", *arguments])
         policy = imitation(teacher, options, camera, folder)

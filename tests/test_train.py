@@ -193,6 +193,17 @@ def test_a_camera_for_which_no_policy_can_be_made_is_refused(name, sight, more, 
     assert sorted(finished.rglob("*")) == before
 
 
+def test_the_policy_for_a_camera_is_not_replaced(finished, tmp_path, capsys):
+    folder, file = tmp_path / "run", tmp_path / "camera.json"
+    shutil.copytree(finished, folder)
+    shutil.copytree(finished, folder / "camera")
+    before = (folder / "camera" / "policy.safetensors").read_bytes()
+    file.write_text("{}")
+    assert train.main(["--resume", str(folder), "--for-camera", str(file), "--quick"]) == 2
+    assert_told(capsys, "camera has a policy already")
+    assert (folder / "camera" / "policy.safetensors").read_bytes() == before
+
+
 @pytest.mark.parametrize("has_policy", [True, False])
 def test_a_run_that_is_not_finished_teaches_no_policy_for_a_camera(has_policy, finished, tmp_path, capsys):
     folder, file = tmp_path / "run", tmp_path / "camera.json"
