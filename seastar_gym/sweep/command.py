@@ -19,7 +19,7 @@ with parts of your own, OUT/best.py is.
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -34,10 +34,21 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, shown
 from seastar_gym.scene.scene import load_scene
 from seastar_gym.scene.serial import KINDS, from_dict, has_own_kinds
+from seastar_gym.simulator import SolverStatus
 from seastar_gym.simulator.device import DEVICES
 from seastar_gym.sweep.designs import PARTS, Axis, Batch, Choices, Range, Route, Sweep
 from seastar_gym.sweep.executors import add_options, executor_of
-from seastar_gym.sweep.run import OF_CONTROLLERS, UNITS, Progress, ResultFiles, best_result, result_file_of, run
+from seastar_gym.sweep.run import (
+    OF_CONTROLLERS,
+    REFUSED,
+    UNITS,
+    Progress,
+    ResultFiles,
+    best_result,
+    result_file_of,
+    run,
+    without_result,
+)
 
 
 def axis_of(text: str) -> Axis:
@@ -190,7 +201,7 @@ def run_sweep(sweep: Sweep, options: argparse.Namespace) -> int:
     with tqdm(total=sweep.n_batches, unit="batch") as bar, executor_of(options) as executor:
         tally = run(sweep.batches(), options.out, executor, bar_of(sweep.n_batches, bar), work)
     print(as_text(tally, options.out))
-    keep_best(options)
+    keep_best(options, (batch.name for batch in sweep.batches()))
     return 1 if tally.problems else 0
 
 
@@ -203,11 +214,18 @@ scene = Scene.from_dict({scene!r})
 """Python of a scene with parts that a file registers."""
 
 
-def keep_best(options: argparse.Namespace) -> None:
-    """Write the scene of the best design, and say which it is; nothing without results."""
-    if not any(ResultFiles(options.out).names()):
+def keep_best(options: argparse.Namespace, batches: Iterable[str]) -> None:
+    """Say which designs of a sweep have no result and which is best, and write its scene; nothing without results.
+
+    batches: Names of the batches of the sweep. The folder may have those of others.
+    """
+    names = set(batches)
+    if names.isdisjoint(ResultFiles(options.out).names()):
         return
-    best = best_result(options.out, options.objective, not options.minimize)
+    for status, count in without_result(options.out, names).items():
+        why = "no scene has such a robot" if status == REFUSED else SolverStatus(status).sentence
+        print(f"Designs without result: {count:,}, with status {status}: {why}")
+    best = best_result(options.out, options.objective, not options.minimize, names)
     if best is None:
         print(f"There is no best design: none has swum, uncrossed, and has {options.objective}.")
         return
@@ -223,7 +241,7 @@ def keep_best(options: argparse.Namespace) -> None:
 def search(sweep: Sweep, options: argparse.Namespace) -> int:
     """Search with Optuna; returns the exit code."""
     require_extra("Searches", "search", "optuna", "sqlalchemy")
-    from seastar_gym.sweep.proposals import Search, explore
+    from seastar_gym.sweep.proposals import Search, batches_of, explore
 
     work = work_of(options)
     options.out.mkdir(parents=True, exist_ok=True)
@@ -232,9 +250,9 @@ def search(sweep: Sweep, options: argparse.Namespace) -> int:
     storage = options.storage or f"sqlite:///{options.out}/study.db"
     wanted = Search(options.objective, not options.minimize, options.seed, options.stale_after)
     with tqdm(total=options.optuna, unit="design") as bar, executor_of(options) as executor:
-        explore(sweep, wanted, storage, options.optuna, options.out, executor,
-                lambda tally: bar.update(tally.designs - bar.n), work, options.workers)  # fmt: skip
-    keep_best(options)
+        study = explore(sweep, wanted, storage, options.optuna, options.out, executor,
+                        lambda tally: bar.update(tally.designs - bar.n), work, options.workers)  # fmt: skip
+    keep_best(options, batches_of(study))
     return 0
 
 

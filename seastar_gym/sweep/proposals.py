@@ -98,6 +98,15 @@ def explore(
     return proposals.study
 
 
+def batches_of(study: optuna.Study) -> set[str]:
+    """Names of the batches in which the proposals of a study were simulated."""
+    return {trial.user_attrs[BATCH] for trial in study.get_trials(deepcopy=False) if BATCH in trial.user_attrs}
+
+
+BATCH = "batch"
+"""Attribute of a proposal: the name of its batch."""
+
+
 class Proposals:
     """Proposals of a study as batches, and their results. designs: Results that the study is to have."""
 
@@ -130,7 +139,9 @@ class Proposals:
         for places, group in groups.items():
             columns = {name: np.array([numbers[name] for _, numbers in group]) for name in group[0][1]}
             batch = Batch(self._sweep.configuration(places), columns, len(group))
-            self._waiting.setdefault(batch.name, []).extend(trial for trial, _ in group)
+            for trial, _ in group:
+                trial.set_user_attr(BATCH, batch.name)
+                self._waiting.setdefault(batch.name, []).append(trial)
             batches.append(batch)
         return batches
 

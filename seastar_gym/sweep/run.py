@@ -10,7 +10,8 @@ from __future__ import annotations
 import json
 import os
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections import Counter
+from collections.abc import Callable, Container, Iterable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,7 +34,7 @@ from seastar_gym.files import within, write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_callable, require_count, require_file, require_flag, require_kind, shown
 from seastar_gym.scene.number import numbers_of, unit_of, with_numbers
-from seastar_gym.simulator import Simulator
+from seastar_gym.simulator import Simulator, SolverStatus
 from seastar_gym.sweep.designs import Batch, Configuration, Controller
 from seastar_gym.sweep.executors import Outcome, Work, outcomes
 
@@ -251,10 +252,12 @@ def read_results(folder: str | os.PathLike[str]) -> Any:
     return pa.concat_tables(list(_tables(folder)), promote_options="default")  # sweeps differ in their columns
 
 
-def _tables(folder: str | os.PathLike[str]) -> Iterator[Any]:
-    """Tables of all parts that are not damaged, see `read_results`. ValueError if there is none."""
+def _tables(folder: str | os.PathLike[str], batches: Container[str] | None = None) -> Iterator[Any]:
+    """Tables of all parts, or those of batches of these names, that are not damaged, see `read_results`. ValueError if
+    there is none."""
     require_file("folder", folder)
     files, found = sorted(ResultFiles(folder).folder.glob("??/*.parquet")), 0
+    files = [file for file in files if batches is None or file.stem in batches]
     for file in files:
         try:
             yield read_result_file(file)
@@ -265,6 +268,12 @@ def _tables(folder: str | os.PathLike[str]) -> Iterator[Any]:
         raise ValueError(f"There are no results in {folder}.")
 
 
+def without_result(folder: str | os.PathLike[str], batches: Container[str] | None = None) -> dict[int, int]:
+    """Numbers of designs that have no result, by their status, see `UNITS`. batches: See `best_result`."""
+    found = Counter(int(status) for table in _tables(folder, batches) for status in table["status"].to_numpy())
+    return {status: count for status, count in sorted(found.items()) if status != SolverStatus.CONVERGED}
+
+
 class Best(NamedTuple):
     """The best design of a sweep. value: Of its objective. design: Values of the axes by name. scene: With them."""
 
@@ -273,15 +282,21 @@ class Best(NamedTuple):
     scene: Scene
 
 
-def best_result(folder: str | os.PathLike[str], objective: str = "speed", is_largest_best: bool = True) -> Best | None:
+def best_result(
+    folder: str | os.PathLike[str],
+    objective: str = "speed",
+    is_largest_best: bool = True,
+    batches: Container[str] | None = None,
+) -> Best | None:
     """Best of all results of a folder that have the objective, a column; None if there is none.
 
+    batches: Names of the batches whose results count. None means all, also of several sweeps.
     Robots whose limbs crossed do not count, nor those without speed, such as of a controller that reached no waypoint.
     """
     require_kind("objective", objective, str, "the name of a column")
     require_flag("is_largest_best", is_largest_best)
     best, sign = None, 1.0 if is_largest_best else -1.0
-    for table in _tables(folder):
+    for table in _tables(folder, batches):
         if objective not in table.column_names:
             continue
         values = sign * table[objective].to_numpy().astype(float)

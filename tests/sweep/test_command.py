@@ -68,6 +68,18 @@ def test_the_best_design_with_parts_of_one_s_own_is_python_that_registers_them(t
     assert f"load_scene({str(tmp_path / 'own.py')!r})" in (tmp_path / "best.py").read_text()
 
 
+def test_the_best_is_one_of_the_sweep_at_hand_which_says_what_has_no_result(tmp_path, capsys):
+    for limbs, searched in (("0.08,0.1", ()), ("0.05:0.06", ("--optuna", "2")), ("-0.05,0.04", ())):
+        words = f"robot.limb_length={limbs}", "--out", str(tmp_path), *searched
+        if searched:
+            pytest.importorskip("optuna")
+        assert main([*words, *QUICK]) == 0
+        told = capsys.readouterr().out
+        best = load_scene(tmp_path / "best.json").robot.limb_length
+        assert best in (0.08, 0.1) if limbs == "0.08,0.1" else 0.04 <= best <= 0.06
+    assert "Designs without result: 1, with status -1: no scene has such a robot" in told and best == 0.04
+
+
 def test_designs_that_swam_nowhere_have_no_best(tmp_path, capsys):
     assert main(["controller=rest", "--seconds", "2", "--out", str(tmp_path), *QUICK]) == 0
     assert "There is no best design" in capsys.readouterr().out and not (tmp_path / "best.json").exists()
