@@ -19,7 +19,7 @@ import os
 import re
 import secrets
 import sys
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from io import FileIO
@@ -312,14 +312,28 @@ def read_table(file: str | Path) -> tuple[tuple[str, ...], list[Row]]:
 
 
 def read_numbers(
-    file: str | Path, columns: str, n_columns: int | None = None, most: int = MOST_ROWS
+    file: str | Path,
+    columns: str,
+    n_columns: int | None = None,
+    most: int = MOST_ROWS,
+    units: Sequence[Mapping[str, float]] = (),
 ) -> list[list[float]]:
     """Numbers of all lines, equally many in each, without the first line if it holds names.
 
     columns: Content of a line for sentences, such as "a time [s] and an angle [rad]".
     n_columns: Numbers per line. None means as many as fields in the first line. most: Most lines.
+    units: For every column, the units that its name may end with, and what they are in ours. Without any, a unit does
+        not count.
     """
-    return read_named_numbers(file, columns, n_columns, most)[1]
+    names, lines = read_named_numbers(file, columns, n_columns, most)
+    for k, (name, known) in enumerate(zip(names, units, strict=False)):
+        unit = unit_of(name)
+        if known and unit is not None:
+            if unit not in known:
+                raise ValueError(f"{file}: {_quoted(name)} must be in {', '.join(known)}.")
+            for line in lines:
+                line[k] *= known[unit]
+    return lines
 
 
 def read_named_numbers(
@@ -357,6 +371,8 @@ def _rows(file: str | Path, form: Form) -> Iterator[Row]:
     here, first = lines.tell(), QUOTED.sub("", next((line for line in lines if line.strip()), ""))
     lines.seek(here)
     separator = form.separator or (";" if ";" in first else "\t" if "\t" in first and "," not in first else ",")
+    if form.separator is None and len(words := first.split()) > 1 and all(map(NUMBER.fullmatch, words)):
+        separator = " "  # as numpy.savetxt writes
     has_commas = separator != "," if form.decimal is None else form.decimal == ","
     reader = csv.reader(lines, strict=True, skipinitialspace=True, delimiter=separator)
     begin = form.skip + 1

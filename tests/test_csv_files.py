@@ -2,9 +2,11 @@
 
 import csv
 
+import numpy as np
 import pytest
 
 from refusals import assert_refused
+from seastar_gym.envs.paths import load_path
 from seastar_gym.files import read_numbers, read_rows
 
 GOOD = b"0.0,0.0\n0.1,0.6\n1.0,0.0\n"
@@ -32,6 +34,7 @@ def read(tmp_path, data):
         b"\xef\xbb\xbftime [s];angle [rad]\n0,0;0\n0,1;0,6\n1,0;0,0\n",
         b"time [s]\tangle [rad]\n0,0\t0\n0.1\t0.6\n1\t0\n",
         b"0,0;0,0\n0,1;0,6\n1;0\n",
+        b"0.000e+00 0.0\n1e-1  0.6\n1.0 0.0\n",
     ],
 )
 def test_a_file_of_numbers_is_read_to_the_last_line(tmp_path, data):
@@ -68,6 +71,16 @@ def test_what_is_no_file_of_numbers_is_refused_with_its_line(tmp_path, data, wor
         read(tmp_path, data)
     with pytest.raises(FileNotFoundError, match=r"^There is no file .*\.$"):
         read_rows(tmp_path)  # a folder
+
+
+def test_numbers_are_in_the_units_that_names_say(tmp_path):
+    file = tmp_path / "path.csv"
+    for names, sides in (("x,y", (100.0, 50.0)), ("x (mm),y_cm", (0.1, 0.5)), ("left_x,right_x [m]", (100.0, 50.0))):
+        file.write_text(f"{names}\n100,50\n")
+        np.testing.assert_allclose(load_path(str(file)), [sides])
+    file.write_text("x (px),y (px)\n100,50\n")
+    with assert_refused("path.csv: 'x (px)' must be in m, cm, mm."):
+        load_path(str(file))
 
 
 def test_a_file_of_more_lines_than_are_read_is_refused(tmp_path):

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.routes import length_of_routes, measured_routes
-from seastar_gym.files import read_numbers
+from seastar_gym.files import UNITS, read_numbers
 from seastar_gym.scene.checks import require_callable, require_few, require_kind, require_unmasked, shown
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -236,7 +236,10 @@ def _walk(legs: NDArray[np.float64], headings: NDArray[np.float64]) -> NDArray[n
 
 # Paths that command lines ask for
 
-PATH_HELP = f"Name of a path ({', '.join(PATHS)}), or a text file with x and y [m] of one waypoint per line."
+PATH_HELP = (
+    f"Name of a path ({', '.join(PATHS)}), or a text file with x and y of one waypoint per line "
+    "[m, unless the first line names a unit: x (mm)]."
+)
 
 
 def load_path(name: str) -> Any:
@@ -244,7 +247,7 @@ def load_path(name: str) -> Any:
     if name in PATHS or not Path(name).is_file():
         make_path(name, np.random.default_rng(0))
         return name
-    waypoints = read_numbers(name, "x and y [m] of a waypoint", 2, MOST_WAYPOINTS)
+    waypoints = read_numbers(name, "x and y [m] of a waypoint", 2, MOST_WAYPOINTS, [UNITS["length"]] * 2)
     try:
         return make_path(waypoints, np.random.default_rng(0))
     except ValueError as bad:

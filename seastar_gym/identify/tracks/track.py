@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.files import read_numbers
+from seastar_gym.files import UNITS, read_numbers
 from seastar_gym.identify.measurement import LATEST, ORIENTATION, Measurement, pointer, write_trajectory
 from seastar_gym.identify.search import require_rest
 from seastar_gym.scene import Scene
@@ -319,7 +319,8 @@ def _normalised(points: Floats) -> Floats:
 
 def read_homography(file: str | Path) -> Floats:
     """Homography from a file of points, one line `u,v,x,y` for each [pixel, pixel, m, m]."""
-    numbers = np.array(read_numbers(file, "a pixel u,v and its place x,y [m]", 4))
+    units = {}, {}, UNITS["length"], UNITS["length"]
+    numbers = np.array(read_numbers(file, "a pixel u,v and its place x,y [m]", 4, units=units))
     try:
         if np.abs(numbers).max() > FARTHEST:
             raise ValueError(f"no pixel and no place is beyond {FARTHEST:g}.")
