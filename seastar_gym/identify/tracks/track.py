@@ -319,8 +319,8 @@ def _normalised(points: Floats) -> Floats:
 
 def read_homography(file: str | Path) -> Floats:
     """Homography from a file of points, one line `u,v,x,y` for each [pixel, pixel, m, m]."""
-    units = {}, {}, UNITS["length"], UNITS["length"]
-    numbers = np.array(read_numbers(file, "a pixel u,v and its place x,y [m]", 4, units=units))
+    lengths = [{}, {}, UNITS["length"], UNITS["length"]]
+    numbers = np.array(read_numbers(file, "a pixel u,v and its place x,y [m]", 4, units=lengths))
     try:
         if np.abs(numbers).max() > FARTHEST:
             raise ValueError(f"no pixel and no place is beyond {FARTHEST:g}.")
