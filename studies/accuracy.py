@@ -123,9 +123,7 @@ class Table:
     side: tuple[int, int] = (6, 1)
     front: str = ""
 
-    def batches(
-        self, seed: int, samples: int | None = None, periods: Sequence[float] | None = None
-    ) -> list[list[Batch]]:
+    def batches(self, seed: int, samples: int | None = None, periods: Sequence[float] = ()) -> list[list[Batch]]:
         """Batches whose errors are told together: all of strokes, or of one period."""
         n = self.samples if samples is None else samples
         if not self.periods:
@@ -147,7 +145,7 @@ class Table:
 
 
 TRAINED_AT = [
-    each._replace(numerics=replace(each.numerics, damping=0.0)) for each in (PRESETS["fast"], PRESETS["balanced"])
+    one._replace(numerics=replace(one.numerics, damping=0.0)) for one in (PRESETS["fast"], PRESETS["balanced"])
 ]
 """Settings that bundled policies were trained at, without numerical damping."""
 MANY = 37
@@ -231,9 +229,8 @@ def exceeding(name: str, samples: int) -> dict[Fidelity, dict[str, Floats]]:
             lengths = measure.path_lengths(table.scene, exact.hub, batch.period)
             for fidelity, swum in zip(FRESH, swums, strict=True):
                 for each, path in batch.of_classes(measure.errors(swum, exact, lengths).path).items():
-                    found[fidelity].setdefault(each, []).append(
-                        path / in_table(fidelity, name).promise(beside(each, known))
-                    )
+                    promised = in_table(fidelity, name).promise(beside(each, known))
+                    found[fidelity].setdefault(each, []).append(path / promised)
     return {fidelity: {each: np.concatenate(some) for each, some in by.items()} for fidelity, by in found.items()}
 
 
@@ -281,9 +278,8 @@ def certified(scene: Scene, samples: int) -> list[float]:
     certificate = measure.certify(scene, samples)
     batch = draw_batch(samples, scene.robot.n_limbs, FRESH_SEED)
     limit = Resolution("continuum", measure.MANY_NODES, measure.SHORT)
-    exact, *swums = measure.swim_all(
-        [at(scene, limit), *(certificate.at(each) for each in certificate.settings)], batch.joined
-    )
+    scenes = [at(scene, limit), *map(certificate.at, certificate.settings)]
+    exact, *swums = measure.swim_all(scenes, batch.joined)
     lengths = measure.path_lengths(scene, exact.hub)
     promised, own = [], []
     for setting, swum in zip(certificate.settings, swums, strict=True):

@@ -252,8 +252,6 @@ def history(beside: Path) -> dict[str, list[float]]:
     return found
 
 
-# The study
-
 PARTS: dict[str, Callable[[float], Iterator[Row]]] = {"throughput": throughput, "start": cold_start}
 
 
@@ -291,9 +289,7 @@ def run(options: Options, results: Results) -> None:
 def figures(results: Mapping[str, Any]) -> str:
     """Table in Markdown of throughput and start in the last run."""
     last = ([{}] + [run["figures"] for run in results["runs"].values() if "figures" in run])[-1]
-    rows = [
-        (what, f"{middle:,.4g}", unit, f"{low:,.3g} to {high:,.3g}") for what, (unit, middle, low, high) in last.items()
-    ]
+    rows = [(what, f"{mid:,.4g}", unit, f"{low:,.3g} to {high:,.3g}") for what, (unit, mid, low, high) in last.items()]
     return markdown(["what", "median", "unit", "middle half"], rows, (0, 2))
 
 

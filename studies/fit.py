@@ -79,9 +79,7 @@ def curvature(numbers: Measured, frequency: float, t: Floats) -> Floats:
 
 def residuals(numbers: Measured, curves: Sequence[Curve]) -> Floats:
     """Measured minus modelled curvature over the peaks of the curves, shape (n_curves, n_samples)."""
-    rows = [
-        (each.curvature - curvature(numbers, each.frequency, PHASES / each.frequency)) / each.peak for each in curves
-    ]
+    rows = [(one.curvature - curvature(numbers, one.frequency, PHASES / one.frequency)) / one.peak for one in curves]
     return np.array(rows)
 
 

@@ -20,8 +20,6 @@ SECONDS, SHOWN = 40, 30
 """Length of a film, one frame per second, and the time of the picture [s]."""
 FPS = 10
 """Frames of a film per second."""
-INSTANCE = 0
-"""Held-out episode of a task."""
 
 
 def agent(id: str) -> Any:
@@ -41,7 +39,7 @@ def frames(id: str) -> list[Picture]:
         if info["time"] > len(drawn) - 0.5 * period:
             drawn.append(shrunk(env.render()))
 
-    options = {"instance": INSTANCE} if id in TASKS else None
+    options = {"instance": 0} if id in TASKS else None  # the first held-out episode
     rollout(env, policy, seeds=0, until=round(SECONDS / period), options=options, on_step=look)
     env.close()
     return drawn

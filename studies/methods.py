@@ -158,7 +158,7 @@ def draw_curves(found: Any, file: Path) -> None:
         points: list[list[float]] = []
         for k in range(min(len(cell.curve) for cell in cells)):
             then = {
-                id: [cell._replace(measure=[cell.curve[k]["measure"]]) for cell in row.cells[id]] for id in row.cells
+                id: [cell._replace(measure=[cell.curve[k]["measure"]]) for cell in own] for id, own in row.cells.items()
             }
             means = (np.mean([cell.curve[k][what] for cell in cells]) for what in ("decisions", "seconds"))
             points.append([*means, row._replace(cells=then).overall(scales).mean])

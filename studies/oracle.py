@@ -276,9 +276,8 @@ def search_of(robots: Robots) -> Search:
     pairs = np.tile(command_table("pairs", n_limbs), (n, 1, 1))
     if isinstance(task, FailBlind):
         live = [strengths > 0.0 for strengths in robots.simulator.limb_strengths]
-        return Search(
-            np.array([list(itertools.product(*((0.0, 1.0, -1.0)[: 1 + 2 * on] for on in limbs))) for limbs in live]), 2
-        )
+        tried = [list(itertools.product(*((0.0, 1.0, -1.0)[: 1 + 2 * on] for on in limbs))) for limbs in live]
+        return Search(np.array(tried), 2)
     if isinstance(task, Station):
         every = command_table("joint", n_limbs)
         return Search(np.tile(every[np.count_nonzero(every, axis=1) <= 2], (n, 1, 1)), 2)

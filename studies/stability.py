@@ -6,15 +6,12 @@ stroke of random commands (for peak angles: of all 243 commands), from rest or f
 more than MOST_STEPS steps are cut short: the pulse ramps as fast as the chapter's and turns back after MOST_STEPS/10
 steps. Two more runs without commands, one in the cell's fluid and one in vacuum, record the energy of randomly moving
 robots after every step.
-
-Prints and keeps a summary, and draws what the solver needed to converge, Newton iterations per step, and the error of
-the hub's path.
 """
 
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -52,8 +49,6 @@ AGREEMENT = 0.01
 """Largest relative difference of the converged path from the one with half as many steps."""
 GROWTH_ROUNDING = 1e-11
 """Relative growth of the energy in a step that is attributed to rounding."""
-
-# What is varied
 
 
 @dataclass(frozen=True)
@@ -143,7 +138,6 @@ class Cell:
     """Measurements of a scene at a time step.
 
     sweep: Label of the quantity, whose value this is; step: Time step [s].
-    refused: Sentence with which the scene was refused, or empty. The other numbers of a refused cell are empty.
     robots: Number of robots, and of those whose status was not CONVERGED, or whose state was not finite, in any run.
     iterations: Newton iterations per nominal time step, averaged over the stroke and its robots.
     regularised, backtracks, halvings: Counts of StrokeReport, summed over robots.
@@ -156,7 +150,6 @@ class Cell:
     sweep: str
     value: float | None
     step: float
-    refused: str = ""
     robots: int = 0
     failed: int = 0
     iterations: float = math.nan
@@ -236,15 +229,12 @@ def energy_growth(case: Case, numerics: Numerics, fluid: Water | None) -> tuple[
 def run_cell(sweep: Sweep, value: float | None, step: float, scheme: SchemeName, converged: Floats | None) -> Cell:
     """Measure one cell; converged: the result of `converged_displacements` for its case and duration."""
     case, numerics = sweep.case(value), Numerics(scheme, step)
-    try:
-        simulator, displacements, report = swim(case, numerics, stroke_duration(step))
-    except ValueError as refusal:
-        return Cell(sweep.label, value, step, refused=str(refusal))
+    simulator, displacements, report = swim(case, numerics, stroke_duration(step))
     finite = np.isfinite(simulator.positions).all(axis=(1, 2)) & np.isfinite(simulator.velocities).all(axis=(1, 2))
     growths, lost = zip(*(energy_growth(case, numerics, fluid) for fluid in (case.fluid, None)), strict=True)
     steps = len(step_times(simulator.scene.actuator.corners, step)) - 1  # nominal ones, without substeps
     return Cell(
-        sweep.label, value, step, "", simulator.n_robots,
+        sweep.label, value, step, simulator.n_robots,
         failed=int((report.status.astype(bool) | ~finite).sum()) + sum(lost),
         iterations=float(report.newton_iterations.mean()) / steps, regularised=int(report.regularised.sum()),
         backtracks=int(report.backtracks.sum()), halvings=int(report.halvings.sum()), growth=max(growths),
@@ -261,10 +251,7 @@ def atlas(sweeps: Sequence[Sweep], steps: Sequence[float], scheme: SchemeName = 
         """Cells of one value at all steps; steps with strokes of the same duration share their converged run."""
         cells = []
         for duration, members in itertools.groupby(steps, stroke_duration):
-            try:
-                converged = converged_displacements(sweep.case(value), duration)
-            except ValueError:
-                converged = None  # run_cell records why the scene is refused
+            converged = converged_displacements(sweep.case(value), duration)
             for step in members:
                 cells.append(run_cell(sweep, value, step, scheme, converged))
                 bar.update()
@@ -274,11 +261,9 @@ def atlas(sweeps: Sequence[Sweep], steps: Sequence[float], scheme: SchemeName = 
         return [cell for cells in pool.map(lambda each: column(*each), columns) for cell in cells]
 
 
-# The summary
-
 SUMMARY = (
-    "against", "cells", "refused", "strokes", "failed", "Newton iterations per step (most)", "substeps",
-    "energy grew", "error at 3, 20 ms",
+    "against", "cells", "strokes", "failed", "Newton iterations per step (most)", "substeps", "energy grew",
+    "error at 3, 20 ms",
 )  # fmt: skip
 TOLD = ("against", "failed", "Newton iterations per step (most)")
 """Columns of the page."""
@@ -299,13 +284,12 @@ def summarise(cells: Sequence[Cell], sweeps: Sequence[Sweep]) -> list[list[str]]
 
 def figures(cells: Sequence[Cell]) -> list[str]:
     """Columns "cells" to "energy grew" of the summary."""
-    ran = [cell for cell in cells if not cell.refused]
-    iterations = [cell.iterations for cell in ran]
-    grew = sum(cell.growth > GROWTH_ROUNDING for cell in ran)
+    iterations = [cell.iterations for cell in cells]
+    grew = sum(cell.growth > GROWTH_ROUNDING for cell in cells)
     return [
-        str(len(cells)), str(len(cells) - len(ran)), str(sum(cell.robots for cell in ran)),
-        str(sum(cell.failed for cell in ran)), f"{np.median(iterations):.2g} ({max(iterations):.0f})",
-        f"{sum(cell.halvings > 0 for cell in ran)} cells", f"{grew} cells" if grew else "nowhere",
+        str(len(cells)), str(sum(cell.robots for cell in cells)), str(sum(cell.failed for cell in cells)),
+        f"{np.median(iterations):.2g} ({max(iterations):.0f})", f"{sum(cell.halvings > 0 for cell in cells)} cells",
+        f"{grew} cells" if grew else "nowhere",
     ]  # fmt: skip
 
 
@@ -315,8 +299,6 @@ def table(results: Mapping[str, Any]) -> str:
     return markdown(TOLD, [[row[k] for k in kept] for row in results["summary"]])
 
 
-# Pictures
-
 MARK, EMPTY = "#d62728", "#eceff3"
 NEEDS = {
     "plain Newton": "#c7e0f4", "regularised matrix or line search": "#5aa2d6", "substeps": "#1b4f8f", "failed": MARK,
@@ -325,7 +307,6 @@ NEEDS = {
 NAMES = {"implicit-euler": "Implicit Euler", "implicit-midpoint": "Implicit midpoint rule", "sdirk2": "SDIRK2"}
 FRAME: dict[str, Any] = {"fill": False, "edgecolor": INK, "linewidth": 1.4}
 DASHES: dict[str, Any] = {"color": MARK, "linewidth": 1.6, "linestyle": (0, (4, 2))}
-REFUSED: dict[str, Any] = {"facecolor": "white", "edgecolor": FAINT, "hatch": "////"}
 
 
 class Numbers(NamedTuple):
@@ -376,15 +357,15 @@ def draw(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float],
     panels = [figure.add_subplot(grid[k // columns, k % columns]) for k in range(len(sweeps))]
     for axes, sweep in zip(panels, sweeps, strict=True):
         own = {(cell.value, cell.step): cell for cell in cells if cell.sweep == sweep.label}
-        ran = {key: (numbers.of if numbers else need)(cell) for key, cell in own.items() if not cell.refused}
-        shown = np.ma.masked_invalid([[ran.get((value, h), math.nan) for h in steps] for value in sweep.values])
+        of = need if numbers is None else numbers.of
+        shown = np.ma.masked_invalid([[of(own[value, h]) for h in steps] for value in sweep.values])
         if numbers is None:
             look: dict[str, Any] = {"cmap": ListedColormap(list(NEEDS.values())), "vmin": -0.5, "vmax": 3.5}
         else:
             look = {"cmap": numbers.colours, "norm": LogNorm(*numbers.limits)}
             shown = np.clip(shown, *numbers.limits)
         image = axes.pcolormesh(shown, edgecolors="white", linewidth=0.5, **look)
-        finish(axes, sweep, steps, [key for key, cell in own.items() if cell.refused])
+        finish(axes, sweep, steps)
     for axes in panels[-columns:]:
         axes.set_xlabel("time step h", fontsize=8.5)
     foot = figure.add_subplot(grid[rows, :])
@@ -398,7 +379,7 @@ def draw(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float],
         bar.ax.minorticks_off()
         patches = [Patch(facecolor=EMPTY, label=numbers.missing)] if numbers.missing else []
     marks = [
-        Patch(label="scene refused", **REFUSED), Patch(label="the chapter's value", **FRAME),
+        Patch(label="the chapter's value", **FRAME),
         Line2D([], [], label="the chapter's numerical issues begin: 20 ms", **DASHES),
     ]  # fmt: skip
     foot.legend(
@@ -408,12 +389,10 @@ def draw(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float],
     save_figure(figure, file)
 
 
-def finish(axes: Axes, sweep: Sweep, steps: Sequence[float], refused: Iterable[tuple[float | None, float]]) -> None:
-    """Add ticks, a title, the marks of the chapter, and hatching over refused cells."""
+def finish(axes: Axes, sweep: Sweep, steps: Sequence[float]) -> None:
+    """Add ticks, a title, and the marks of the chapter."""
     halo = [withStroke(linewidth=3.2, foreground="white")]  # lines then show on any colour
     axes.set_facecolor(EMPTY)
-    for value, step in refused:
-        axes.add_patch(Rectangle((steps.index(step), sweep.values.index(value)), 1, 1, linewidth=0.0, **REFUSED))
     axes.set_xticks(np.arange(len(steps)) + 0.5, [EngFormatter("s")(step) for step in steps], rotation=90)
     axes.set_yticks(np.arange(len(sweep.values)) + 0.5, [format_value(value) for value in sweep.values])
     axes.tick_params(length=0, labelsize=8)
