@@ -15,6 +15,7 @@ from refusals import assert_refused
 from seastar_gym import Scene, Simulator, Water
 from seastar_gym.gradients import Motion, differentiate, gradient, record
 from seastar_gym.gradients.adjoint import QUANTITIES
+from seastar_gym.gradients.tape import OF_COMMANDS, of_command
 from simulator.test_conservation import rattled
 from strokes import ternary
 
@@ -37,6 +38,7 @@ def number_of(slopes, quantities):
 TIGHT = replace(SMALL, numerics=replace(SMALL.numerics, newton_tolerance=1e-14))
 SCENES = {
     "positions and velocities": (SMALL, [*ALL_KINDS, "positions", "velocities"], COMMANDS),
+    "commands at their ends": (SMALL, ["commands", "robot.density"], np.sign(COMMANDS)),
     **{name: (SWIMS[name][0], ALL_KINDS, COMMANDS) for name in
        ("implicit-euler", "sdirk2", "implicit-midpoint", "halved")},
     "halved midpoint": (
@@ -68,6 +70,13 @@ def test_gradient_is_that_of_dual_lanes(name):
         np.testing.assert_allclose(found, right, rtol=0.0, atol=share * largest, err_msg=by)
     assert recorded.sentence == expected.sentence
     assert (BRANCH in recorded.sentence) == (name.startswith("halved")) or name in TERMS
+
+
+@pytest.mark.parametrize("command", [-1.0, 0.0, 1.0])
+def test_slopes_in_commands_are_those_of_any_quartic_and_look_no_farther_than_commands_go(command):
+    places, weights = map(np.array, of_command(command))
+    np.testing.assert_allclose([weights @ places**power for power in range(1, 5)], [1.0, 0.0, 0.0, 0.0], atol=1e-12)
+    assert np.abs(command + OF_COMMANDS * places).max() <= 1.0
 
 
 def test_an_objective_has_its_value_and_the_gradient_of_its_slopes():
