@@ -5,6 +5,7 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import NoReturn
 
 INTERRUPTED = 130
@@ -38,9 +39,27 @@ def ended_by_disk(failure: OSError) -> int:
     return 2 if failure.errno is None else 1
 
 
-def answered(work: Callable[[], int | None]) -> int:
-    """Exit code of a command's work: 2, after a sentence, where it refuses what it was given or lacks a module."""
+WRITTEN = "out", "chosen", "intervals", "picture", "film"
+"""Options that name files to write, in all commands but those of trainings."""
+
+
+def require_inputs_kept(options: argparse.Namespace) -> None:
+    """ValueError where an option names a file to write that another one names to read, as a file or as a policy's."""
+    written = {name: file for name in WRITTEN if isinstance(file := getattr(options, name, None), Path)}
+    values = [value for name, value in vars(options).items() if name not in WRITTEN]
+    named = [each for value in values for each in (value if isinstance(value, list) else [value])]
+    read = [Path(each) for each in named if isinstance(each, str | Path) and "\0" not in str(each)]
+    read += [file.with_suffix(".json") for file in read if file.suffix == ".safetensors"]
+    for name, file in written.items():
+        if file.is_file() and any(each.is_file() and each.samefile(file) for each in read):
+            raise ValueError(f"--{name} {file} would replace a file that is read: name another one.")
+
+
+def answered(work: Callable[[], int | None], options: argparse.Namespace | None = None) -> int:
+    """Exit code of a command's work: 2, after a sentence, where it refuses its options or lacks a module."""
     try:
+        if options is not None:
+            require_inputs_kept(options)
         return work() or 0
     except FileNotFoundError as missing:
         return ended_by_disk(missing)
@@ -61,7 +80,7 @@ def main_of(
             answer = work(options)
             return print(answer) if isinstance(answer, str) else answer
 
-        return answered(done)
+        return answered(done, options)
 
     return main
 

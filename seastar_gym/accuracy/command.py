@@ -148,4 +148,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
     file = "JSON file for the scene at the setting that --error chooses, which train.py --scene takes"
     parser.add_argument("--chosen", type=Path, help=file)
     options = parser.parse_args(arguments)
-    return answered(lambda: certify_as_asked(options))
+    return answered(lambda: certify_as_asked(options), options)

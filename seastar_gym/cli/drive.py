@@ -268,7 +268,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     options = parser().parse_args(arguments)
     try:
-        return answered(lambda: drive(options))
+        return answered(lambda: drive(options), options)
     except PlantError as why:
         print(why, file=sys.stderr)
         return STOPPED

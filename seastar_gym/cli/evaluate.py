@@ -344,4 +344,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
         require_heeded(mode, given)
         return mode.run(options, shlex.join(["seastar", "evaluate", *given]))
 
-    return answered(answer)
+    return answered(answer, options)

@@ -95,4 +95,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--intervals", type=Path, help=intervals)
     parser.add_argument("--picture", type=Path, help="file for a picture of the fit")
     options = parser.parse_args(arguments)
-    return answered(lambda: fit(options))
+    return answered(lambda: fit(options), options)

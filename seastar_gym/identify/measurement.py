@@ -184,7 +184,18 @@ def _read_commands(file: str | Path) -> tuple[Floats | None, Floats]:
     if len(names) < 2 or not rows:
         raise ValueError(f"{file}: after time there must be one column per limb, and lines below the first.")
     numbers = np.array([row.numbers() for row in rows])
-    return numbers[:, 0], numbers[:, 1:]
+    return numbers[:, 0], numbers[:, 1:][:, _order(file, names[1:])]
+
+
+def _order(file: str | Path, names: Sequence[str]) -> NDArray[np.intp]:
+    """Places of the columns of limbs 1, 2, ..., by the numbers at the end of their names; as they are without any."""
+    found = [re.search(r"\d+$", name) for name in names]
+    if not any(found):
+        return np.arange(len(names))
+    limbs = [-1 if match is None else int(match[0]) for match in found]
+    if sorted(limbs) not in (list(range(1, len(names) + 1)), list(range(len(names)))):
+        raise ValueError(f"{file}: after time come limbs 1 to {len(names)}, each once, not {', '.join(names)}.")
+    return np.argsort(limbs)
 
 
 COUNTS = (int, int | Any)

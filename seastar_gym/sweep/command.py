@@ -266,7 +266,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return search(sweep, options) if options.optuna else run_sweep(sweep, options)
 
     try:
-        return answered(work)
+        return answered(work, options)
     except KeyboardInterrupt:
         print(f"Interrupted: all finished batches are in {shown(str(options.out))}, and the same command goes on.",
               file=sys.stderr)  # fmt: skip

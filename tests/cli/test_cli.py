@@ -306,6 +306,27 @@ def test_policies_are_exported(folder, monkeypatch, capsys):
     assert capsys.readouterr().err == 'ONNX files need onnx: pip install "seastar-gym[export]".\n'
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "identify path.csv commands.csv --scene own.py --out own.py",
+        "identify path.csv commands.csv --intervals commands.csv",
+        "track2csv path.csv --from table --out ./path.csv",
+        "certify own.py --out own.py",
+        "certify own.py --chosen own.py",
+        "export own.safetensors --to c --out own.json",
+        "swim --scene own.py --film own.py",
+    ],
+)
+def test_what_a_command_reads_is_not_replaced(words, folder, capsys):
+    for name in ("path.csv", "commands.csv", "own.py", "own.safetensors", "own.json"):
+        Path(name).write_text("mine")
+    assert main(words.split()) == 2
+    told = capsys.readouterr()
+    assert "would replace a file that is read" in told.err and told.err.count("\n") == 1
+    assert all(Path(name).read_text() == "mine" for name in ("path.csv", "commands.csv", "own.py", "own.json"))
+
+
 def test_training_runs_the_checkout_s_own_script_and_says_where_there_is_none(folder, monkeypatch, capsys):
     monkeypatch.setattr("seastar_gym.cli.main.__file__", str(folder / "lib" / "seastar_gym" / "cli" / "main.py"))
     assert main(["train"]) == 2

@@ -112,6 +112,8 @@ FILES = [
     *((HEADER + ROW, text, "commands.csv: after time there must be one column per limb")
       for text in ("time\n0\n", "time,a\n")),
     (HEADER + ROW, "time,a,b\n0,1\n", "commands.csv, line 2: the line must have 3 fields"),
+    (HEADER + ROW, "time,limb1,limb3\n0,1,1\n", "after time come limbs 1 to 2, each once, not limb1, limb3"),
+    (HEADER + ROW, "time,limb1,more\n0,1,1\n", "after time come limbs 1 to 2, each once, not limb1, more"),
     (HEADER + ROW, "time,a\n0,1\n0,1\n", "command_times must be 2 finite times that increase"),
 ]  # fmt: skip
 
@@ -122,3 +124,11 @@ def test_a_file_that_cannot_be_read_is_refused_by_its_name(tmp_path, subtests):
         (tmp_path / "commands.csv").write_text(commands)
         with subtests.test(path=path, commands=commands), assert_refused(words):
             Measurement.from_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
+
+
+@pytest.mark.parametrize("names", ["limb2,limb3,limb1", "limb 1,limb 2,limb 0"])
+def test_commands_are_of_the_limbs_that_their_names_say(names, tmp_path):
+    (tmp_path / "path.csv").write_text(HEADER + ROW + "1,0,0\n")
+    (tmp_path / "commands.csv").write_text(f"time,{names}\n0,1,0,-1\n")
+    found = Measurement.from_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
+    assert found.commands.tolist() == [[-1, 1, 0]]
