@@ -393,6 +393,9 @@ def _scripted(name: str, seed: int, decision_period: float | None, n_limbs: int)
     except ValueError as unknown:
         if name in known:
             raise  # a gait that does not fit the time between decisions
+        if Path(name).exists():
+            policy = Path(name, "policy.safetensors") if Path(name).is_dir() else "policy.safetensors or model.zip"
+            raise ValueError(f"{name} is no file of a policy, such as {policy}.") from None
         others = f"{', '.join(AGENTS)}, files of policies, and module:function"
         raise ValueError(f"{unknown} Others are {others}.") from unknown
 

@@ -31,7 +31,8 @@ class Estimate(NamedTuple):
     high: float
 
     def __str__(self) -> str:
-        return f"{self.mean:.1f}" + ("" if np.isnan(self.low) else f" [{self.low:.1f}, {self.high:.1f}]")
+        form = ".1f" if abs(self.mean) >= 10.0 else ".3g"
+        return f"{self.mean:{form}}" + ("" if np.isnan(self.low) else f" [{self.low:{form}}, {self.high:{form}}]")
 
 
 def mean_with_interval(values: ArrayLike) -> Estimate:

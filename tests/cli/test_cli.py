@@ -35,6 +35,7 @@ def folder(tmp_path, monkeypatch):
         "wrong.py": "import math\nscene = nothing\n",
     }.items():  # fmt: skip
         Path(name).write_text(content)
+    Path("runs").mkdir()
     return tmp_path
 
 
@@ -130,6 +131,7 @@ REFUSED = [
     ("play", "No window can be opened here"),
     ("play --film x.gif", "A film needs the keys"),
     ("play --keys 9", "There is no key '9'"),
+    ("evaluate --agents runs", "runs is no file of a policy, such as runs/policy.safetensors."),
     ("evaluate --agents pentagram", f"Unknown scripted agent 'pentagram'|{NAMES}"),
     ("evaluate --agents no_such_module:make", "No module named 'no_such_module'"),
     ("evaluate --agents own_agents:missing", "the module own_agents has no function missing"),
