@@ -131,8 +131,15 @@ def _swim_once(
     """Swim of an agent, filmed if there is a file for the video, and its playback if `record` asks for one."""
     scene = make_scene(environment["scene"], None, environment["decision_period"])
     environment = {**camera_of(policy), "actions": actions_of(policy, scene.robot.n_limbs), **environment}
+
+    def swum_by(env: OneRobotEnv, **more: Any) -> Swim:
+        try:
+            return swim(name, policy, env, **episode, **more)
+        except ValueError as unfit:
+            raise ValueError(f"{name}: {unfit}") from unfit
+
     if video is None and not record:
-        return swim(name, policy, SeastarSwimEnv(**environment), **episode), None
+        return swum_by(SeastarSwimEnv(**environment)), None
     env = RecordingEnv(film=video is not None, frames_per_stroke=FRAMES_PER_STROKE, **environment)
     with film(video, FPS) if video is not None else nullcontext(lambda picture: None) as add:
 
@@ -140,7 +147,7 @@ def _swim_once(
             for picture in env.render() or ():
                 add(picture)
 
-        swum = swim(name, policy, env, **episode, watch=watch)
+        swum = swum_by(env, watch=watch)
     env.close()
     return swum, env.playback(name)
 

@@ -148,6 +148,10 @@ def write_trajectory(file: str | Path, time: Floats, positions: Floats, nodes: t
     write_lines(file, [names, *lines])
 
 
+UNSEEN = "", "nan", "na"
+"""Fields of what was not seen, in any case."""
+
+
 def _read_trajectory(file: str | Path) -> tuple[Floats, Floats, tuple[int, ...]]:
     """Times [s], positions [m] and nodes of a trajectory, see `Measurement`."""
     names, rows = read_table(file)
@@ -159,9 +163,12 @@ def _read_trajectory(file: str | Path) -> tuple[Floats, Floats, tuple[int, ...]]
         raise ValueError(f"{file}: the first line must be time,x0,y0,.. and there must be others below it.")
     for row in rows:
         row.require_fields(len(expected))
-        if not row.fields[0]:
+        if row.fields[0].lower() in UNSEEN:
             raise row.refused("there is no time")
-    numbers = np.array([row.numbers(missing=("",)) for row in rows])
+    numbers = np.array([row.numbers(missing=UNSEEN) for row in rows])
+    backwards = np.flatnonzero(np.diff(numbers[:, 0]) < 0.0)
+    if backwards.size > 0:
+        raise rows[backwards[0] + 1].refused("the clock goes back")
     positions = numbers[:, 1 : 1 + len(columns)].reshape(len(numbers), len(nodes), 2)
     if turns:
         positions = np.concatenate([positions, pointer(numbers[:, -1])[:, None]], axis=1)

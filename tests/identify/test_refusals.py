@@ -105,7 +105,8 @@ FILES = [
         "", "time\n0\n", HEADER, "time,x0\n0,0\n", "t,x0,y0\n0,0,0\n", "time,x0,y1\n0,0,0\n", "time,x²,y²\n0,0,0\n")),
     (HEADER + "0,0\n", COMMAND, "path.csv, line 2: the line must have 3 fields"),
     (HEADER + ROW + ",0,0\n", COMMAND, "path.csv, line 3: there is no time"),
-    (HEADER + "1,0,0\n" + ROW, COMMAND, "path.csv: Times must be finite, not negative, and in order"),
+    (HEADER + "1,0,0\n" + ROW, COMMAND, "path.csv, line 3: the clock goes back"),
+    (HEADER + ROW + "NaN,0,0\n", COMMAND, "path.csv, line 3: there is no time"),
     (HEADER + "0,1e308,0\n", COMMAND, "path.csv: Positions must be within 1000 m"),
     (HEADER + ROW, "", "commands.csv has no line with one number per limb"),
     (HEADER + ROW, COMMAND + "1\n", "commands.csv, line 2: every line must have one number per limb"),
@@ -128,7 +129,7 @@ def test_a_file_that_cannot_be_read_is_refused_by_its_name(tmp_path, subtests):
 
 @pytest.mark.parametrize("names", ["limb2,limb3,limb1", "limb 1,limb 2,limb 0"])
 def test_commands_are_of_the_limbs_that_their_names_say(names, tmp_path):
-    (tmp_path / "path.csv").write_text(HEADER + ROW + "1,0,0\n")
+    (tmp_path / "path.csv").write_text(HEADER + ROW + "1,nan,NA\n")
     (tmp_path / "commands.csv").write_text(f"time,{names}\n0,1,0,-1\n")
     found = Measurement.from_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
-    assert found.commands.tolist() == [[-1, 1, 0]]
+    assert found.commands.tolist() == [[-1, 1, 0]] and np.isnan(found.positions[1]).all()
