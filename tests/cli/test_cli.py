@@ -139,7 +139,7 @@ REFUSED = [
     ("evaluate --agents own_agents:nothing", "is a int, which has no predict"),
     ("evaluate --agents own_agents:of_nothing", "a function of one argument, the environment: of_nothing(env)."),
     ("evaluate --agents own_agents:OfOneArgument", "needs predict(observation, state, episode_start, deterministic)."),
-    ("evaluate --agents greedy own_agents:Stateless", "own_agents:Stateless: predict must return an action and the state"),
+    ("evaluate --agents greedy own_agents:Stateless", "own_agents:Stateless: predict must return an action"),
     ("evaluate --agents own_agents:StatelessRobot", "predict must return an action and the state for its next call"),
     ("evaluate --path ragged.csv", "ragged.csv, line 2: every line must have x and y"),
     ("evaluate --seconds 0", "--seconds must be"),
