@@ -5,6 +5,7 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
+from os.path import isfile, samefile
 from pathlib import Path
 from typing import NoReturn
 
@@ -41,6 +42,8 @@ def ended_by_disk(failure: OSError) -> int:
 
 WRITTEN = "out", "chosen", "intervals", "picture", "film"
 """Options that name files to write, in all commands but those of trainings."""
+POLICY = ".safetensors"
+"""Ending of a file of weights, beside which one of JSON has the description."""
 
 
 def require_inputs_kept(options: argparse.Namespace) -> None:
@@ -48,10 +51,10 @@ def require_inputs_kept(options: argparse.Namespace) -> None:
     written = {name: file for name in WRITTEN if isinstance(file := getattr(options, name, None), Path)}
     values = [value for name, value in vars(options).items() if name not in WRITTEN]
     named = [each for value in values for each in (value if isinstance(value, list) else [value])]
-    read = [Path(each) for each in named if isinstance(each, str | Path) and "\0" not in str(each)]
-    read += [file.with_suffix(".json") for file in read if file.suffix == ".safetensors"]
+    read = [str(each) for each in named if isinstance(each, str | Path)]
+    read += [f"{file.removesuffix(POLICY)}.json" for file in read if file.endswith(POLICY)]
     for name, file in written.items():
-        if file.is_file() and any(each.is_file() and each.samefile(file) for each in read):
+        if isfile(file) and any(isfile(each) and samefile(each, file) for each in read):
             raise ValueError(f"--{name} {file} would replace a file that is read: name another one.")
 
 

@@ -44,10 +44,9 @@ from seastar_gym.sweep.run import (
     UNITS,
     Progress,
     ResultFiles,
-    best_result,
+    judged,
     result_file_of,
     run,
-    without_result,
 )
 
 
@@ -222,10 +221,10 @@ def keep_best(options: argparse.Namespace, batches: Iterable[str]) -> None:
     names = set(batches)
     if names.isdisjoint(ResultFiles(options.out).names()):
         return
-    for status, count in without_result(options.out, names).items():
+    best, without = judged(options.out, options.objective, not options.minimize, names)
+    for status, count in without.items():
         why = "no scene has such a robot" if status == REFUSED else SolverStatus(status).sentence
         print(f"Designs without result: {count:,}, with status {status}: {why}")
-    best = best_result(options.out, options.objective, not options.minimize, names)
     if best is None:
         print(f"There is no best design: none has swum, uncrossed, and has {options.objective}.")
         return

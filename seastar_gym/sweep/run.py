@@ -268,12 +268,6 @@ def _tables(folder: str | os.PathLike[str], batches: Container[str] | None = Non
         raise ValueError(f"There are no results in {folder}.")
 
 
-def without_result(folder: str | os.PathLike[str], batches: Container[str] | None = None) -> dict[int, int]:
-    """Numbers of designs that have no result, by their status, see `UNITS`. batches: See `best_result`."""
-    found = Counter(int(status) for table in _tables(folder, batches) for status in table["status"].to_numpy())
-    return {status: count for status, count in sorted(found.items()) if status != SolverStatus.CONVERGED}
-
-
 class Best(NamedTuple):
     """The best design of a sweep. value: Of its objective. design: Values of the axes by name. scene: With them."""
 
@@ -282,21 +276,31 @@ class Best(NamedTuple):
     scene: Scene
 
 
-def best_result(
-    folder: str | os.PathLike[str],
-    objective: str = "speed",
-    is_largest_best: bool = True,
-    batches: Container[str] | None = None,
-) -> Best | None:
+class Judged(NamedTuple):
+    """What came of a sweep. best: None if there is none. without: Numbers of designs without result, by status."""
+
+    best: Best | None
+    without: dict[int, int]
+
+
+def best_result(folder: str | os.PathLike[str], objective: str = "speed", is_largest_best: bool = True) -> Best | None:
     """Best of all results of a folder that have the objective, a column; None if there is none.
 
-    batches: Names of the batches whose results count. None means all, also of several sweeps.
     Robots whose limbs crossed do not count, nor those without speed, such as of a controller that reached no waypoint.
     """
+    return judged(folder, objective, is_largest_best).best
+
+
+def judged(
+    folder: str | os.PathLike[str], objective: str, is_largest_best: bool, batches: Container[str] | None = None
+) -> Judged:
+    """Best result, see `best_result`, and what has none. batches: Names of those that count; None means all."""
     require_kind("objective", objective, str, "the name of a column")
     require_flag("is_largest_best", is_largest_best)
+    without = Counter[int]()
     best, sign = None, 1.0 if is_largest_best else -1.0
     for table in _tables(folder, batches):
+        without.update(table["status"].to_numpy().astype(int).tolist())
         if objective not in table.column_names:
             continue
         values = sign * table[objective].to_numpy().astype(float)
@@ -310,7 +314,7 @@ def best_result(
             numbers = {name: table[name][row].as_py() for name in numbers_of(scene)
                        if name in table.column_names and name not in labels}  # fmt: skip
             best = Best(sign * float(values[row]), labels | numbers, with_numbers(scene, numbers))
-    return best
+    return Judged(best, {status: n for status, n in sorted(without.items()) if status != SolverStatus.CONVERGED})
 
 
 AT_ONCE = 1000

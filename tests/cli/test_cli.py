@@ -317,6 +317,7 @@ def test_policies_are_exported(folder, monkeypatch, capsys):
         "certify own.py --out own.py",
         "certify own.py --chosen own.py",
         "export own.safetensors --to c --out own.json",
+        f"swim --agent {300 * 'x'} --scene own.py --film own.py",
         "swim --scene own.py --film own.py",
     ],
 )
