@@ -14,6 +14,7 @@ import numpy as np
 from agents.methods import METHODS
 from seastar_gym.evaluation import benchmark
 from seastar_gym.evaluation.benchmark import ENTRIES, EPISODES, GREEDY, ORACLE, REFERENCES, TRACKS, Cell, contract
+from seastar_gym.evaluation.results import difference_of_episodes
 from seastar_gym.evaluation.rollout import measure_of_task
 from seastar_gym.files import save_figure
 from studies.frame import Results, Study, commit_of, provenance, rounded
@@ -117,13 +118,16 @@ def rules_table(found: Any) -> str:
 
 
 def check_table(found: Any) -> str:
-    """Means of the check episodes, in bold where they are outside the interval of the test episodes."""
+    """Means of the test and of the check episodes of the same seeds; bold where their difference is not noise."""
     before, lines = named_rows(trained(found)), []
     for name, row in named_rows(trained(found, benchmark.FIRST["check"])).items():
         shown = dict.fromkeys(ENTRIES, "–")
-        for id in row.cells:
-            mean, of_test = row.measure(id).mean, before[name].measure(id)
-            shown[id] = f"{mean:.3g}" if of_test.low <= mean <= of_test.high else f"**{mean:.3g}**"
+        for id, cells in row.cells.items():
+            of_test = {cell.seed: cell for cell in before[name].cells[id]}
+            first, second = [of_test[cell.seed].measure for cell in cells], [cell.measure for cell in cells]
+            differs = difference_of_episodes(first, second)
+            text = f"{np.mean(first):.3g}, {np.mean(second):.3g}"
+            shown[id] = (f"**{text}**" if differs.low > 0.0 or differs.high < 0.0 else text) + f" ({len(cells)})"
         lines.append([name, *shown.values()])
     return markdown(["agent, track", *(id.removeprefix("Seastar").removesuffix("-v0") for id in ENTRIES)], lines)
 

@@ -103,7 +103,27 @@ def smallest_difference(scores: ArrayLike) -> float:
     return float(SEEN_BY_TEN * scores.std(ddof=1)) if scores.size >= FEWEST else float("nan")
 
 
-def _bootstrapped(samples: tuple[Floats, ...], statistic: Callable[..., Any], **how: Any) -> tuple[float, float]:
+def difference_of_episodes(first: ArrayLike, second: ArrayLike) -> Estimate:
+    """Mean of a second set of episodes less that of the first, and its interval over trainings and episodes.
+
+    first, second: A row for every training, the same in both, of shapes (T, E) and (T, F). The bootstrap draws
+    trainings, and the episodes of either set; NaN ends for fewer than FEWEST trainings, and for a set of one episode.
+
+    >>> print(difference_of_episodes([[1.0, 2.0]] * 3, [[2.0, 4.0]] * 3))
+    1.5 [0, 3]
+    """
+    first, second = np.asarray(first, float), np.asarray(second, float)
+
+    def between(trainings: Any, ours: Any, theirs: Any) -> Any:
+        return second[trainings][:, theirs].mean() - first[trainings][:, ours].mean()
+
+    drawn = tuple(np.arange(n) for n in (len(first), first.shape[1], second.shape[1]))
+    has_ends = len(first) >= FEWEST and min(first.shape[1], second.shape[1]) > 1
+    ends = _bootstrapped(drawn, between, vectorized=False) if has_ends else (np.nan, np.nan)
+    return Estimate(float(between(*drawn)), *ends)
+
+
+def _bootstrapped(samples: tuple[NDArray[Any], ...], statistic: Callable[..., Any], **how: Any) -> tuple[float, float]:
     """Ends of the interval of a statistic of samples, each of which is drawn anew."""
     from scipy.stats import bootstrap
 
