@@ -82,7 +82,7 @@ def train(options: Options, robot: Robot, folder: Path, stop: Callable[[], bool]
     if new:
         model = make_model(env, options.ppo, options.seed, options.device)
     else:
-        model = resume(folder / "model.zip", env, options.device)
+        model = learner_in(folder, env, options.device)
     model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
     watch = Watch(options, robot, folder, model, env, stop)
     if not new and model.num_timesteps not in (strokes for strokes, *_ in recorded(folder)):
@@ -93,6 +93,16 @@ def train(options: Options, robot: Robot, folder: Path, stop: Callable[[], bool]
         watch.checkpoint()
     env.close()
     return model, watch
+
+
+def learner_in(folder: Path, env: BatchVecEnv, device: str) -> PPO:
+    """Learner of the run in a folder. ValueError or FileNotFoundError where it is damaged, with what to do about it."""
+    try:
+        return resume(folder / "model.zip", env, device)
+    except (FileNotFoundError, ValueError) as damaged:
+        if (last := max((folder / "checkpoints").glob("*.zip"), default=None)) is None:
+            raise
+        raise type(damaged)(f"{damaged} The last checkpoint is {last}: put a copy in its place.") from damaged
 
 
 def describe(options: Options, robot: Robot, folder: Path, trained: int, watch: Watch) -> Remarks:
@@ -127,9 +137,11 @@ def describe(options: Options, robot: Robot, folder: Path, trained: int, watch: 
 def run_seeds(options: Options, arguments: Sequence[str]) -> int:
     """Run the training of every seed; returns the exit code of the first that fails."""
     folder = options.out or Path("runs") / time.strftime("%Y-%m-%d_%H-%M-%S")
-    for seed in options.seeds:
+    for place, seed in enumerate(options.seeds):
         code = run(replace(options, seed=seed, seeds=(), out=folder / f"seed_{seed}"), arguments)
         if code != 0:
+            if left := shlex.join(map(str, options.seeds[place + 1 :])):
+                print(f"and train the others with the same options, --seeds {left} --out {shlex.quote(str(folder))}")
             return code
     print("seed, strokes round the pentagon, strokes and seconds of training until they were 170")
     for seed in options.seeds:

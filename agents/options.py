@@ -159,7 +159,9 @@ def config_of(folder: Path) -> dict[str, Any]:
     """Entries of the config.json of a run: its options, commands, versions and machine."""
     file = folder / CONFIG
     if not file.is_file():
-        raise FileNotFoundError(f"There is no run to continue in {folder}: it has no {CONFIG}.")
+        runs = sorted(str(found.parent) for found in folder.glob(f"*/{CONFIG}"))
+        these = f" It has those of several seeds: name one, such as {runs[0]}." if runs else ""
+        raise FileNotFoundError(f"There is no run to continue in {folder}: it has no {CONFIG}.{these}")
     with faults_of(file):
         config = read_json(file)
         commands = config["commands"]

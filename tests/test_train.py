@@ -321,7 +321,7 @@ DEEP = "[" * 100_000
 DAMAGES = {
     **{f"{name}: {kind}": linked(name, kind) for name in RUN for kind in KINDS},
     "no run": (lambda folder: (folder / "config.json").unlink(), "There is no run to continue in"),
-    "no model": (lambda folder: (folder / "model.zip").unlink(), "There is no trained policy at"),
+    "no model": (lambda folder: (folder / "model.zip").unlink(), "There is no trained policy at", "checkpoint"),
     "half a config": (damaged_file("config.json", "{"), "is damaged or from another version"),
     "an empty config": (damaged_file("config.json", '{"options": {}}'), "is damaged or from another version"),
     "no commands": damaged_config(lambda config: config.pop("commands")),
@@ -340,7 +340,7 @@ DAMAGES = {
        for name in ("config.json", "efficiency.json", "progress.csv")},
     **{f"efficiency {text}": (damaged_file("efficiency.json", text), "efficiency.json is damaged")
        for text in ('{"seconds": "long"}', '{"strokes": null}', '{"seconds": NaN}', '{"hours": 3}')},
-    "no zip": damaged_file("model.zip", "PK"),
+    "no zip": (damaged_file("model.zip", "PK"), "The last checkpoint is"),
     "deep scene": lambda folder: (damaged_options(scene="x.py")(folder), damaged_file("scene.json", DEEP)(folder)),
 }  # fmt: skip
 """What happens to a run's folder, some with words of the sentence."""
@@ -457,9 +457,17 @@ def test_several_seeds_are_runs_of_their_own(tmp_path, capsys, short_swims):
     table = capsys.readouterr().out.splitlines()[-3:]
     assert table[0].startswith("seed, strokes round the pentagon") and [line[0] for line in table[1:]] == ["3", "4"]
     assert train.main(["--resume", str(tmp_path / "seed_3"), "--strokes", "256"]) == 0
+    assert train.main(["--resume", str(tmp_path)]) == 2
+    assert_told(capsys, f"such as {tmp_path / 'seed_3'}.")
     for wrong in (["--seeds", "1", "1"], ["--seeds", "1", "--publish"]):
         with pytest.raises(SystemExit):
             train.main([*TINY, *wrong])
+
+
+def test_seeds_that_a_stop_left_are_named(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("train.run", lambda options, _: 130 * (options.seed == 4))
+    assert train.main([*TINY, "--seeds", "3", "4", "5", "6", "--out", str(tmp_path)]) == 130
+    assert f"--seeds 5 6 --out {tmp_path}" in capsys.readouterr().out
 
 
 def filmed(folder, *arguments):
