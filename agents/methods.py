@@ -3,17 +3,18 @@
     python -m agents.tasks --benchmark --methods PPO --ids SeastarStation-v0 --seeds 0 1 2
 
 A cell is a file, written when its training is over, with the test episodes of the last policy and a learning curve; the
-model lies beside it. The command goes on with the cells that are missing, several at once, each in a process with one
-thread. The processor time of a cell is that of its training, without the points of the curve.
+model lies beside it. The command goes on with the cells that are missing, several at once, on any executor of a sweep,
+in one thread each. The processor time of a cell is that of its training, without the points of the curve.
 """
 
+import json
 import os
 import time
 from collections.abc import Callable
-from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,9 +48,9 @@ from seastar_gym.evaluation.benchmark import (
 )
 from seastar_gym.evaluation.benchmark import swum as swum_by
 from seastar_gym.evaluation.rollout import Batch
-from seastar_gym.files import beside, require_writable
+from seastar_gym.files import require_writable, write_atomically
 from seastar_gym.scene.checks import require_count, require_seed
-from seastar_gym.sweep.executors import Processes
+from seastar_gym.sweep.executors import Where, executor_of, outcomes
 
 
 class Draw(NamedTuple):
@@ -150,6 +151,21 @@ UNTUNED = tuple(name for name, method in METHODS.items() if method.draw is None)
 """Methods with their own numbers."""
 
 
+class Training(NamedTuple):
+    """The training of a cell. decisions: Its length."""
+
+    method: str
+    track: Track
+    id: str
+    seed: int
+    decisions: int
+
+    def file(self, folder: Path) -> Path:
+        """File of the cell in a folder of cells."""
+        name = self.method.lower().replace(", ", "-").replace(" ", "-")
+        return folder / str(self.decisions) / f"{name}-{self.track}" / f"{self.id}-{self.seed}.json"
+
+
 @dataclass(frozen=True)
 class BenchmarkOptions:
     """Train the cells of the benchmark that are missing: methods, tracks, ids and seeds."""
@@ -164,8 +180,14 @@ class BenchmarkOptions:
     """Seeds of the trainings."""
     decisions: int = BUDGETS[0]
     """Length of every training [decisions]."""
-    processes: int = 2
-    """Cells that are trained at once."""
+    executor: Where = "processes"
+    """Where cells are trained: in processes of this machine, in this process, or on a cluster."""
+    workers: int | None = None
+    """Cells that are trained at once; by default one for every processor, and with SLURM 64."""
+    address: str | None = None
+    """Ray, Dask: HOST:PORT of the head; by default a cluster of this machine."""
+    partition: str | None = None
+    """SLURM: partition."""
     out: Path = Path("runs/benchmark")
     """Folder of the cells."""
 
@@ -181,21 +203,18 @@ class BenchmarkOptions:
         for seed in self.seeds:
             require_seed(seed)
         require_count("decisions", self.decisions, 1, 10**9)
-        require_count("processes", self.processes, 1, 1_000)
 
     @property
-    def cells(self) -> list[tuple[str, Track, str, int, int, Path]]:
-        """Cells that are missing, as arguments of `train_cell`: all ids of a seed before the next seed.
+    def cells(self) -> list[Training]:
+        """Cells that are missing: all ids of a seed before the next seed.
 
         ValueError: one that is there is of another contract.
         """
         once = dict.fromkeys
         every = product(once(self.seeds), once(self.methods), once(self.tracks), once(self.ids))
+        trainings = [Training(method, track, id, seed, self.decisions) for seed, method, track, id in every]
         return [
-            (method, track, id, seed, self.decisions, file)
-            for seed, method, track, id in every
-            if track in METHODS[method].tracks
-            and not is_trained(file := file_of_cell(self.out, method, track, id, seed, self.decisions))
+            one for one in trainings if one.track in METHODS[one.method].tracks and not is_trained(one.file(self.out))
         ]
 
 
@@ -210,12 +229,6 @@ def is_trained(file: Path) -> bool:
         return False
     require_current(cells, str(file))
     return bool(cells)
-
-
-def file_of_cell(folder: Path, method: str, track: Track, id: str, seed: int, decisions: int) -> Path:
-    """File of a cell."""
-    name = method.lower().replace(", ", "-").replace(" ", "-")
-    return folder / str(decisions) / f"{name}-{track}" / f"{id}-{seed}.json"
 
 
 def batch_of(method: Method, track: Track, id: str, n: int, split: Split, **more: Any) -> Batch:
@@ -263,9 +276,10 @@ class Curve(BaseCallback):
         return found
 
 
-def train_cell(method: str, track: Track, id: str, seed: int, decisions: int, file: Path) -> str:
-    """Train a cell and write its files; returns a line that says so."""
+def train_cell(training: Training) -> dict[str, bytes]:
+    """Files of a cell by their endings, once it is trained."""
     torch.set_num_threads(1)
+    method, track, id, seed, decisions = training
     learner = METHODS[method]
     model = new_model(method, track, id, seed)
 
@@ -275,31 +289,45 @@ def train_cell(method: str, track: Track, id: str, seed: int, decisions: int, fi
     curve = Curve([mark for mark in CURVE if mark < decisions], swim)
     model.learn(decisions, callback=curve)
     found = curve.point()
-    if learner.stacked:  # what its frames are stands in files of our own
-        learner_file.save(model, file.with_suffix(".zip"))
-    else:
-        with beside(file.with_suffix(".zip")) as part, part.open("wb") as stream:
-            model.save(stream)
-    model.get_env().close()
-    seconds = float(curve.points[-1]["seconds"])
-    cost: dict[str, Any] = {"decisions": decisions, "seconds": seconds, "curve": curve.points}
-    write([Cell(method, track, id, seed, contract(id), 0, **found, **cost)], file)
-    return f"{file.stem}, {method}, {track}: {curve.points[-1]['measure']:.4g} after {seconds:.0f} s"
+    cost: dict[str, Any] = {
+        "decisions": decisions, "seconds": float(curve.points[-1]["seconds"]), "curve": curve.points
+    }  # fmt: skip
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "cell.json"
+        if learner.stacked:  # what its frames are stands in files of our own
+            learner_file.save(model, file.with_suffix(".zip"))
+        else:
+            model.save(file.with_suffix(".zip"))
+        model.get_env().close()
+        write([Cell(method, track, id, seed, contract(id), 0, **found, **cost)], file)
+        return {ending: file.with_suffix(ending).read_bytes() for ending in (".zip", ".json")}
+
+
+def keep(training: Training, files: dict[str, bytes], folder: Path) -> str:
+    """Write the files of a cell, at last that which says that it is there; returns a line about it."""
+    file = training.file(folder)
+    for ending, content in files.items():
+        write_atomically(file.with_suffix(ending), content)
+    (cell,) = json.loads(files[".json"])["cells"]
+    last = cell["curve"][-1]
+    return f"{file.stem}, {training.method}, {training.track}: {last['measure']:.4g} after {cell['seconds']:.0f} s"
 
 
 def train_cells(options: BenchmarkOptions) -> int:
-    """Train the cells that are missing; returns the exit code, 130 after Ctrl-C."""
+    """Train the cells that are missing; returns the exit code, 1 where some have no result, 130 after Ctrl-C."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     require_writable(options.out)
-    cells = options.cells
+    cells, lost = options.cells, 0
     print(f"{len(cells)} cells to train", flush=True)
-    pool = Processes(options.processes)
     try:
-        for done in as_completed([pool.submit(train_cell, *cell) for cell in cells]):
-            print(done.result(), flush=True)
+        with executor_of(options) as executor:
+            for training, files, problem in outcomes(executor, train_cell, cells, max(1, len(cells))):
+                lost += files is None
+                name = training.file(options.out)
+                print(f"{name}: {problem}" if files is None else keep(training, files, options.out), flush=True)
     except KeyboardInterrupt:
         print("Stopped: the same command goes on with the cells that are missing.", flush=True)
         return 130
-    finally:
-        pool.shutdown(cancel_futures=True)
-    return 0
+    if lost:
+        print(f"{lost} cells have no result: the same command trains them again.", flush=True)
+    return int(lost > 0)

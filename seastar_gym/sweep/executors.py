@@ -1,4 +1,4 @@
-"""Where the batches of a sweep are run: any executor of `concurrent.futures`, and those that the command makes.
+"""Where batches of a sweep, or trainings, are run: any executor of `concurrent.futures`, and those that commands make.
 
 Results are the same bits on each. A worker that is lost costs the batch that it was at.
 """
@@ -8,13 +8,13 @@ import os
 import signal
 import socket
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from multiprocessing import get_context, parent_process
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any, NamedTuple
+from typing import Any, Generic, Literal, NamedTuple, TypeVar, get_args
 
 from seastar_gym.command import DEFAULT, refused_by_disk
 from seastar_gym.files import require_extra, within
@@ -22,6 +22,8 @@ from seastar_gym.process import processors
 from seastar_gym.scene.checks import require_count, shown
 from seastar_gym.sweep.designs import Batch
 
+Task = TypeVar("Task")
+Part = TypeVar("Part")
 Work = Callable[[Batch], bytes]
 """What is done with a batch: a function that can be sent to another process, and that returns a file."""
 KNOWN_FAILURES = (ValueError, OSError, MemoryError, ArithmeticError)
@@ -30,25 +32,31 @@ PATIENCE = 10.0
 """Time that the head of a cluster has to answer [s]."""
 
 
-class Outcome(NamedTuple):
-    """What came of a batch. part: Its results, None if there are none. problem: Why, in a sentence."""
+class Outcome(NamedTuple, Generic[Task, Part]):
+    """What came of a task, such as a batch. part: Its results, None if there are none. problem: Why, in a sentence."""
 
-    task: Batch
-    part: bytes | None
+    task: Task
+    part: Part | None
     problem: str = ""
 
 
-def outcomes(executor: Executor | None, work: Work, tasks: Iterator[Batch], at_once: int) -> Iterator[Outcome]:
-    """Outcomes of all batches, as they are done. The next batch is taken when there is room for it.
+Done = Outcome[Batch, bytes]
+"""What came of a batch: a file."""
 
-    executor: None runs them here, one after the other. at_once: Batches under way at most.
+
+def outcomes(
+    executor: Executor | None, work: Callable[[Task], Part], tasks: Iterable[Task], at_once: int
+) -> Iterator[Outcome[Task, Part]]:
+    """Outcomes of all tasks, as they are done. The next task is taken when there is room for it.
+
+    executor: None runs them here, one after the other. at_once: Tasks under way at most.
     """
     if executor is None:
         yield from (attempt(work, task) for task in tasks)
         return
-    done, pending = SimpleQueue[Future[Outcome]](), dict[Future[Outcome], Batch]()
+    done, pending = SimpleQueue[Future[Outcome[Task, Part]]](), dict[Future[Outcome[Task, Part]], Task]()
 
-    def next_done() -> Outcome:
+    def next_done() -> Outcome[Task, Part]:
         future = done.get()
         task, lost = pending.pop(future), future.exception()
         return Outcome(task, None, f"Its worker was lost: {sentence_of(lost)}") if lost else future.result()
@@ -67,8 +75,8 @@ def outcomes(executor: Executor | None, work: Work, tasks: Iterator[Batch], at_o
             future.cancel()
 
 
-def attempt(work: Work, task: Batch) -> Outcome:
-    """Outcome of a batch that is run now, where it is."""
+def attempt(work: Callable[[Task], Part], task: Task) -> Outcome[Task, Part]:
+    """Outcome of a task that is run now, where it is."""
     try:
         return Outcome(task, work(task))
     except KNOWN_FAILURES as failure:
@@ -212,10 +220,14 @@ def require_reachable(address: str) -> None:
         raise ValueError(f"There is no cluster at {address}: {sentence_of(refused)}") from None
 
 
+Where = Literal["processes", "here", "ray", "slurm", "dask"]
+"""Processes of this machine, this process, or a cluster."""
+
+
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add --executor, --workers, --address and --partition to a parser."""
     parser.add_argument(
-        "--executor", choices=("processes", "here", "ray", "slurm", "dask"), default="processes",
+        "--executor", choices=get_args(Where), default="processes",
         help=f"where batches run: processes of this machine, this process, or a cluster {DEFAULT}",
     )  # fmt: skip
     parser.add_argument("--workers", type=int, help="batches at a time (default: one per processor; of SLURM, 64)")
@@ -224,8 +236,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 @contextmanager
-def executor_of(options: argparse.Namespace) -> Iterator[Executor | None]:
-    """Context with the executor that the options name. It says at once what is missing, and ends with the context."""
+def executor_of(options: Any) -> Iterator[Executor | None]:
+    """Context with the executor that options name. It says at once what is missing, and ends with the context.
+
+    options: What `add_options` adds, and the folder of results, `out`.
+    """
     if options.workers is not None:
         require_count("--workers", options.workers, 1, 1_000_000)
     executor: Executor

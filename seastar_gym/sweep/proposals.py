@@ -20,7 +20,7 @@ import pyarrow.parquet
 from seastar_gym.process import processors
 from seastar_gym.scene.checks import require_choice, require_count, require_number
 from seastar_gym.sweep.designs import Batch, Range, Sweep
-from seastar_gym.sweep.executors import Outcome, Work, outcomes, sentence_of
+from seastar_gym.sweep.executors import Done, Work, outcomes, sentence_of
 from seastar_gym.sweep.run import OnProgress, Progress, ResultFiles, result_file_of, units_of
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ class Proposals:
         numbers |= {axis.name: float(axis.values[places[axis.name]]) for axis in sweep.of_robots}
         return tuple(places[axis.name] for axis in sweep.of_configurations), numbers
 
-    def tell(self, outcome: Outcome) -> None:
+    def tell(self, outcome: Done) -> None:
         """Tell the study what came of a batch. Proposals of a lost one are put back."""
         trials = self._waiting.pop(outcome.task.name)
         if outcome.part is None:

@@ -36,7 +36,7 @@ from seastar_gym.scene.checks import require_callable, require_count, require_fi
 from seastar_gym.scene.number import numbers_of, unit_of, with_numbers
 from seastar_gym.simulator import Simulator, SolverStatus
 from seastar_gym.sweep.designs import Batch, Configuration, Controller
-from seastar_gym.sweep.executors import Outcome, Work, outcomes
+from seastar_gym.sweep.executors import Done, Outcome, Work, outcomes
 
 REFUSED = -1
 """Status of a design that a scene refuses; others have that of the solver, see `SolverStatus`."""
@@ -375,7 +375,7 @@ def run(
     if progress is not None:
         require_callable("progress", progress)
     parts, tally = ResultFiles(folder), Progress()
-    waiting, lost = unfinished(batches, parts, tally), list[Outcome]()
+    waiting, lost = unfinished(batches, parts, tally), list[Done]()
     for _ in range(ATTEMPTS):
         lost = _attempt(outcomes(executor, work, waiting, at_once), parts, tally, progress)
         if not lost:
@@ -401,11 +401,9 @@ def unfinished(batches: Iterable[Batch], parts: ResultFiles, tally: Progress) ->
         yield batch
 
 
-def _attempt(
-    found: Iterator[Outcome], parts: ResultFiles, tally: Progress, progress: OnProgress | None
-) -> list[Outcome]:
+def _attempt(found: Iterator[Done], parts: ResultFiles, tally: Progress, progress: OnProgress | None) -> list[Done]:
     """Write the parts of outcomes; returns those without."""
-    lost = list[Outcome]()
+    lost = list[Done]()
     refused = 0
     for outcome in found:
         try:
@@ -423,7 +421,7 @@ def _attempt(
     return lost
 
 
-def _count(outcome: Outcome, lost: list[Outcome], tally: Progress) -> None:
+def _count(outcome: Done, lost: list[Done], tally: Progress) -> None:
     """Count an outcome. ValueError if too many are lost."""
     if outcome.part is not None:
         tally.count(outcome.task)

@@ -1,9 +1,13 @@
 """Methods of the benchmark: each trains a cell, which says what its last policy reaches and what that cost."""
 
+import contextlib
+import json
+
 import numpy as np
 import pytest
 
 from later import Later
+from losing import Losing
 from refusals import assert_refused
 from seastar_gym.controllers.registry import load_agent
 from seastar_gym.evaluation import benchmark
@@ -20,10 +24,10 @@ def test_a_method_trains_a_cell(name, tmp_path, monkeypatch):
     monkeypatch.setattr("agents.methods.EPISODES", 2)
     monkeypatch.setattr("agents.methods.CURVE", (1,))
     options = methods.BenchmarkOptions((name,), ids=(ID,), seeds=(3,), decisions=2048, out=tmp_path)
-    (*arguments, file) = options.cells[-1]
-    track = arguments[1]
-    assert {cell[1] for cell in options.cells} == {*methods.METHODS[name].tracks}
-    assert f"{ID}-3, {name}, {track}" in methods.train_cell(*arguments, file)
+    training = options.cells[-1]
+    track, file = training.track, training.file(tmp_path)
+    assert {cell.track for cell in options.cells} == {*methods.METHODS[name].tracks}
+    assert f"{ID}-3, {name}, {track}" in methods.keep(training, methods.train_cell(training), tmp_path)
     (cell,) = read([file])
     assert (cell.agent, cell.track, cell.id, cell.seed, cell.contract) == (name, track, ID, 3, contract(ID))
     *earlier, last = cell.curve
@@ -71,7 +75,7 @@ def test_what_is_no_method_or_id_is_refused():
 
 def test_cells_that_are_damaged_are_trained_anew_and_those_of_another_contract_refused(tmp_path, capsys):
     options = methods.BenchmarkOptions(("DQN",), tracks=("plain",), ids=(ID,), seeds=(0, 0, 1), out=tmp_path)
-    first, second = (cell[-1] for cell in options.cells)
+    first, second = (cell.file(tmp_path) for cell in options.cells)
     for text in ("", '{"cells": ['):
         first.parent.mkdir(parents=True, exist_ok=True)
         first.write_text(text)
@@ -81,3 +85,16 @@ def test_cells_that_are_damaged_are_trained_anew_and_those_of_another_contract_r
         write([Cell("DQN", "plain", ID, seed, known, 0, [1.0], [1.0], [True])], file)
     with assert_refused(f"{second} and this version are of different contracts of {ID}"):
         assert options.cells
+
+
+def test_a_cell_that_a_worker_lost_is_named_and_trained_by_the_same_command(tmp_path, monkeypatch, capsys):
+    options = methods.BenchmarkOptions(("DQN",), tracks=("plain",), ids=(ID,), seeds=(0, 1), out=tmp_path)
+    files = {"seed": 0, "curve": [{"measure": 2.0}], "seconds": 1.0}
+    contents = {".zip": b"model", ".json": json.dumps({"cells": [files]}).encode()}
+    executor = Losing(lambda training: training.seed == 1)
+    monkeypatch.setattr("agents.methods.train_cell", lambda training: contents)
+    monkeypatch.setattr("agents.methods.executor_of", lambda options: contextlib.nullcontext(executor))
+    first, second = (training.file(tmp_path) for training in options.cells)
+    assert methods.train_cells(options) == 1
+    assert f"{second}: Its worker was lost" in (told := capsys.readouterr().out) and "1 cells have no result" in told
+    assert first.is_file() and first.with_suffix(".zip").read_bytes() == b"model" and not second.exists()

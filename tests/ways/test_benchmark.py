@@ -6,7 +6,7 @@ import pytest
 
 from ways.story import command
 
-CELL = "--methods PPO --tracks symmetric --ids SeastarStation-v0 --decisions 2048 --processes 1"
+CELL = "--methods PPO --tracks symmetric --ids SeastarStation-v0 --decisions 2048 --workers 1"
 
 
 def test_a_row_is_trained_after_a_stop_evaluated_and_merged(story):
