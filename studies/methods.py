@@ -78,7 +78,8 @@ def ids_table(found: Any) -> str:
     means = {(cell.id, cell.agent): f"{np.mean(cell.measure):.3g}" for cell in benchmark.read([REFERENCES])}
     lines = [
         [
-            f"`{id}`", entry.why, f"{measures[id].name} [{measures[id].unit}], {measures[id].better} is better",
+            f"`{id}`<br>[![{id}](ids/{id}.png)](ids/{id}.gif)", entry.why,
+            f"{measures[id].name} [{measures[id].unit}], {measures[id].better} is better",
             *(means.get((id, agent), "none") for agent in (GREEDY, ORACLE)),
             "-" if entry.price is None else f"{entry.price:g}",
         ]
@@ -90,15 +91,6 @@ def ids_table(found: Any) -> str:
 def trained(found: Any, first: int = 0) -> list[Cell]:
     """Cells of learners. first: Number of the first of their test episodes."""
     return [cell for cell in cells_of(found) if cell.decisions is not None and cell.first == first]
-
-
-def named_rows(cells: list[Cell]) -> dict[str, benchmark.Row]:
-    """Rows by agent, track and length of training where it is not the shorter budget."""
-    return {
-        f"{row.agent}, {track}" + ("" if decisions == benchmark.BUDGETS[0] else f", {decisions:,} decisions"): row
-        for track, _, decisions, rows in benchmark.groups(cells)
-        for row in rows
-    }
 
 
 def rows_table(found: Any) -> str:
@@ -119,14 +111,14 @@ def rules_table(found: Any) -> str:
 
 def check_table(found: Any) -> str:
     """Means of the test and of the check episodes of the same seeds; bold where their difference is not noise."""
-    before, lines = named_rows(trained(found)), []
-    for name, row in named_rows(trained(found, benchmark.FIRST["check"])).items():
+    before, lines, first = benchmark.named_rows(trained(found)), [], benchmark.FIRST["check"]
+    for name, row in benchmark.named_rows(trained(found, first)).items():
+        name = name.removesuffix(f", from {first}")
         shown = dict.fromkeys(ENTRIES, "–")
         for id, cells in row.cells.items():
             of_test = {cell.seed: cell for cell in before[name].cells[id]}
-            first, second = [of_test[cell.seed].measure for cell in cells], [cell.measure for cell in cells]
-            differs = difference_of_episodes(first, second)
-            text = f"{np.mean(first):.3g}, {np.mean(second):.3g}"
+            pair = [of_test[cell.seed].measure for cell in cells], [cell.measure for cell in cells]
+            differs, text = difference_of_episodes(*pair), ", ".join(f"{np.mean(each):.3g}" for each in pair)
             shown[id] = (f"**{text}**" if differs.low > 0.0 or differs.high < 0.0 else text) + f" ({len(cells)})"
         lines.append([name, *shown.values()])
     return markdown(["agent, track", *(id.removeprefix("Seastar").removesuffix("-v0") for id in ENTRIES)], lines)
@@ -135,7 +127,7 @@ def check_table(found: Any) -> str:
 def draw_scores(found: Any, file: Path) -> None:
     """Scores of all rows with their intervals, beside those of the rules."""
     ids = benchmark.scales()
-    scored = [(row.overall(ids), row, name) for name, row in named_rows(trained(found)).items()]
+    scored = [(row.overall(ids), row, name) for name, row in benchmark.named_rows(trained(found)).items()]
     scored = sorted((each for each in scored if not np.isnan(each[0].mean)), key=lambda each: each[0].mean)
     figure, axis = subplots(1, 1, figsize=(7.2, 1.2 + 0.28 * len(scored)))
     labels = []
@@ -157,7 +149,7 @@ def draw_curves(found: Any, file: Path) -> None:
     """Score of every row that has one against decisions, and against processor time."""
     figure, axes = subplots(1, 2, figsize=(9.0, 4.2), sharey=True)
     scales, colours = benchmark.scales(), dict(zip(METHODS, (*CYCLE, INK), strict=False))
-    for name, row in named_rows(trained(found)).items():
+    for name, row in benchmark.named_rows(trained(found)).items():
         cells: list[Any] = [cell for own in row.cells.values() for cell in own]
         points: list[list[float]] = []
         for k in range(min(len(cell.curve) for cell in cells)):

@@ -37,7 +37,7 @@ from seastar_gym.evaluation.results import (
     write_csv,
 )
 from seastar_gym.evaluation.rollout import RECORDED, Batch, env_of, make_batch, measure_of_task, require_seen, rollout
-from seastar_gym.files import read_json, write_atomically, write_json
+from seastar_gym.files import beside, read_json, write_atomically, write_json
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.serial import to_dict
 
@@ -334,6 +334,25 @@ def groups(cells: Sequence[Cell]) -> list[tuple[Track, int, int | None, list[Row
     ]
 
 
+def named_rows(cells: Sequence[Cell]) -> dict[str, Row]:
+    """Rows by agent, track, length of training where it is not the shorter budget, and first episode where not 0."""
+    found = dict[str, Row]()
+    for track, first, decisions, rows in groups(cells):
+        of = f", {decisions:,} decisions" if decisions not in (None, BUDGETS[0]) else ""
+        found |= {f"{row.agent}, {track}{of}" + (f", from {first}" if first else ""): row for row in rows}
+    return found
+
+
+def score_arrays(cells: Sequence[Cell]) -> dict[str, Any]:
+    """Arrays of the scores of every row, shape (seeds, ids), ids as of ENTRIES, NaN for what is missing."""
+    found = dict[str, Any]()
+    for name, row in named_rows(cells).items():
+        by_seed = {(cell.seed, id): score(cell) for id, own in row.cells.items() for cell in own}
+        seeds = sorted({seed for seed, _ in by_seed})
+        found[name] = np.array([[by_seed.get((seed, id), np.nan) for id in ENTRIES] for seed in seeds])
+    return found
+
+
 def records(cells: Sequence[Cell]) -> list[dict[str, Any]]:
     """A record of every agent, track, length of training, set of episodes and id, by the names of the CSV."""
     found = []
@@ -432,8 +451,10 @@ def tables(cells: Sequence[Cell], form: Callable[..., str] = as_text) -> str:
 
 
 def write_all(cells: Sequence[Cell], folder: Path) -> None:
-    """Write benchmark.json, which merges, and tables as benchmark.csv, .md and .tex into a folder."""
+    """Write benchmark.json, which merges, tables as .csv, .md and .tex, and arrays of scores as .npz, into a folder."""
     write(cells, folder / RESULTS)
+    with beside(folder / "benchmark.npz", ".npz") as part:
+        np.savez(part, **score_arrays(cells))
     write_csv(records(cells), folder / "benchmark.csv")
     for ending, form in {".md": as_markdown, ".tex": as_latex}.items():
         write_atomically(folder / f"benchmark{ending}", tables(cells, form))

@@ -171,6 +171,10 @@ def test_tables_are_written_in_every_form(tmp_path, scales):
     assert r"\toprule" in tex and r"ppo\_lstm & 2.33 [1, 4] (3)" in tex and tex.count(r"\\") == 3
     assert "| ppo_lstm | 2.33 [1, 4] (3) |" in (tmp_path / "benchmark.md").read_text("utf-8")
     assert (tmp_path / "benchmark.csv").read_text().splitlines()[1].startswith(f"ppo_lstm,plain,,0,{PREY},3,")
+    with np.load(tmp_path / "benchmark.npz") as arrays:  # what rliable takes
+        (name, scores), other = next(iter(arrays.items())), arrays["mine, plain"]
+    assert name == "ppo_lstm, plain" and scores.shape == (3, len(benchmark.ENTRIES)) == other.shape
+    assert np.isfinite(scores).sum() == 3 and (np.isfinite(scores) != np.isfinite(other)).sum() == 6
     assert len(json.loads((tmp_path / "benchmark.json").read_text())["cells"]) == 6
 
 
