@@ -7,6 +7,7 @@ model lies beside it. The command goes on with the cells that are missing, sever
 in one thread each. The processor time of a cell is that of its training, without the points of the curve.
 """
 
+import gc
 import json
 import os
 import time
@@ -278,6 +279,7 @@ class Curve(BaseCallback):
 
 def train_cell(training: Training) -> dict[str, bytes]:
     """Files of a cell by their endings, once it is trained."""
+    gc.collect()  # models are cycles, with replay buffers of hundreds of megabytes: the last one goes before the next
     torch.set_num_threads(1)
     method, track, id, seed, decisions = training
     learner = METHODS[method]

@@ -1,10 +1,12 @@
 """Methods of the benchmark: each trains a cell, which says what its last policy reaches and what that cost."""
 
 import contextlib
+import gc
 import json
 
 import numpy as np
 import pytest
+from stable_baselines3.common.buffers import ReplayBuffer
 
 from later import Later
 from losing import Losing
@@ -85,6 +87,13 @@ def test_cells_that_are_damaged_are_trained_anew_and_those_of_another_contract_r
         write([Cell("DQN", "plain", ID, seed, known, 0, [1.0], [1.0], [True])], file)
     with assert_refused(f"{second} and this version are of different contracts of {ID}"):
         assert options.cells
+
+
+def test_a_worker_keeps_no_model_of_an_earlier_cell(monkeypatch):
+    monkeypatch.setattr("agents.methods.EPISODES", 2)
+    for seed in (0, 1):
+        methods.train_cell(methods.Training("DQN", "plain", ID, seed, 128))
+    assert sum(type(each) is ReplayBuffer for each in gc.get_objects()) == 1
 
 
 def test_a_cell_that_a_worker_lost_is_named_and_trained_by_the_same_command(tmp_path, monkeypatch, capsys):
