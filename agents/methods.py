@@ -214,13 +214,15 @@ class BenchmarkOptions:
         once = dict.fromkeys
         every = product(once(self.seeds), once(self.methods), once(self.tracks), once(self.ids))
         trainings = [Training(method, track, id, seed, self.decisions) for seed, method, track, id in every]
-        return [
-            one for one in trainings if one.track in METHODS[one.method].tracks and not is_trained(one.file(self.out))
-        ]
+        return [one for one in trainings if one.track in METHODS[one.method].tracks and not is_trained(one, self.out)]
 
 
-def is_trained(file: Path) -> bool:
-    """Whether a cell is there. One that is damaged is not, and a note says so; ValueError for another contract."""
+def is_trained(training: Training, folder: Path) -> bool:
+    """Whether the cell of a training is there. One that is damaged is not, and a note says so.
+
+    ValueError: it is of another contract, or another training's.
+    """
+    file = training.file(folder)
     if not file.is_file():
         return False
     try:
@@ -229,7 +231,9 @@ def is_trained(file: Path) -> bool:
         print(f"{damaged} It is trained anew.", flush=True)
         return False
     require_current(cells, str(file))
-    return bool(cells)
+    if [(cell.agent, cell.track, cell.id, cell.seed, cell.decisions) for cell in cells] != [training]:
+        raise ValueError(f"{file} has not the cell that its name says: move it away.")
+    return True
 
 
 def batch_of(method: Method, track: Track, id: str, n: int, split: Split, **more: Any) -> Batch:

@@ -270,7 +270,7 @@ def measured_on_benchmark(options: argparse.Namespace) -> int:
         cells = benchmark.merged({"What is known": cells, f"--agents {label}": found})
         if options.out is not None:
             benchmark.write_all(cells, options.out)
-    shown = [cell for cell in cells if cell.id in ids]
+    shown = [cell for cell in cells if cell.id in ids and (options.benchmark != "check" or cell.first == first)]
     if not shown:
         raise ValueError("There is nothing to show: name --agents that fit, or files to --merge.")
     if options.out is not None:

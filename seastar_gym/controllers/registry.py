@@ -24,8 +24,8 @@ import re
 import warnings
 import zipfile
 import zlib
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from copy import deepcopy
 from functools import partial
 from pathlib import Path
@@ -45,7 +45,7 @@ from seastar_gym.envs.tasks import name_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, require_kind, require_period, require_seed, require_texts, shown
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene import find_modules_in
+from seastar_gym.scene.scene import failure_in, find_modules_in
 
 _FUNCTION = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
@@ -66,6 +66,19 @@ def module_file(name: str) -> Path:
     if spec is None or not spec.has_location or spec.origin is None:
         raise ValueError(f"There is no agent {name!r}: no file has the module {module}.")
     return Path(spec.origin)
+
+
+@contextmanager
+def own_code(name: str) -> Iterator[None]:
+    """Context in which an exception of the code of "module:function" becomes a ValueError with one sentence."""
+    try:
+        yield
+    except (ValueError, OSError):
+        raise  # a sentence already
+    except Exception as wrong:  # the module is anybody's code
+        if not is_function(name):
+            raise
+        raise ValueError(failure_in(module_file(name), wrong)) from wrong
 
 
 def call_function(name: str, env: OneRobotEnv) -> Policy:
@@ -261,7 +274,8 @@ def fitting_agents(
     agents, left_out = dict[str, Policy](), list[str]()
     for label, make in makers.items():
         try:
-            policy = make()
+            with own_code(label):
+                policy = make()
             sight = learned.camera_of(policy).get("sight")
             n_seen = None if sight is None else policy.description.observation_size  # type: ignore[attr-defined]
             require_fit(policy, known, actions_of(policy, known.robot.n_limbs), decision_period, n_seen, sight=sight)

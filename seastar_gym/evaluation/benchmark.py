@@ -22,7 +22,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from seastar_gym.controllers.contract import Policy
-from seastar_gym.controllers.registry import is_file, is_function, load_agent
+from seastar_gym.controllers.learned import reason_of
+from seastar_gym.controllers.registry import is_file, is_function, load_agent, own_code
 from seastar_gym.envs import IDS
 from seastar_gym.envs.instances import SIZES, Split
 from seastar_gym.envs.robots import Task
@@ -38,6 +39,15 @@ from seastar_gym.evaluation.results import (
 )
 from seastar_gym.evaluation.rollout import RECORDED, Batch, env_of, make_batch, measure_of_task, require_seen, rollout
 from seastar_gym.files import beside, read_json, write_atomically, write_json
+from seastar_gym.scene.checks import (
+    is_whole_number,
+    require_choice,
+    require_count,
+    require_flag,
+    require_kind,
+    require_number,
+    require_numbers,
+)
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.serial import to_dict
 
@@ -126,6 +136,10 @@ def contract(id: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+POINT = ("decisions", "seconds", "measure")
+"""What a point of a learning curve has at least."""
+
+
 class Cell(NamedTuple):
     """What one training, or rule, reached in the test episodes of an id.
 
@@ -171,8 +185,8 @@ def track_of(policy: Policy) -> Track:
 def length_of(policy: Policy) -> int | None:
     """Decisions that a policy learned for; None where it does not say."""
     training = getattr(policy, "training", None)
-    own = training.get("strokes") if isinstance(training, dict) else None
-    return getattr(policy, "num_timesteps", own)
+    own = getattr(policy, "num_timesteps", training.get("strokes") if isinstance(training, dict) else None)
+    return own if is_whole_number(own) else None
 
 
 def require_length(name: str, policy: Policy, decisions: int | None) -> None:
@@ -192,13 +206,17 @@ def measured(
     decisions: Length of their trainings, which says in which table they are. Rules have none, and what the package
     brings its own; ValueError for a file that says a length more than a tenth away.
     """
+    require_ids([id])
+    names = [names] if isinstance(names, str) else names
     env, cells = env_of(id, task=task_of(id), split="test", fidelity=FIDELITY), list[Cell]()
     for seed, name in enumerate(names):
-        policy = load_agent(name, env)
+        with own_code(name):
+            policy = load_agent(name, env)
         length = length_of(policy) if not (is_file(name) or is_function(name)) else decisions
         require_length(name, policy, length)
         batch = make(id, EPISODES, "test", threads, actions=require_seen(policy, env))
-        reached = swum(batch, policy, first)
+        with own_code(name):
+            reached = swum(batch, policy, first)
         cells.append(Cell(agent, track_of(policy), id, seed, contract(id), first, **reached, decisions=length))
     env.close()
     return cells
@@ -239,15 +257,41 @@ def cells_in(file: Path | str) -> list[Cell]:
     data = read_json(file)
     try:
         cells = [Cell(**cell) for cell in data["cells"]]
-        if not all(np.array([cell.measure, cell.returns, cell.success], float).size for cell in cells):
-            raise ValueError("no episodes")
-    except (KeyError, TypeError, ValueError) as wrong:
-        raise ValueError(f"{file} is no file of the benchmark.") from wrong
+        for cell in cells:
+            require_cell(cell)
+    except (KeyError, OverflowError, TypeError, ValueError) as wrong:
+        raise ValueError(f"{file} is no file of the benchmark: {reason_of(wrong)}.") from wrong
     return cells
 
 
-def read(files: Iterable[Path | str]) -> list[Cell]:
-    """Cells of all files, see `merged`."""
+def require_cell(cell: Cell) -> None:
+    """ValueError for a cell with entries that cannot be, also of an id that is not of the benchmark."""
+    for name in ("agent", "track", "id", "contract"):
+        require_kind(name, getattr(cell, name), str, "a text")
+    if not cell.agent.strip():
+        raise ValueError("An agent has no name.")
+    require_choice("track", cell.track, TRACKS)
+    require_ids([cell.id])
+    for name, smallest in {"seed": 0, "first": 0, "decisions": 1}.items():
+        if (count := getattr(cell, name)) is not None or name != "decisions":
+            require_count(name, count, smallest, 2**53)
+    if cell.seconds is not None:
+        require_number("seconds", cell.seconds, "s", zero_allowed=True)
+    for name in ("measure", "returns", "success"):
+        require_kind(name, getattr(cell, name), list, "a list")
+    require_numbers("measure", (*cell.measure, *cell.returns), "1")
+    for done in cell.success:
+        require_flag("success", done)
+    if not len(cell.measure) == len(cell.returns) == len(cell.success) > 0:
+        raise ValueError("A cell has as many measures as returns and successes, and at least one.")
+    require_kind("curve", cell.curve, list, "a list of points")
+    for point in cell.curve:
+        require_numbers("curve", tuple(point[name] for name in POINT), "1")
+
+
+def read(files: Iterable[Path | str] | str) -> list[Cell]:
+    """Cells of all files, or of one, see `merged`."""
+    files = [files] if isinstance(files, str) else files
     return merged({str(file): cells_in(file) for file in files})
 
 
@@ -268,23 +312,25 @@ def merged(parts: Mapping[str, Iterable[Cell]]) -> list[Cell]:
             key = cell.agent, cell.track, cell.id, cell.seed, cell.first, cell.decisions
             same, whose = found.setdefault(key, (cell, source))
             if (same.measure, same.returns, same.success) != (cell.measure, cell.returns, cell.success):
+                both = f"{source} has two" if whose == source else f"{whose} and {source} have different"
                 raise ValueError(
-                    f"{whose} and {source} have different results of {cell.agent} in {cell.id}, seed {cell.seed}: name "
-                    "them apart by LABEL=FILES."
+                    f"{both} results of {cell.agent} in {cell.id}, seed {cell.seed}: name them apart by LABEL=FILES."
                 )
     return [cell for cell, _ in found.values()]
 
 
 def require_current(cells: Iterable[Cell], source: str) -> None:
     """ValueError, with one sentence, for cells of no id of the benchmark, or of another contract than it has here."""
-    of = {(cell.id, cell.contract) for cell in cells}
-    require_ids(id for id, _ in of)
-    for id, hashed in sorted(of):
+    of = {(cell.id, cell.contract, len(cell.measure)) for cell in cells}
+    require_ids(id for id, *_ in of)
+    for id, hashed, n_episodes in sorted(of):
         if hashed != contract(id):
             raise ValueError(
                 f"{source} and this version are of different contracts of {id}, whose task, observation, reward, "
                 "numerics or split changed in between: swim it again."
             )
+        if n_episodes != EPISODES:
+            raise ValueError(f"{source} has {n_episodes} episodes of {id}, not {EPISODES}: swim it again.")
 
 
 # Tables
@@ -344,12 +390,12 @@ def named_rows(cells: Sequence[Cell]) -> dict[str, Row]:
 
 
 def score_arrays(cells: Sequence[Cell]) -> dict[str, Any]:
-    """Arrays of the scores of every row, shape (seeds, ids), ids as of ENTRIES, NaN for what is missing."""
+    """Arrays of the scores of every row, shape (seeds, ids): of its ids, and of the seeds that have them all."""
     found = dict[str, Any]()
     for name, row in named_rows(cells).items():
-        by_seed = {(cell.seed, id): score(cell) for id, own in row.cells.items() for cell in own}
-        seeds = sorted({seed for seed, _ in by_seed})
-        found[name] = np.array([[by_seed.get((seed, id), np.nan) for id in ENTRIES] for seed in seeds])
+        by_id = [{cell.seed: score(cell) for cell in row.cells[id]} for id in ENTRIES if id in row.scores]
+        seeds = sorted(set.intersection(*map(set, by_id))) if by_id else []
+        found[name] = np.array([[of[seed] for of in by_id] for seed in seeds]).reshape(len(seeds), len(by_id))
     return found
 
 
@@ -391,21 +437,21 @@ def table_of(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
     """Titles and lines of the table of a track: means over seeds with intervals, and the number of seeds in brackets.
 
     The last columns: the interquartile mean of the scores, the smallest difference of their mean that ten seeds can
-    see, and the probability that a seed scores more than one of the first row. Rows that lack an id that others have a
-    score of have none of the three.
+    see, and the probability that a seed scores more than one of the first row that has all ids. Rows that lack an id
+    that others have a score of have none of the three.
     """
     ids = [id for id in ENTRIES if any(id in row.cells for row in rows)]
     scored = [id for id in ids if id in scales()]
     over = f"score over\n{', '.join(map(_short, scored))},\nmore is better" if scored else "score"
     titles, lines = ["agent", *map(_title, ids), over, "seen by ten", "P(> first)"], list[list[str]]()
-    first = [rows[0].scores[id] for id in scored] if rows[0].scores.keys() == {*scored} else []
+    whole = next((row for row in rows if row.scores.keys() == {*scored}), None)
     for row in rows:
         shown = [f"{_shown(row.measure(id))} ({len(row.cells[id])})" if id in row.cells else "–" for id in ids]
         overall, smallest, better = row.overall(scored), np.nan, np.nan
         if not np.isnan(overall.mean):
             smallest = row.smallest
-            if first and row is not rows[0]:
-                better = probability_of_improvement([row.scores[id] for id in scored], first)
+            if whole is not None and row is not whole:
+                better = probability_of_improvement(*([each.scores[id] for id in scored] for each in (row, whole)))
         last = [_shown(overall), f"{smallest:.2g}", f"{better:.2f}"]
         lines.append([row.agent, *shown, *(text.replace("nan", "–") for text in last)])
     return titles, lines
@@ -452,9 +498,13 @@ def tables(cells: Sequence[Cell], form: Callable[..., str] = as_text) -> str:
 
 def write_all(cells: Sequence[Cell], folder: Path) -> None:
     """Write benchmark.json, which merges, tables as .csv, .md and .tex, and arrays of scores as .npz, into a folder."""
-    write(cells, folder / RESULTS)
+    if not cells:
+        raise ValueError("There are no cells to write.")
+    arrays, lines = score_arrays(cells), records(cells)
+    texts = {ending: tables(cells, form) for ending, form in {".md": as_markdown, ".tex": as_latex}.items()}
+    write(cells, folder / RESULTS)  # which can be shown, as it was
     with beside(folder / "benchmark.npz", ".npz") as part:
-        np.savez(part, **score_arrays(cells))
-    write_csv(records(cells), folder / "benchmark.csv")
-    for ending, form in {".md": as_markdown, ".tex": as_latex}.items():
-        write_atomically(folder / f"benchmark{ending}", tables(cells, form))
+        np.savez(part, **arrays)
+    write_csv(lines, folder / "benchmark.csv")
+    for ending, text in texts.items():
+        write_atomically(folder / f"benchmark{ending}", text)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seastar_gym.controllers.registry import is_file, learned_file, load_agent
+from seastar_gym.controllers.registry import is_file, learned_file, load_agent, own_code
 from seastar_gym.evaluation.results import Estimate, mean_with_interval, number, over_trainings, text_table, write_csv
 from seastar_gym.evaluation.rollout import env_of, held_out, measure_of, swim_episodes
 from seastar_gym.evaluation.swim import HELD_OUT_SEED
@@ -62,8 +62,13 @@ def policies_of(agent: str) -> tuple[str, list[str]]:
     label, several, names = agent.partition("=")
     if several and not (label.strip() and all(names.split(","))):
         raise ValueError(f"{agent!r} lacks a label or a policy: write LABEL=A,B,C.")
-    short = Path(agent).stem if len(Path(agent).parts) > 1 else agent
-    return (label, names.split(",")) if several else (short, [agent])
+    if not several:
+        return Path(agent).stem if len(Path(agent).parts) > 1 else agent, [agent]
+    policies = names.split(",")
+    places = [Path(name).resolve() if is_file(name) else name for name in policies]
+    if twice := [name for k, name in enumerate(policies) if places[k] in places[:k]]:
+        raise ValueError(f"{label} has {twice[0]} twice: every policy is a training of its own.")
+    return label, policies
 
 
 def measured(
@@ -81,8 +86,9 @@ def measured(
     measure, found = measure_of(env), dict[int, tuple[Any, ...]]()
     for turn, name in enumerate(names[:seeds]):
         own = list(range(HELD_OUT_SEED, HELD_OUT_SEED + seeds))[turn :: len(names)]
-        policy = load_agent(name, env, own[0])
-        swum = swim_episodes(task, policy, own, fidelity=fidelity, max_decisions=max_decisions, threads=threads)
+        with own_code(name):
+            policy = load_agent(name, env, own[0])
+            swum = swim_episodes(task, policy, own, fidelity=fidelity, max_decisions=max_decisions, threads=threads)
         rows = (column.tolist() for column in (measure.of(swum), swum.success, swum.returns, swum.decisions))
         found |= zip(own, zip(*rows, strict=True), strict=True)
     columns: Any = map(list, zip(*(found[seed] for seed in sorted(found)), strict=True))

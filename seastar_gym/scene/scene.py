@@ -457,7 +457,7 @@ def load_scene(file: str | PathLike[str] | None) -> Scene:
     except ValueError:
         raise  # a sentence of ours, as of a robot without limbs
     except Exception as wrong:  # the file is anybody's code
-        raise ValueError(f"{file}, {_line(wrong, file)}{type(wrong).__name__}: {str(wrong).rstrip('.')}.") from wrong
+        raise ValueError(failure_in(file, wrong)) from wrong
     if not isinstance(found, Scene):
         raise ValueError(f"{file} must define `scene`, a Scene.")
     return found
@@ -471,7 +471,8 @@ def find_modules_in(*folders: Path) -> None:
             importlib.invalidate_caches()
 
 
-def _line(wrong: Exception, file: Path) -> str:
-    """Last line of a file at which something went wrong, as the beginning of a sentence."""
+def failure_in(file: Path, wrong: Exception) -> str:
+    """Sentence on an exception in a file of somebody's code, with the last line of it that was at work."""
     lines = [frame.lineno for frame in traceback.extract_tb(wrong.__traceback__) if frame.filename == str(file)]
-    return f"line {lines[-1]}: " if lines else ""
+    place = f"line {lines[-1]}: " if lines else ""
+    return f"{file}, {place}{type(wrong).__name__}: {' '.join(str(wrong).split()).rstrip('.')}."

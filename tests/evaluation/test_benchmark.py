@@ -68,6 +68,9 @@ def test_rows_that_lack_an_id_have_no_score_and_tables_say_over_which_ids_scores
     text = tables([*cells, *row("whole", [9.0] * 3, "SeastarFailBlind-v0")])
     whole, part = (next(line for line in text.splitlines() if line.startswith(name)) for name in ("whole", "part"))
     assert "PreyTimed, Station" in text and part.split()[-3:] == ["–"] * 3 and "0.583" in whole
+    *_, best = tables([*row("part", [8.0] * 3), *cells[:6], *row("best", [9.0] * 3), *row("best", [0.0] * 3, STATION)],
+                      benchmark.as_markdown).strip().splitlines()  # fmt: skip
+    assert best.startswith("| best |") and best.endswith(" 1.00 |")
 
 
 # Files
@@ -85,8 +88,19 @@ def test_files_of_one_contract_merge_unless_they_have_different_results_of_one_t
         read([tmp_path / "a.json", tmp_path / "c.json"])
 
 
+ODD = {
+    "agent": [5, "", []], "track": ["banana", []], "id": [5, "SeastarSwim-v0"], "contract": [None],
+    "seed": [-3, 0.5, "zero", [0]], "first": ["0", 0.5, None], "decisions": [-2048, 2048.5, "2048", [1], 10**400],
+    "measure": [["x", "y"], [None, 1.0], [True, False], [1.0], [], 1.0],
+    "returns": [[1.0]], "success": [[7, 7], [True]], "seconds": ["fast", -1.0], "curve": [5, [3], [{"measure": 1.0}]],
+}  # fmt: skip
+"""What entries of a cell cannot be."""
 WRONG = ['{"runs": 3}', '{"cells": [', '{"cells": [{"agent": "mine"}]}', ""]
-WRONG.append(json.dumps({"cells": [cell("mine", PREY, 0, 1.0)._replace(measure=["x", "y"])._asdict()]}))
+WRONG += [
+    json.dumps({"cells": [cell("mine", PREY, 0, 1.0)._replace(**{name: value})._asdict()]})
+    for name, values in ODD.items()
+    for value in values
+]
 
 
 @pytest.mark.parametrize("text", WRONG)
@@ -95,6 +109,9 @@ def test_an_out_that_is_damaged_or_no_folder_is_refused_before_anything_swims(te
     (tmp_path / "benchmark.json").write_text(text)
     assert main(["evaluate", "--benchmark", "--agents", "greedy", "--out", str(tmp_path)]) == 2
     assert "benchmark.json is no " in capsys.readouterr().err
+    told = "benchmark.json is no file of the benchmark: " if '"curve"' in text else "benchmark.json is no "
+    assert main(["evaluate", "--merge", str(tmp_path / "benchmark.json")]) == 2
+    assert told in (said := capsys.readouterr().err) and said.count("\n") == 1
     assert (tmp_path / "benchmark.json").read_text() == text
     with pytest.raises(FileExistsError):
         main(["evaluate", "--benchmark", "--agents", "greedy", "--out", str(tmp_path / "benchmark.json")])
@@ -102,6 +119,7 @@ def test_an_out_that_is_damaged_or_no_folder_is_refused_before_anything_swims(te
 
 def test_results_join_those_of_a_folder_and_files_are_shown_by_ids(tmp_path, scales, monkeypatch, capsys):
     monkeypatch.setattr(benchmark, "contract", lambda id: "a")
+    monkeypatch.setattr(benchmark, "EPISODES", 2)
     monkeypatch.setattr(
         benchmark, "measured",
         lambda id, label, names, first, threads, decisions: [
@@ -122,6 +140,10 @@ def test_results_join_those_of_a_folder_and_files_are_shown_by_ids(tmp_path, sca
     assert [each[2:4] for each in rows[1:]] == [["200000", "0"], ["200000", "0"], ["1000000", "0"]]
     assert main(["evaluate", "--merge", str(tmp_path / "benchmark.json"), "--task", STATION]) == 2
     assert "nothing to show" in capsys.readouterr().err
+    assert main(["evaluate", "--benchmark", "check", "--merge", str(tmp_path / "benchmark.json")]) == 2  # has none
+    monkeypatch.setattr(benchmark, "EPISODES", 64)
+    assert main(["evaluate", "--merge", str(tmp_path / "benchmark.json")]) == 2
+    assert f"has 2 episodes of {PREY}, not 64" in capsys.readouterr().err
 
 
 def pentagon(env):
@@ -138,11 +160,44 @@ def test_rules_have_no_length_and_what_the_package_brings_its_own(name, length, 
     assert found.decisions == length
 
 
+FAILING = """
+from seastar_gym.controllers.open_loop import scripted
+
+def good(env):
+    return scripted("pentagon")
+
+def late(env):
+    return Late()
+
+class Late:
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        return 1 / 0, state
+
+def early(env):
+    return {}["key"]
+"""
+
+
+@pytest.mark.parametrize("mode", ["--benchmark", "--seeds=2"])
+def test_code_of_ones_own_that_fails_is_told_with_its_line_and_others_go_on(mode, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(benchmark, "EPISODES", 2)
+    name = f"failing{mode[2:6]}"
+    (tmp_path / f"{name}.py").write_text(FAILING)
+    agents = [f"{function}={name}:{function}" for function in ("late", "early", "good")]
+    assert main(["evaluate", mode, "--task", STATION, "--agents", *agents]) == 2
+    out, told = capsys.readouterr()
+    assert told.count("\n") == 2 and "good" in out
+    for agent, line, failure in (("late", 12, "ZeroDivisionError"), ("early", 15, "KeyError")):
+        assert f"{agent}" in told and f"{name}.py, line {line}: {failure}: " in told
+
+
 REFUSED = {
     "leave out --seeds": ["--seeds", "10"], "leave out --path": ["--path", "pentagon"],
     "leave out --decision-period": ["--decision-period", "0.5"], "leave out --random-heading": ["--random-heading"],
     "called greedy": ["--agents", "greedy", "greedy"], "lacks a label": ["--agents", "=a.zip"],
     "--decisions": ["--decisions", "0"], "name them": ["--decisions", "10"],
+    "mine has ./a.zip twice": ["--agents", "mine=a.zip,b.zip,./a.zip"],
 }  # fmt: skip
 
 
@@ -172,9 +227,10 @@ def test_tables_are_written_in_every_form(tmp_path, scales):
     assert "| ppo_lstm | 2.33 [1, 4] (3) |" in (tmp_path / "benchmark.md").read_text("utf-8")
     assert (tmp_path / "benchmark.csv").read_text().splitlines()[1].startswith(f"ppo_lstm,plain,,0,{PREY},3,")
     with np.load(tmp_path / "benchmark.npz") as arrays:  # what rliable takes
-        (name, scores), other = next(iter(arrays.items())), arrays["mine, plain"]
-    assert name == "ppo_lstm, plain" and scores.shape == (3, len(benchmark.ENTRIES)) == other.shape
-    assert np.isfinite(scores).sum() == 3 and (np.isfinite(scores) != np.isfinite(other)).sum() == 6
+        assert {*arrays} == {"ppo_lstm, plain", "mine, plain"}
+        assert arrays["ppo_lstm, plain"].tolist() == [[0.125], [0.25], [0.5]]
+    with assert_refused("There are no cells to write"):
+        benchmark.write_all([], tmp_path)
     assert len(json.loads((tmp_path / "benchmark.json").read_text())["cells"]) == 6
 
 
