@@ -35,10 +35,10 @@ import numpy as np
 
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.contract import Policy, actions_of, answer_of, is_batched, require_fit
-from seastar_gym.controllers.learned import reason_of
+from seastar_gym.controllers.learned import LearnedPolicy, reason_of
 from seastar_gym.controllers.open_loop import GAITS, scripted
 from seastar_gym.controllers.reduced import as_it_learned
-from seastar_gym.controllers.search import GreedyPolicy, Planner, gait_planner
+from seastar_gym.controllers.search import GreedyPolicy, Planner, Searcher, gait_planner
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import OneRobotEnv, SeastarSwimEnv
 from seastar_gym.envs.tasks import name_of
@@ -76,8 +76,6 @@ def own_code(name: str) -> Iterator[None]:
     except (ValueError, OSError):
         raise  # a sentence already
     except Exception as wrong:  # the module is anybody's code
-        if not is_function(name):
-            raise
         raise ValueError(failure_in(module_file(name), wrong)) from wrong
 
 
@@ -90,20 +88,22 @@ def call_function(name: str, env: OneRobotEnv) -> Policy:
     module, _, function = name.partition(":")
     find_modules_in(Path.cwd())
     try:
-        make = getattr(importlib.import_module(module), function, None)
+        with own_code(name):
+            make = getattr(importlib.import_module(module), function, None)
     except ModuleNotFoundError as missing:
         raise ValueError(f"There is no agent {name!r}: {missing}.") from missing
     if not callable(make):
         raise ValueError(f"There is no agent {name!r}: the module {module} has no function {function}.")
     if not takes(make, env):
         raise ValueError(f"The agent {name!r} must be a function of one argument, the environment: {function}(env).")
-    policy = make(env)
+    with own_code(name):
+        policy = make(env)
     if not callable(getattr(policy, "predict", None)):
         raise ValueError(f"The agent {name!r} is a {type(policy).__name__}, which has no predict(observation, ...).")
     if not takes(policy.predict, None, state=None, episode_start=None, deterministic=True):
         raise ValueError(f"The agent {name!r} needs predict(observation, state, episode_start, deterministic).")
     policy = as_it_learned(policy, lambda: env)
-    return policy if is_batched(policy) else RobotByRobot(policy)
+    return policy if isinstance(policy, LearnedPolicy | Searcher) else OwnPolicy(policy, name)
 
 
 def takes(function: Callable[..., Any], *arguments: Any, **named: Any) -> bool:
@@ -117,17 +117,19 @@ def takes(function: Callable[..., Any], *arguments: Any, **named: Any) -> bool:
     return True
 
 
-class RobotByRobot:
-    """Policy that has another one answer for every robot of a batch; its other attributes are those of that policy.
+class OwnPolicy:
+    """Policy of somebody's code, whose failures are sentences; its other attributes are those of that policy.
 
-    Every robot has a copy of the policy, a new one in every episode, so that what a policy remembers is of its robot.
-    One that cannot be copied is shared.
+    One that is not batched answers for every robot of a batch: each has a copy of it, a new one in every episode, so
+    that what a policy remembers is of its robot. One that cannot be copied is shared.
+
+    name: "module:function" that it is of.
     """
 
     batched = True
 
-    def __init__(self, policy: Policy):
-        self._policy, self._copies = policy, dict[int, Any]()
+    def __init__(self, policy: Policy, name: str):
+        self._policy, self._name, self._copies = policy, name, dict[int, Any]()
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
@@ -137,9 +139,14 @@ class RobotByRobot:
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
     ) -> tuple[Any, Any]:
-        """Action and state of one robot, or actions, shape (n, ...), and a list of states of n robots."""
-        if np.ndim(observation) == 1:
-            return answer_of(self._policy.predict(observation, state, episode_start, deterministic))
+        """Action and state of one robot, or actions, shape (n, ...), and states of n robots."""
+        with own_code(self._name):
+            if np.ndim(observation) == 1 or is_batched(self._policy):
+                return answer_of(self._policy.predict(observation, state, episode_start, deterministic))
+            return self._of_each(observation, state, episode_start, deterministic)
+
+    def _of_each(self, observation: Any, state: Any, episode_start: Any, deterministic: bool) -> tuple[Any, Any]:
+        """Actions of n robots, shape (n, ...), and a list of their states."""
         n = len(observation)
         begins = np.full(n, state is None) if episode_start is None else np.asarray(episode_start, bool)
         states = [None] * n if state is None else list(state)
@@ -274,8 +281,7 @@ def fitting_agents(
     agents, left_out = dict[str, Policy](), list[str]()
     for label, make in makers.items():
         try:
-            with own_code(label):
-                policy = make()
+            policy = make()
             sight = learned.camera_of(policy).get("sight")
             n_seen = None if sight is None else policy.description.observation_size  # type: ignore[attr-defined]
             require_fit(policy, known, actions_of(policy, known.robot.n_limbs), decision_period, n_seen, sight=sight)

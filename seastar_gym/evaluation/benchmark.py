@@ -23,7 +23,7 @@ import numpy as np
 
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import reason_of
-from seastar_gym.controllers.registry import is_file, is_function, load_agent, own_code
+from seastar_gym.controllers.registry import is_file, is_function, load_agent
 from seastar_gym.envs import IDS
 from seastar_gym.envs.instances import SIZES, Split
 from seastar_gym.envs.robots import Task
@@ -210,13 +210,11 @@ def measured(
     names = [names] if isinstance(names, str) else names
     env, cells = env_of(id, task=task_of(id), split="test", fidelity=FIDELITY), list[Cell]()
     for seed, name in enumerate(names):
-        with own_code(name):
-            policy = load_agent(name, env)
+        policy = load_agent(name, env)
         length = length_of(policy) if not (is_file(name) or is_function(name)) else decisions
         require_length(name, policy, length)
         batch = make(id, EPISODES, "test", threads, actions=require_seen(policy, env))
-        with own_code(name):
-            reached = swum(batch, policy, first)
+        reached = swum(batch, policy, first)
         cells.append(Cell(agent, track_of(policy), id, seed, contract(id), first, **reached, decisions=length))
     env.close()
     return cells

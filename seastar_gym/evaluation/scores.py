@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seastar_gym.controllers.registry import is_file, learned_file, load_agent, own_code
+from seastar_gym.controllers.registry import is_file, learned_file, load_agent
 from seastar_gym.evaluation.results import Estimate, mean_with_interval, number, over_trainings, text_table, write_csv
 from seastar_gym.evaluation.rollout import env_of, held_out, measure_of, swim_episodes
 from seastar_gym.evaluation.swim import HELD_OUT_SEED
@@ -86,9 +86,8 @@ def measured(
     measure, found = measure_of(env), dict[int, tuple[Any, ...]]()
     for turn, name in enumerate(names[:seeds]):
         own = list(range(HELD_OUT_SEED, HELD_OUT_SEED + seeds))[turn :: len(names)]
-        with own_code(name):
-            policy = load_agent(name, env, own[0])
-            swum = swim_episodes(task, policy, own, fidelity=fidelity, max_decisions=max_decisions, threads=threads)
+        policy = load_agent(name, env, own[0])
+        swum = swim_episodes(task, policy, own, fidelity=fidelity, max_decisions=max_decisions, threads=threads)
         rows = (column.tolist() for column in (measure.of(swum), swum.success, swum.returns, swum.decisions))
         found |= zip(own, zip(*rows, strict=True), strict=True)
     columns: Any = map(list, zip(*(found[seed] for seed in sorted(found)), strict=True))

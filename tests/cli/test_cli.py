@@ -134,6 +134,8 @@ REFUSED = [
     ("evaluate --agents runs", "runs is no file of a policy, such as runs/policy.safetensors."),
     ("evaluate --agents pentagram", f"Unknown scripted agent 'pentagram'|{NAMES}"),
     ("evaluate --agents no_such_module:make", "No module named 'no_such_module'"),
+    ("evaluate --agents own_agents:Failing", "own_agents.py, line 40: ZeroDivisionError: division by zero."),
+    ("swim --agent own_agents:FailingRobot --film x.gif", "own_agents.py, line 40: ZeroDivisionError: division"),
     ("evaluate --agents own_agents:missing", "the module own_agents has no function missing"),
     ("evaluate --agents own_agents:number", "the module own_agents has no function number"),
     ("evaluate --agents own_agents:nothing", "is a int, which has no predict"),

@@ -33,6 +33,19 @@ class OfOneArgument(Towards):
         return self.action, None
 
 
+class Failing(Towards):
+    """Divides by zero."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        return 1 / 0, state
+
+
+class FailingRobot(Failing):
+    """Divides by zero, for one robot."""
+
+    batched = False
+
+
 class Stateless(Towards):
     """Returns the action alone."""
 
