@@ -46,6 +46,11 @@ class FailingRobot(Failing):
     batched = False
 
 
+def unborn(env):
+    """Fails before there is a policy."""
+    raise KeyError("no weights")
+
+
 class Stateless(Towards):
     """Returns the action alone."""
 

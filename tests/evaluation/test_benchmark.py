@@ -1,6 +1,7 @@
 """The benchmark: one contract for an id, results that merge, and tables that say how many seeds they have."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -160,36 +161,15 @@ def test_rules_have_no_length_and_what_the_package_brings_its_own(name, length, 
     assert found.decisions == length
 
 
-FAILING = """
-from seastar_gym.controllers.open_loop import scripted
-
-def good(env):
-    return scripted("pentagon")
-
-def late(env):
-    return Late()
-
-class Late:
-    def predict(self, observation, state=None, episode_start=None, deterministic=False):
-        return 1 / 0, state
-
-def early(env):
-    return {}["key"]
-"""
-
-
 @pytest.mark.parametrize("mode", ["--benchmark", "--seeds=2"])
-def test_code_of_ones_own_that_fails_is_told_with_its_line_and_others_go_on(mode, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_code_of_ones_own_that_fails_is_told_with_its_line_and_others_go_on(mode, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "controllers")
     monkeypatch.setattr(benchmark, "EPISODES", 2)
-    name = f"failing{mode[2:6]}"
-    (tmp_path / f"{name}.py").write_text(FAILING)
-    agents = [f"{function}={name}:{function}" for function in ("late", "early", "good")]
-    assert main(["evaluate", mode, "--task", STATION, "--agents", *agents]) == 2
+    agents = [f"{name}=own_agents:{name}" for name in ("Failing", "FailingRobot", "unborn")]
+    assert main(["evaluate", mode, "--task", STATION, "--agents", *agents, f"good={__name__}:pentagon"]) == 2
     out, told = capsys.readouterr()
-    assert told.count("\n") == 2 and "good" in out
-    for agent, line, failure in (("late", 12, "ZeroDivisionError"), ("early", 15, "KeyError")):
-        assert f"{agent}" in told and f"{name}.py, line {line}: {failure}: " in told
+    lines = [line.partition("own_agents.py, line ")[2] for line in told.splitlines()]
+    assert lines == ["40: ZeroDivisionError: division by zero."] * 2 + ["51: KeyError: 'no weights'."] and "good" in out
 
 
 REFUSED = {
