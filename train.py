@@ -96,13 +96,13 @@ def train(options: Options, robot: Robot, folder: Path, stop: Callable[[], bool]
 
 
 def learner_in(folder: Path, env: BatchVecEnv, device: str) -> PPO:
-    """Learner of the run in a folder. ValueError or FileNotFoundError where it is damaged, with what to do about it."""
+    """Learner of the run in a folder. Where it is damaged or missing, a ValueError says which checkpoint there is."""
     try:
         return resume(folder / "model.zip", env, device)
     except (FileNotFoundError, ValueError) as damaged:
         if (last := max((folder / "checkpoints").glob("*.zip"), default=None)) is None:
             raise
-        raise type(damaged)(f"{damaged} The last checkpoint is {last}: put a copy in its place.") from damaged
+        raise ValueError(f"{damaged} The last checkpoint is {last}: put a copy in its place.") from damaged
 
 
 def describe(options: Options, robot: Robot, folder: Path, trained: int, watch: Watch) -> Remarks:

@@ -335,5 +335,5 @@ def train_cells(options: BenchmarkOptions) -> int:
         print("Stopped: the same command goes on with the cells that are missing.", flush=True)
         return 130
     if lost:
-        print(f"{lost} cells have no result: the same command trains them again.", flush=True)
+        print(f"Cells without a result: {lost}. The same command trains them again.", flush=True)
     return int(lost > 0)

@@ -113,5 +113,5 @@ def test_a_cell_that_a_worker_lost_is_named_and_trained_by_the_same_command(tmp_
     monkeypatch.setattr("agents.methods.executor_of", lambda options: contextlib.nullcontext(executor))
     first, second = (training.file(tmp_path) for training in options.cells)
     assert methods.train_cells(options) == 1
-    assert f"{second}: Its worker was lost" in (told := capsys.readouterr().out) and "1 cells have no result" in told
+    assert f"{second}: Its worker was lost" in (told := capsys.readouterr().out) and "without a result: 1." in told
     assert first.is_file() and first.with_suffix(".zip").read_bytes() == b"model" and not second.exists()
