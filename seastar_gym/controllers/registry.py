@@ -87,11 +87,11 @@ def call_function(name: str, env: OneRobotEnv) -> Policy:
     """
     module, _, function = name.partition(":")
     find_modules_in(Path.cwd())
-    try:
-        with own_code(name):
+    with own_code(name):
+        try:
             make = getattr(importlib.import_module(module), function, None)
-    except ModuleNotFoundError as missing:
-        raise ValueError(f"There is no agent {name!r}: {missing}.") from missing
+        except ModuleNotFoundError as missing:
+            raise ValueError(f"There is no agent {name!r}: {missing}.") from missing
     if not callable(make):
         raise ValueError(f"There is no agent {name!r}: the module {module} has no function {function}.")
     if not takes(make, env):
