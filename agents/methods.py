@@ -324,7 +324,7 @@ def train_cells(options: BenchmarkOptions) -> int:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     require_writable(options.out)
     cells, lost = options.cells, 0
-    print(f"{len(cells)} cells to train", flush=True)
+    print(f"Cells to train: {len(cells)}", flush=True)
     try:
         with executor_of(options) as executor:
             for training, files, problem in outcomes(executor, train_cell, cells, max(1, len(cells))):

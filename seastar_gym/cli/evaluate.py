@@ -283,6 +283,8 @@ def known_cells(files: Sequence[Path], ids: Sequence[str], out: Path | None) -> 
     """Cells of ids in files, and all that a folder of results has; the folder is made, and can be written to."""
     parts = {str(file): [cell for cell in benchmark.cells_in(file) if cell.id in ids] for file in files}
     if out is not None:
+        if out.suffix in benchmark.FORMS:
+            raise ValueError(f"The benchmark writes several files: --out is a folder for them, not {out.name}.")
         require_writable(out)
         if (kept := out / benchmark.RESULTS).exists():
             parts[str(kept)] = benchmark.cells_in(kept)

@@ -109,7 +109,7 @@ def require_fit(
     if ours is not None and not math.isclose(ours, theirs):  # robots have other wires then, and show other numbers
         raise ValueError(
             f"The policy decides every {ours:g} s, the environment every {theirs:g} s: make them equal, by "
-            "decision_period or --decision-period."
+            "decision_period or --decision-period, or take the id that it learned for."
         )
     if hasattr(policy, "require_fit"):
         policy.require_fit(scene, actions, n_seen, task, sight)

@@ -243,6 +243,8 @@ def score(cell: Cell) -> float:
 
 RESULTS = "benchmark.json"
 """Name of the file of them in a folder."""
+FORMS = (".json", ".csv", ".md", ".tex", ".npz")
+"""Endings of all files that `write_all` writes there."""
 
 
 def write(cells: Sequence[Cell], file: Path, **about: Any) -> None:

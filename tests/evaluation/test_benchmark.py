@@ -114,8 +114,9 @@ def test_an_out_that_is_damaged_or_no_folder_is_refused_before_anything_swims(te
     assert main(["evaluate", "--merge", str(tmp_path / "benchmark.json")]) == 2
     assert told in (said := capsys.readouterr().err) and said.count("\n") == 1
     assert (tmp_path / "benchmark.json").read_text() == text
+    (tmp_path / "mine").write_text(text)
     with pytest.raises(FileExistsError):
-        main(["evaluate", "--benchmark", "--agents", "greedy", "--out", str(tmp_path / "benchmark.json")])
+        main(["evaluate", "--benchmark", "--agents", "greedy", "--out", str(tmp_path / "mine")])
 
 
 def test_results_join_those_of_a_folder_and_files_are_shown_by_ids(tmp_path, scales, monkeypatch, capsys):
@@ -178,6 +179,7 @@ REFUSED = {
     "called greedy": ["--agents", "greedy", "greedy"], "lacks a label": ["--agents", "=a.zip"],
     "--decisions": ["--decisions", "0"], "name them": ["--decisions", "10"],
     "mine has ./a.zip twice": ["--agents", "mine=a.zip,b.zip,./a.zip"],
+    "--out is a folder for them, not mine.csv": ["--agents", "greedy", "--out", "mine.csv"],
 }  # fmt: skip
 
 

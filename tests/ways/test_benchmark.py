@@ -16,7 +16,7 @@ def test_a_row_is_trained_after_a_stop_evaluated_and_merged(story):
     assert files[0].is_file() and not files[1].is_file()
     first = files[0].read_bytes()
     story.types(f"{train} --seeds 0 1")
-    assert "1 cells to train" in story.told and files[0].read_bytes() == first and files[1].is_file()
+    assert "Cells to train: 1" in story.told and files[0].read_bytes() == first and files[1].is_file()
     evaluate = command("docs/benchmark.md", "seastar evaluate --benchmark", "--agents").partition("--agents")[0]
     zips = ",".join(str(file.with_suffix(".zip").relative_to(story.folder)) for file in files)
     story.types(f"{evaluate} --agents mine={zips} --decisions 2048 --out runs/mine")
