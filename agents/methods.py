@@ -189,6 +189,8 @@ class BenchmarkOptions:
     """Ray, Dask: HOST:PORT of the head; by default a cluster of this machine."""
     partition: str | None = None
     """SLURM: partition."""
+    minutes: int | None = None
+    """SLURM: time limit of a cell [min]; by default 60."""
     out: Path = Path("runs/benchmark")
     """Folder of the cells."""
 

@@ -92,7 +92,7 @@ def test_a_command_without_its_extra_says_how_to_get_it(extra, missing, command,
 def test_an_executor_without_its_extra_says_how_to_get_it(extra, module, tmp_path, monkeypatch):
     executors = pytest.importorskip("seastar_gym.sweep.executors")
     monkeypatch.setitem(sys.modules, module, None)
-    options = Namespace(executor=extra, workers=None, address=None, partition=None, out=tmp_path)
+    options = Namespace(executor=extra, workers=None, address=None, partition=None, minutes=None, out=tmp_path)
     install = re.escape(f'need {module}: pip install "seastar-gym[{extra}]".')
     with pytest.raises(MissingExtra, match=install), executors.executor_of(options):
         pass

@@ -106,7 +106,9 @@ def parser() -> argparse.ArgumentParser:
                        f"--benchmark length of the trainings (default: {benchmark.BUDGETS[0]})")  # fmt: skip
     tasks.add_argument("--benchmark", nargs="?", const="test", choices=tuple(benchmark.FIRST),
                        help="the protocol of docs/benchmark.md; check: on its other 64 episodes")  # fmt: skip
-    tasks.add_argument("--merge", nargs="+", type=Path, default=[], help="results of --benchmark to show as well")
+    tasks.add_argument(
+        "--merge", nargs="+", type=Path, default=[], help="results of --benchmark to show as well, files or folders"
+    )
     many.add_argument("--num-threads", type=int, help="threads of the simulator (default: one for every processor)")
     return found
 
@@ -281,6 +283,7 @@ def measured_on_benchmark(options: argparse.Namespace) -> int:
 
 def known_cells(files: Sequence[Path], ids: Sequence[str], out: Path | None) -> list[Cell]:
     """Cells of ids in files, and all that a folder of results has; the folder is made, and can be written to."""
+    files = [file / benchmark.RESULTS if file.is_dir() else file for file in files]
     parts = {str(file): [cell for cell in benchmark.cells_in(file) if cell.id in ids] for file in files}
     if out is not None:
         if out.suffix in benchmark.FORMS:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.base import JUMP, Actuator, ActuatorBase, complete
-from seastar_gym.scene.checks import require_choice, require_unmasked
+from seastar_gym.scene.checks import require_choice, require_unmasked, shown
 from seastar_gym.scene.number import batch_size
 from seastar_gym.scene.numerics import require_duration
 
@@ -111,7 +111,9 @@ def to_commands(actions: Actions, n_limbs: int, action: object, n_robots: int) -
             f"not {array.dtype} of shape {array.shape}."
         )
     if np.maximum.reduce(array.astype(np.uint64), axis=None) >= len(table):  # numbers below 0 are large ones then
-        raise ValueError(f'With actions="{actions}" an action is from 0 to {len(table) - 1}, not {array.tolist()}.')
+        raise ValueError(
+            f'With actions="{actions}" an action is from 0 to {len(table) - 1}, not {shown(array.tolist())}.'
+        )
     return np.asarray(table[array])
 
 
@@ -124,7 +126,7 @@ def _checked_shares(array: NDArray[Any], shape: tuple[int, int]) -> NDArray[np.f
         )
     shares = array.astype(np.float64)
     if not (np.abs(shares) <= 1.0 + ROUNDING).all():
-        raise ValueError(f'With actions="continuous" an action is numbers from -1 to 1, not {array.tolist()}.')
+        raise ValueError(f'With actions="continuous" an action is numbers from -1 to 1, not {shown(array.tolist())}.')
     return np.clip(shares, -1.0, 1.0, out=shares)
 
 

@@ -9,12 +9,13 @@ of a batch.
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import math
 import runpy
 import sys
 import traceback
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from operator import itemgetter
@@ -42,7 +43,7 @@ from seastar_gym.scene.number import Numbers, as_tuple, batch_size, check_number
 from seastar_gym.scene.numerics import DEFAULT, DEFAULT_FIDELITY, MAX_STEPS, PRESETS, Fidelity, Numerics
 from seastar_gym.scene.robot import Seastar
 from seastar_gym.scene.section import Disc
-from seastar_gym.scene.serial import from_dict, is_term, register_part, scene_html, short_repr, to_dict
+from seastar_gym.scene.serial import FROM_FILES, from_dict, is_term, register_part, scene_html, short_repr, to_dict
 from seastar_gym.scene.shape import cross_at_rest, n_hub_hinges, natural_hub_angle, touching_at_rest, turn_per_hinge
 from seastar_gym.scene.water import Water
 
@@ -451,7 +452,7 @@ def load_scene(file: str | PathLike[str] | None) -> Scene:
             raise ValueError(f"{file} is no scene: {str(wrong).rstrip('.')}.") from wrong
     find_modules_in(file.parent, Path.cwd())
     try:
-        found = runpy.run_path(str(file)).get("scene")
+        found = _run(file).get("scene")
     except SyntaxError as wrong:
         raise ValueError(f"{file}, line {wrong.lineno}, is not Python: {wrong.msg}.") from wrong
     except ValueError:
@@ -461,6 +462,28 @@ def load_scene(file: str | PathLike[str] | None) -> Scene:
     if not isinstance(found, Scene):
         raise ValueError(f"{file} must define `scene`, a Scene.")
     return found
+
+
+def _run(file: Path) -> dict[str, Any]:
+    """Names that a file of Python defines. It is run as the module of its name, where Python would find that module.
+
+    Other processes find the classes of a scene by the names of their modules.
+    """
+    name, spec = file.stem, None
+    with suppress(ImportError, ValueError):  # no module has such a name
+        spec = importlib.util.find_spec(name)
+    if spec is None or spec.origin is None or Path(spec.origin).resolve() != file.resolve():
+        return runpy.run_path(str(file))
+    module, before = importlib.util.module_from_spec(spec), sys.modules.get(name)
+    sys.modules[name] = module
+    FROM_FILES.add(name)
+    try:
+        exec(compile(file.read_bytes(), str(file), "exec"), vars(module))
+    except BaseException:
+        sys.modules.pop(name)
+        sys.modules.update({} if before is None else {name: before})
+        raise
+    return vars(module)
 
 
 def find_modules_in(*folders: Path) -> None:

@@ -75,6 +75,9 @@ def _spaced(name: str, words: list[str]) -> Axis:
             f"{name} is written LOW:HIGH, LOW:HIGH:COUNT or either with :log, not {shown(':'.join(words))}."
         )
     low, high, *count = numbers
+    are_whole = not is_log and all(isinstance(number, int) for number in numbers)
+    if are_whole and count and 2 <= count[0] <= high - low + 1 and (high - low) % (count[0] - 1) == 0:
+        return Choices(name, tuple(range(low, high + 1, (high - low) // (count[0] - 1))))
     axis = Range(name, float(low), float(high), is_log)
     if not count:
         return axis
@@ -118,7 +121,9 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, default=Path("runs/sweep"), help=f"folder of the results {DEFAULT}")
     parser.add_argument("--scene", type=Path, help="file of the scene, .py or .json (default: the chapter's at `fast`)")
     parser.add_argument("--gait", default="straight", help=f"what robots do, unless an axis says it {DEFAULT}")
-    parser.add_argument("--settling", type=int, default=2, help=f"strokes before the measurement {DEFAULT}")
+    parser.add_argument(
+        "--settling", type=int, default=2, help=f"strokes before the measurement, or seconds of gaits in time {DEFAULT}"
+    )
     parser.add_argument("--measured", type=int, default=8, help=f"strokes of the measurement {DEFAULT}")
     parser.add_argument("--path", default="pentagon", help=f"controllers: {PATH_HELP} {DEFAULT}")
     parser.add_argument("--seconds", type=float, default=TIME_LIMIT, help=f"controllers: time limit [s] {DEFAULT}")
@@ -154,7 +159,7 @@ def bar_of(total: int, bar: Any) -> Callable[[Progress], None]:
         bar.total = total - tally.kept
         bar.set_postfix_str(
             f"{tally.designs / seconds:.0f} designs/s"
-            + (f", {tally.intervals / seconds:.0f} strokes/s" if tally.intervals else "")
+            + (f", {tally.strokes / seconds:.0f} strokes/s" if tally.strokes else "")
             + (f", {tally.losses} lost" if tally.losses else ""),
             refresh=False,
         )
@@ -174,9 +179,14 @@ def as_text(tally: Progress, out: Path) -> str:
     return text
 
 
-def sweep_of(options: argparse.Namespace, axes: tuple[Axis, ...]) -> Sweep:
-    """Sweep that the options describe."""
+def sweep_of(options: argparse.Namespace) -> Sweep:
+    """Sweep that the options describe. ValueError for what they cannot mean."""
     scene = Scene.preset("fast") if options.scene is None else load_scene(options.scene)
+    axes = tuple(map(axis_of, options.axes))  # after the scene's file, which may register parts
+    if options.latin and options.optuna:
+        raise ValueError("Designs are drawn by --latin or searched by --optuna: leave one out.")
+    if ranges := [axis.name for axis in axes if isinstance(axis, Range) and not options.latin + options.optuna]:
+        raise ValueError(f"{ranges[0]} has a range: say --latin N or --optuna N, or how many values, LOW:HIGH:COUNT.")
     return Sweep(
         scene, axes, options.gait, options.settling, options.measured,
         1 if options.optuna and any(isinstance(axis, Range) for axis in axes) else options.latin,
@@ -234,7 +244,8 @@ def keep_best(options: argparse.Namespace, batches: Iterable[str]) -> None:
         file = file.with_suffix(".py")
         write_atomically(file, REGISTERED.format(file=str(options.scene.absolute()), scene=best.scene.to_dict()))
     unit = (UNITS | OF_CONTROLLERS)[options.objective]
-    print(f"Best {options.objective}: {best.value:.6g} {unit}, of {design}. Its scene: {file}.")
+    of = f", of {design}" if design else ""
+    print(f"Best {options.objective}: {best.value:.6g} {unit}{of}. Its scene: {file}.")
 
 
 def search(sweep: Sweep, options: argparse.Namespace) -> int:
@@ -261,7 +272,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def work() -> int:
         require_choice("--objective", options.objective, tuple(UNITS | OF_CONTROLLERS))
-        sweep = sweep_of(options, tuple(map(axis_of, options.axes)))
+        sweep = sweep_of(options)
         return search(sweep, options) if options.optuna else run_sweep(sweep, options)
 
     try:

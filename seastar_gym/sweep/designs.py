@@ -156,6 +156,11 @@ class Gait(NamedTuple):
     commands: tuple[tuple[float, ...], ...]
     interval: float | None = None
 
+    @property
+    def per_stroke(self) -> int:
+        """Intervals that count as a stroke: one, or all of a gait in time, which lasts a second."""
+        return 1 if self.interval is None else len(self.commands)
+
 
 TIMED = "lagged", "thrifty"
 """Gaits in time."""
@@ -191,6 +196,8 @@ def _stroke(text: str, n_limbs: int) -> gaits.Floats:
         if sign not in ("+", "-") or not number.isdecimal() or not 1 <= int(number) <= n_limbs:
             known = ", ".join(["straight", *TIMED])
             raise ValueError(f"A gait is one of {known}, or limbs of {n_limbs} such as 1+,2-, not {shown(text)}.")
+        if command[0, int(number) - 1]:
+            raise ValueError(f"A gait turns a limb one way in a stroke, and {shown(text)} names limb {number} twice.")
         command[0, int(number) - 1] = 1.0 if sign == "+" else -1.0
     return command
 
@@ -267,7 +274,7 @@ def _digest(files: Iterable[Path]) -> str:
     return digest.hexdigest()
 
 
-FORM = 2
+FORM = 3
 """Form of the results. Parts of another form are other parts."""
 
 
@@ -275,7 +282,7 @@ FORM = 2
 class Configuration:
     """Scene and gait, or controller, of a lane batch, before its robots get their own numbers.
 
-    gait: Of robots without a controller. settling, measured: Its intervals before and during the measurement.
+    gait: Of robots without a controller. settling, measured: Its strokes before and during the measurement.
     labels: What was chosen, by the name of the axis: texts or numbers.
     controller: Controller, None for a gait.
     """
@@ -299,8 +306,8 @@ class Configuration:
         return json.dumps(told, sort_keys=True)
 
     @property
-    def intervals(self) -> int:
-        """Intervals, such as strokes, that every robot swims; 0 for controllers, which end when they arrive."""
+    def strokes(self) -> int:
+        """Strokes that every robot swims; 0 for controllers, which end when they arrive."""
         return self.settling + self.measured if self.controller is None else 0
 
     @cached_property
@@ -356,11 +363,11 @@ class Sweep:
     scene: Scene for one robot that is varied.
     axes: What differs.
     gait: What every robot does unless an axis says it, see `gait_of`.
-    settling, measured: Intervals of the gait, such as strokes, before and during the measurement.
+    settling, measured: Strokes before and during the measurement; of gaits in time, their periods of a second.
     samples: Designs of the Latin hypercube.
     seed: Of the Latin hypercube.
     robots: Designs of a batch at most.
-    route: What controllers swim, if there is an axis of them. Gaits and their intervals are of no matter then.
+    route: What controllers swim, if there is an axis of them. Gaits and their strokes are of no matter then.
     """
 
     scene: Scene

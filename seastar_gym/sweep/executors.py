@@ -5,11 +5,12 @@ Results are the same bits on each. A worker that is lost costs the batch that it
 
 import argparse
 import os
+import re
 import signal
 import socket
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from multiprocessing import get_context, parent_process
 from pathlib import Path
@@ -28,8 +29,11 @@ Work = Callable[[Batch], bytes]
 """What is done with a batch: a function that can be sent to another process, and that returns a file."""
 KNOWN_FAILURES = (ValueError, OSError, MemoryError, ArithmeticError)
 """Failures of a batch that leave its worker sound."""
+COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 PATIENCE = 10.0
 """Time that the head of a cluster has to answer [s]."""
+LOOK = 1.0
+"""Time between looks for the end of a job [s]."""
 
 
 class Outcome(NamedTuple, Generic[Task, Part]):
@@ -49,6 +53,8 @@ def outcomes(
 ) -> Iterator[Outcome[Task, Part]]:
     """Outcomes of all tasks, as they are done. The next task is taken when there is room for it.
 
+    ValueError if the executor cancels a task: those that follow might never end.
+
     executor: None runs them here, one after the other. at_once: Tasks under way at most.
     """
     if executor is None:
@@ -58,8 +64,15 @@ def outcomes(
 
     def next_done() -> Outcome[Task, Part]:
         future = done.get()
-        task, lost = pending.pop(future), future.exception()
-        return Outcome(task, None, f"Its worker was lost: {sentence_of(lost)}") if lost else future.result()
+        task = pending.pop(future)
+        try:
+            return future.result()
+        except CancelledError:  # futures of what comes next might never end
+            raise ValueError(
+                "The executor has cancelled its tasks, as one does whose cluster has lost its head."
+            ) from None
+        except Exception as lost:  # of whatever kind a worker's end is
+            return Outcome(task, None, f"Its worker was lost: {sentence_of(lost)}")
 
     try:
         for task in tasks:
@@ -87,7 +100,10 @@ def sentence_of(failure: BaseException) -> str:
     """A failure on one line."""
     if isinstance(failure, OSError):
         return refused_by_disk(failure)
-    return " ".join(str(failure).split())[:200] or type(failure).__name__
+    text = COLOUR.sub("", str(failure))
+    if "Traceback" in text:  # of a worker: what counts is its end
+        text = text.strip().splitlines()[-1]
+    return " ".join(text.split())[:200] or type(failure).__name__
 
 
 class Processes(ThreadPoolExecutor):
@@ -160,7 +176,10 @@ class RayTasks(Executor):
         try:
             ray.init(address or "local", log_to_driver=False, logging_level="error", **own)
         except (ConnectionError, RuntimeError) as refused:
-            raise ValueError(f"Ray does not start, or is not at {address}: {sentence_of(refused)}") from None
+            raise ValueError(
+                f"Ray does not start, or is not at {address}: {sentence_of(refused)} (a head with tokens needs "
+                "RAY_AUTH_MODE=token)"
+            ) from None
         self._ray = ray
         self._call = ray.remote(num_cpus=1, max_retries=0)(lambda work, *arguments: work(*arguments))
 
@@ -189,11 +208,27 @@ class SlurmJobs(ThreadPoolExecutor):
         except RuntimeError as refused:
             raise ValueError(f"There is no SLURM here: {sentence_of(refused)}") from None
         self._jobs.update_parameters(**parameters)
+        self._ended = threading.Event()
         super().__init__(jobs)
 
     def submit(self, work: Any, /, *arguments: Any, **named: Any) -> Future[Any]:
         """Run a function as a job, for which a thread waits."""
-        return super().submit(lambda: self._jobs.submit(work, *arguments, **named).result())
+        return super().submit(self._as_job, work, *arguments, **named)
+
+    def _as_job(self, work: Any, *arguments: Any, **named: Any) -> Any:
+        """What a thread does: its job works for it, and is cancelled at the end."""
+        job = self._jobs.submit(work, *arguments, **named)
+        while not job.done():
+            if self._ended.wait(LOOK):
+                job.cancel()
+                raise CancelledError("The job was cancelled.")
+        return job.result()
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Wait for the jobs, or cancel them if futures are to be cancelled."""
+        if cancel_futures:
+            self._ended.set()
+        super().shutdown(wait, cancel_futures=cancel_futures)
 
 
 def dask_client(address: str | None = None, workers: int | None = None) -> Any:
@@ -204,18 +239,23 @@ def dask_client(address: str | None = None, workers: int | None = None) -> Any:
     from distributed import Client
 
     if address:
-        require_reachable(address.removeprefix("tcp://"))
-    own: dict[str, Any] = {} if address else {"n_workers": workers or processors(), "threads_per_worker": 1}
-    return Client(address, **own)
+        require_reachable(address.removeprefix("tcp://"), speaks_first=True)
+        return Client(address, timeout=PATIENCE)
+    return Client(n_workers=workers or processors(), threads_per_worker=1)
 
 
-def require_reachable(address: str) -> None:
-    """ValueError unless something listens at "HOST:PORT": clusters themselves would try for minutes."""
+def require_reachable(address: str, speaks_first: bool = False) -> None:
+    """ValueError unless something listens at "HOST:PORT": clusters themselves would try for minutes.
+
+    speaks_first: Whether it must send something at once, as schedulers of Dask do, and web pages do not.
+    """
     host, _, port = address.rpartition(":")
     if not host or not port.isdecimal():
         raise ValueError(f"The address of a cluster is HOST:PORT, such as head:6379, not {shown(address)}.")
     try:
-        socket.create_connection((host, int(port)), timeout=PATIENCE).close()
+        with socket.create_connection((host, int(port)), timeout=PATIENCE) as there:
+            if speaks_first and not there.recv(1):
+                raise ConnectionError("it says nothing")
     except (OSError, OverflowError) as refused:
         raise ValueError(f"There is no cluster at {address}: {sentence_of(refused)}") from None
 
@@ -233,6 +273,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=int, help="batches at a time (default: one per processor; of SLURM, 64)")
     parser.add_argument("--address", help="Ray, Dask: HOST:PORT of the head (default: a cluster of this machine)")
     parser.add_argument("--partition", help="SLURM: partition")
+    parser.add_argument("--minutes", type=int, help="SLURM: time limit of a job [min] (default: 60)")
 
 
 @contextmanager
@@ -241,8 +282,12 @@ def executor_of(options: Any) -> Iterator[Executor | None]:
 
     options: What `add_options` adds, and the folder of results, `out`.
     """
-    if options.workers is not None:
-        require_count("--workers", options.workers, 1, 1_000_000)
+    for name, largest in {"workers": 1_000_000, "minutes": 100_000}.items():
+        if getattr(options, name) is not None:
+            require_count(f"--{name}", getattr(options, name), 1, largest)
+    for name, heeded in {"address": ("ray", "dask"), "partition": ("slurm",), "minutes": ("slurm",)}.items():
+        if getattr(options, name) is not None and options.executor not in heeded:
+            raise ValueError(f"--{name} is for --executor {' or '.join(heeded)}, not {options.executor}.")
     executor: Executor
     match options.executor:
         case "here":
@@ -258,8 +303,9 @@ def executor_of(options: Any) -> Iterator[Executor | None]:
             executor = RayTasks(options.address, options.workers)
         case "slurm":
             require_extra("Runs on SLURM", "slurm", "submitit")
-            partition = {} if options.partition is None else {"slurm_partition": options.partition}
-            executor = SlurmJobs(within(options.out, "slurm"), options.workers or 64, cpus_per_task=1, **partition)
+            own: dict[str, Any] = {"timeout_min": 60 if options.minutes is None else options.minutes}
+            own |= {} if options.partition is None else {"slurm_partition": options.partition}
+            executor = SlurmJobs(within(options.out, "slurm"), options.workers or 64, cpus_per_task=1, **own)
         case _:
             executor = Processes(options.workers)
     try:

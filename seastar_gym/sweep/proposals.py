@@ -21,7 +21,16 @@ from seastar_gym.process import processors
 from seastar_gym.scene.checks import require_choice, require_count, require_number
 from seastar_gym.sweep.designs import Batch, Range, Sweep
 from seastar_gym.sweep.executors import Done, Work, outcomes, sentence_of
-from seastar_gym.sweep.run import OnProgress, Progress, ResultFiles, result_file_of, units_of
+from seastar_gym.sweep.run import (
+    COUNTING,
+    UNWRITTEN,
+    OnProgress,
+    Progress,
+    ResultFiles,
+    result_file_of,
+    units_of,
+    worth,
+)
 
 if TYPE_CHECKING:
     import optuna
@@ -81,18 +90,23 @@ def explore(
 ) -> optuna.Study:  # fmt: skip
     """Propose and simulate until a study has results of so many designs. Every batch has `sweep.robots` at most.
 
+    ValueError if UNWRITTEN batches in a row have no result: the next ones would have none, either.
+
     executor, work, at_once: As of `run`, but proposals depend on results: None means a batch for every processor.
     """
     require_count("designs", designs, 1, 10_000_000)
     proposals = Proposals(sweep, study_of(sweep, search, storage), search, designs)
-    parts, tally = ResultFiles(folder), Progress()
+    parts, tally, in_a_row = ResultFiles(folder), Progress(), 0
     for outcome in outcomes(executor, work, proposals.batches(), at_once or processors()):
         if outcome.part is None:
-            tally.losses += 1
+            tally.losses, in_a_row = tally.losses + 1, in_a_row + 1
         else:
             parts.write(outcome.task.name, outcome.part)
             tally.count(outcome.task)
+            in_a_row = 0
         proposals.tell(outcome)
+        if in_a_row == UNWRITTEN:
+            raise ValueError(f"{UNWRITTEN} batches in a row have no result, the last one so: {outcome.problem}")
         if progress is not None:
             progress(tally)
     return proposals.study
@@ -162,14 +176,10 @@ class Proposals:
             for trial in trials:
                 put_back(self.study, trial.number)
             return
-        worst = -np.inf if self._search.is_largest_best else np.inf  # of designs without the objective, such as a time
-        for trial, value in zip(trials, _column(outcome.part, self._search.objective), strict=True):
-            _tell(self.study, trial.number, worst if value is None or np.isnan(value) else value)
-
-
-def _column(part: bytes, name: str) -> list[float]:
-    values: list[float] = pa.parquet.read_table(pa.BufferReader(part), columns=[name]).column(name).to_pylist()
-    return values
+        objective, sign = self._search.objective, 1.0 if self._search.is_largest_best else -1.0
+        table = pa.parquet.read_table(pa.BufferReader(outcome.part), columns=[*{objective, *COUNTING}])
+        for trial, value in zip(trials, worth(table, objective, sign), strict=True):
+            _tell(self.study, trial.number, sign * float(value))
 
 
 def _count(study: optuna.Study, state: TrialState) -> int:

@@ -30,7 +30,7 @@ from seastar_gym.envs.robots import Robots
 from seastar_gym.envs.vector import ManyRobotsEnv
 from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.evaluation.rollout import rollout
-from seastar_gym.files import within, write_atomically
+from seastar_gym.files import require_writable, within, write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_callable, require_count, require_file, require_flag, require_kind, shown
 from seastar_gym.scene.number import numbers_of, unit_of, with_numbers
@@ -128,8 +128,9 @@ def repeat(scene: Scene, frame: Configuration, n_robots: int, device: str) -> di
     status, iterations, energy, work, moment = np.zeros((5, n_robots))
     angle = np.full(n_robots, np.inf)
     hub, heading = simulator.hub_position(), simulator.heading()
-    for k in range(frame.settling + frame.measured):
-        if k == frame.settling:
+    settling, measured = frame.settling * gait.per_stroke, frame.measured * gait.per_stroke
+    for k in range(settling + measured):
+        if k == settling:
             hub, heading, energy[:] = simulator.hub_position(), simulator.heading(), 0.0
             work[:] = moment[:] = 0.0
         report = simulator.advance(interval, np.tile(gait.commands[k % len(gait.commands)], (n_robots, 1)))
@@ -137,7 +138,7 @@ def repeat(scene: Scene, frame: Configuration, n_robots: int, device: str) -> di
         iterations, energy = iterations + report.newton_iterations, energy + report.energy
         work, moment = work + report.work, np.maximum(moment, report.peak_moment)
     way = (simulator.hub_position() - hub) @ [1.0, 1.0j] * np.exp(-1j * heading)
-    speed = np.abs(way) / (frame.measured * interval)
+    speed = np.abs(way) / (measured * interval)
     return {
         **ways(scene, speed, way, simulator.heading() - heading), "energy": energy, "work": work, "peak_moment": moment,
         "smallest_opening_angle": angle, "newton_iterations": iterations, "status": status,
@@ -249,7 +250,16 @@ def read_results(folder: str | os.PathLike[str]) -> Any:
 
     Parts that are damaged are left out with a warning: the same sweep simulates their batches again.
     """
-    return pa.concat_tables(list(_tables(folder)), promote_options="default")  # sweeps differ in their columns
+    tables = list(_tables(folder))  # which differ in their columns, and in whether labels are texts
+    texts = {field.name for table in tables for field in table.schema if pa.types.is_string(field.type)}
+    tables = [
+        table.cast(pa.schema(
+            [field.with_type(pa.string()) if field.name in texts else field for field in table.schema],
+            table.schema.metadata,
+        ))
+        for table in tables
+    ]  # fmt: skip
+    return pa.concat_tables(tables, promote_options="permissive")
 
 
 def _tables(folder: str | os.PathLike[str], batches: Container[str] | None = None) -> Iterator[Any]:
@@ -291,6 +301,17 @@ def best_result(folder: str | os.PathLike[str], objective: str = "speed", is_lar
     return judged(folder, objective, is_largest_best).best
 
 
+COUNTING = "smallest_opening_angle", "speed"
+"""Columns by which designs count: robots whose limbs crossed do not, nor those without speed."""
+
+
+def worth(table: Any, objective: str, sign: float) -> Floats:
+    """Objective of every design of a table, times the sign; minus infinity of those that do not count."""
+    angle, speed = (table[name].to_numpy() for name in COUNTING)
+    values = sign * table[objective].to_numpy().astype(float)
+    return np.where((angle >= 0.0) & (speed > 0.0) & ~np.isnan(values), values, -np.inf)
+
+
 def judged(
     folder: str | os.PathLike[str], objective: str, is_largest_best: bool, batches: Container[str] | None = None
 ) -> Judged:
@@ -303,9 +324,7 @@ def judged(
         without.update(table["status"].to_numpy().astype(int).tolist())
         if objective not in table.column_names:
             continue
-        values = sign * table[objective].to_numpy().astype(float)
-        angle, speed = table["smallest_opening_angle"].to_numpy(), table["speed"].to_numpy()
-        values[~((angle >= 0.0) & (speed > 0.0)) | np.isnan(values)] = -np.inf
+        values = worth(table, objective, sign)
         row = int(values.argmax())
         if values[row] > (-np.inf if best is None else sign * best.value):
             told = json.loads(table.schema.metadata[b"seastar_gym"])
@@ -332,7 +351,7 @@ class Progress:
     """Counts of a run.
 
     kept: Batches that had parts before. damaged: Parts that were damaged before, whose batches are run again.
-    done: Batches and, in them, designs and intervals (such as strokes) that were run.
+    done: Batches and, in them, designs and their strokes that were run.
     losses: Attempts that failed. problems: Why batches have no part after all attempts, by the name of the batch.
     """
 
@@ -340,7 +359,7 @@ class Progress:
     damaged: list[Path] = field(default_factory=list)
     done: int = 0
     designs: int = 0
-    intervals: int = 0
+    strokes: int = 0
     losses: int = 0
     problems: dict[str, str] = field(default_factory=dict)
 
@@ -348,7 +367,7 @@ class Progress:
         """Count a finished batch."""
         self.done += 1
         self.designs += batch.n_robots
-        self.intervals += batch.n_robots * batch.configuration.intervals
+        self.strokes += batch.n_robots * batch.configuration.strokes
 
 
 OnProgress = Callable[[Progress], None]
@@ -374,6 +393,7 @@ def run(
         require_kind("executor", executor, Executor, "an executor of concurrent.futures, such as Processes()")
     if progress is not None:
         require_callable("progress", progress)
+    require_writable(folder)
     parts, tally = ResultFiles(folder), Progress()
     waiting, lost = unfinished(batches, parts, tally), list[Done]()
     for _ in range(ATTEMPTS):

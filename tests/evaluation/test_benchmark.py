@@ -111,7 +111,7 @@ def test_an_out_that_is_damaged_or_no_folder_is_refused_before_anything_swims(te
     assert main(["evaluate", "--benchmark", "--agents", "greedy", "--out", str(tmp_path)]) == 2
     assert "benchmark.json is no " in capsys.readouterr().err
     told = "benchmark.json is no file of the benchmark: " if '"curve"' in text else "benchmark.json is no "
-    assert main(["evaluate", "--merge", str(tmp_path / "benchmark.json")]) == 2
+    assert main(["evaluate", "--merge", str(tmp_path)]) == 2
     assert told in (said := capsys.readouterr().err) and said.count("\n") == 1
     assert (tmp_path / "benchmark.json").read_text() == text
     (tmp_path / "mine").write_text(text)

@@ -39,6 +39,7 @@ def test_axes_are_words(tmp_path, monkeypatch):
         "robot=@seven.json,Seastar": Choices("robot", (SEVEN, Seastar()), ("seven", "Seastar")),
         "robot.density=1e2:1e4:3:log": Range("robot.density", 1e2, 1e4, is_log=True).spaced(3),
         "x=1:2:1000000": Range("x", 1.0, 2.0).spaced(1_000_000),
+        "robot.n_limbs=3:7:3": Choices("robot.n_limbs", (3, 5, 7)),
     }.items():
         assert axis_of(text) == axis, text
 
@@ -56,6 +57,54 @@ def test_a_sweep_from_words_to_a_table(tmp_path, capsys):
     assert Scene.from_dict(json.loads(told)["scene"]).numerics == Scene.preset("fast").numerics
     assert main([*words, *QUICK]) == 0
     assert "batches: 0; there before, batches: 2" in capsys.readouterr().out
+
+
+OWN = """from dataclasses import dataclass
+from seastar_gym import Scene, SmaPulse, register_part
+
+@register_part
+@dataclass(frozen=True)
+class Weaker(SmaPulse):
+    peak_angle: float = 0.3
+
+scene = Scene.preset("fast")
+"""
+
+
+@pytest.mark.parametrize("executor", ["here", pytest.param("processes", marks=pytest.mark.slow)])
+def test_parts_that_the_file_of_the_scene_defines_are_values_of_an_axis(executor, tmp_path, capsys):
+    (file := tmp_path / f"weaker_{executor}.py").write_text(OWN)
+    words = "actuator=Weaker,SmaPulse", "--scene", str(file), "--executor", executor, "--out", str(tmp_path)
+    assert main([*QUICK[:-2], *words]) == 0
+    assert read_results(tmp_path).num_rows == 2
+
+
+@pytest.mark.parametrize("gait", ["lagged", "thrifty"])
+def test_gaits_in_time_are_measured_over_whole_periods(gait, tmp_path):
+    (file := tmp_path / "wires.py").write_text(
+        "from seastar_gym import Scene, Seastar, SmaWires\n"
+        "scene = Scene(Seastar(nodes_per_limb=7), actuator=SmaWires(), numerics=Scene.preset('fast').numerics)"
+    )
+    speeds = []
+    for settling, measured in ((2, 2), (2, 8)):
+        out, counts = tmp_path / str(measured), ("--settling", str(settling), "--measured", str(measured))
+        assert main([f"gait={gait}", "--scene", str(file), "--out", str(out), *counts, "--executor", "here"]) == 0
+        speeds.append(read_results(out).column("speed").to_pylist()[0])
+    assert speeds[0] == pytest.approx(speeds[1], rel=0.05)
+
+
+REFUSED = {
+    "say --latin N or --optuna N": ["robot.limb_length=0.05:0.15"],
+    "leave one out": ["robot.limb_length=0.05:0.15", "--latin", "2", "--optuna", "2"],
+    "--address is for --executor ray or dask": ["--address", "head:1"],
+    "--minutes is for --executor slurm": ["--minutes", "5"],
+}
+
+
+@pytest.mark.parametrize("sentence", REFUSED)
+def test_options_that_a_sweep_would_not_heed_are_refused(sentence, tmp_path, capsys):
+    assert main([*REFUSED[sentence], "--out", str(tmp_path)]) == 2
+    assert sentence in capsys.readouterr().err
 
 
 def test_the_best_design_with_parts_of_one_s_own_is_python_that_registers_them(tmp_path):

@@ -95,7 +95,7 @@ def test_agents_of_one_s_own_swim_every_robot(monkeypatch):
 def test_a_part_says_controller_time_and_waypoints_with_the_same_bits_in_other_processes(tmp_path):
     sweep = sweep_of("straight", axes=(LENGTHS,), robots=2)
     tally = run(sweep.batches(), tmp_path, Processes(2))
-    assert tally.done == 2 and tally.designs == 3 and tally.intervals == 0
+    assert tally.done == 2 and tally.designs == 3 and tally.strokes == 0
     for batch in sweep.batches():
         assert ResultFiles(tmp_path).file(batch.name).read_bytes() == result_file_of(batch)
     table = pyarrow.parquet.read_table(ResultFiles(tmp_path).file(batch.name))

@@ -9,6 +9,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+import pyarrow.parquet
 import pytest
 
 from losing import Losing, first
@@ -140,16 +141,26 @@ def test_a_result_that_comes_too_late_changes_nothing(sqlite):
 
 
 @pytest.mark.parametrize("is_largest_best", [True, False])
-def test_a_design_without_the_objective_is_the_worst_and_not_tried_for_ever(is_largest_best, sqlite, monkeypatch):
-    """A time is NaN where a robot does not arrive."""
-    monkeypatch.setattr("seastar_gym.sweep.proposals._column", lambda part, name: [math.nan, 1.0])
-    search = Search(is_largest_best=is_largest_best)
+def test_designs_that_do_not_count_are_the_worst_and_not_tried_for_ever(is_largest_best, sqlite, monkeypatch):
+    """One without the objective, such as a time; one whose limbs crossed; one that stands still; one that counts."""
+    columns = {"ahead": [math.nan, 2.0, 0.5, 1.0], "speed": [1.0, 1.0, 0.0, 1.0]}
+    columns["smallest_opening_angle"] = [1.0, -0.1, 1.0, 1.0]
+    pyarrow.parquet.write_table(pyarrow.table(columns), part := pyarrow.BufferOutputStream())
+    search = Search("ahead", is_largest_best=is_largest_best)
     study = study_of(SWEEP, search, sqlite)
-    proposals = Proposals(SWEEP, study, search, 2)
-    monkeypatch.setattr(proposals, "_waiting", {"batch": [study.ask(), study.ask()]})
-    proposals.tell(Outcome(type("Batch", (), {"name": "batch"})(), b"part"))
-    assert states(study) == ["COMPLETE"] * 2 and study.best_value == 1.0
+    proposals = Proposals(SWEEP, study, search, 4)
+    monkeypatch.setattr(proposals, "_waiting", {"batch": [study.ask() for _ in range(4)]})
+    proposals.tell(Outcome(type("Batch", (), {"name": "batch"})(), part.getvalue()))
+    assert states(study) == ["COMPLETE"] * 4 and study.best_value == 1.0
     assert list(proposals.batches()) == []
+
+
+def test_a_search_whose_batches_all_fail_ends_and_says_why(sqlite, tmp_path):
+    def failing(batch):
+        raise ValueError("No water.")
+
+    with assert_refused("10 batches in a row have no result", "No water."):
+        explore(SWEEP, Search(), sqlite, 6, tmp_path, work=failing)
 
 
 @pytest.mark.parametrize(

@@ -41,6 +41,7 @@ REFUSED = [
     (chosen("actuator", SmaPulse(), "pulse"), "actuator", "pulse"),
     (chosen("fidelity", "fast", "quick"), "fidelity", "quick"),
     (sweep(gait="lagged"), "lagged", "SmaWires"),
+    (sweep(gait="1+,2-,1-"), "names limb 1 twice"),
     (sweep(gait=np.zeros((2, 4))), "rows of commands of 5 limbs"),
     (sweep(WATER_OR_NOT, Range("fluid.density", 900.0, 1100.0), samples=2), "vacuum", "fluid.density"),
     (lambda: Sweep(Scene(Seastar(limb_length=np.array([0.1, 0.2]))), ()), "one robot"),

@@ -6,7 +6,7 @@ import json
 import os
 import resource
 import tracemalloc
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import pyarrow.parquet
@@ -16,7 +16,7 @@ import works
 from losing import Interrupted
 from refusals import assert_refused
 from seastar_gym.scene import Scene
-from seastar_gym.sweep.command import as_text
+from seastar_gym.sweep.command import as_text, axis_of
 from seastar_gym.sweep.designs import Choices, Range, Sweep
 from seastar_gym.sweep.executors import Outcome, Processes, RayTasks, SlurmJobs, dask_client, outcomes
 from seastar_gym.sweep.run import ATTEMPTS, ResultFiles, read_results, result_file_of, run, swim
@@ -67,7 +67,7 @@ def test_only_cells_without_parts_are_run(tmp_path, sweep):
         run(sweep.batches(), tmp_path, Interrupted(2), work=works.named)
     assert len(list(ResultFiles(tmp_path).names())) == 2
     seen = []
-    run(sweep.batches(), tmp_path, None, lambda now: seen.append((now.done, now.kept, now.designs, now.intervals)),
+    run(sweep.batches(), tmp_path, None, lambda now: seen.append((now.done, now.kept, now.designs, now.strokes)),
         works.named)  # fmt: skip
     assert seen == [(1, 2, 4, 4), (2, 2, 8, 8)]
     assert set(ResultFiles(tmp_path).names()) == {batch.name for batch in sweep.batches()}
@@ -94,6 +94,31 @@ def test_a_part_that_the_disk_refuses_costs_its_cell_alone(tmp_path, sweep, larg
     monkeypatch.setenv("SWOLLEN", "")
     again = run(iter(batches), tmp_path, None, work=works.swollen)
     assert (again.done, again.kept, again.problems) == (1, 3, {})
+
+
+def test_a_folder_that_cannot_be_written_to_costs_no_batch(tmp_path, sweep):
+    (tmp_path / "file").touch()
+    with pytest.raises(FileExistsError):
+        run(sweep.batches(), tmp_path / "file", work=lambda batch: pytest.fail("simulated"))
+
+
+def test_an_executor_that_cancels_its_tasks_ends_a_run(tmp_path, sweep):
+    """What is submitted to one whose cluster has lost its head might never end."""
+
+    class Headless(ThreadPoolExecutor):
+        def submit(self, *_):
+            (future := Future()).cancel()
+            future.set_running_or_notify_cancel()
+            return future
+
+    with assert_refused("has cancelled its tasks"):
+        run(sweep.batches(), tmp_path, Headless())
+
+
+@pytest.mark.parametrize("text", ["numerics.damping=0,0.003", "robot.relaxation_time=None,0.001"])
+def test_results_with_labels_of_several_kinds_are_one_table(text, tmp_path):
+    run(Sweep(Scene.preset("fast"), (axis_of(text),), settling=0, measured=1).batches(), tmp_path)
+    assert read_results(tmp_path).num_rows == 2
 
 
 def test_parts_are_not_written_through_links(tmp_path, sweep):
