@@ -42,7 +42,7 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.report import ResultsTable, read_progress
 from seastar_gym.evaluation.swim import Swim, swim
 from seastar_gym.files import PART, is_left_behind, is_part_of, read_json, write_atomically, write_json, write_lines
-from seastar_gym.identify.fit import DOUBT
+from seastar_gym.identify.fit import DOUBT, UNSURE
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number, shown
 from seastar_gym.scene.numerics import Fidelity
@@ -87,7 +87,7 @@ class Efficiency:
         if self.strokes_to_target is None:
             return f"The pentagon was not rounded in {TARGET:g} s yet."
         return (
-            f"The pentagon took {TARGET:g} s or less after {self.strokes_to_target} strokes and "
+            f"The pentagon took {TARGET:g} s or less after {self.strokes_to_target} decisions and "
             f"{self.seconds_to_target:.1f} s of training."
         )
 
@@ -266,7 +266,8 @@ def read_intervals(file: Path, anyway: bool = False) -> DomainRandomization:
         raise ValueError(f"{file} is no file.")
     try:
         found = read_json(file)
-        doubt = found.pop(DOUBT, None)
+        doubt, unsure = found.pop(DOUBT, None), found.pop(UNSURE, ())
+        unsure = ", ".join(map(str, unsure))
         ends = {name: (low, high) for name, (low, high) in found.items()}
     except (AttributeError, TypeError, ValueError) as wrong:
         raise ValueError(f'{file} must be JSON such as {{"robot.youngs_modulus": [9e5, 1.1e6]}}.') from wrong
@@ -274,6 +275,11 @@ def read_intervals(file: Path, anyway: bool = False) -> DomainRandomization:
         raise ValueError(
             f"{file} is of a fit whose residual is {shown(doubt)} times the noise of its track, so its intervals may "
             "not hold the robot: fit again, or give --intervals-anyway."
+        )
+    if unsure and not anyway:
+        raise ValueError(
+            f"{file} is of a fit that cannot tell {unsure}, so what it has of them means nothing: measure something "
+            "else, fix them, or give --intervals-anyway."
         )
     return DomainRandomization({name: Uniform(low, high) for name, (low, high) in ends.items()})
 

@@ -201,7 +201,7 @@ def drive(options: argparse.Namespace) -> int:
     require_no_logs(options.out)
     robot = scene_at(own_scene(_scene_of_plant(options)), options.fidelity, "fast")
     arguments = arguments_of(options)
-    if devices and not options.dry:
+    if not options.dry and (devices or robot is not None):
         with opened(options, arguments, robot) as plant:  # which heats nothing
             require_limbs(plant, arguments["scene"])
     policy, planned, actions = plan(options, arguments)
@@ -232,7 +232,9 @@ def drive(options: argparse.Namespace) -> int:
 
 
 def require_no_logs(folder: Path) -> None:
-    """ValueError where a folder has the logs of a drive."""
+    """ValueError where a folder has the logs of a drive, or is none."""
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"{folder} is no folder: give another --out.")
     if any((folder / f"{name}.csv").exists() for name in LOGS):
         raise ValueError(f"{folder} has the logs of another drive: give another --out.")
 

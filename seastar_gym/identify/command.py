@@ -20,11 +20,10 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from seastar_gym.command import answered, command_parser
 from seastar_gym.files import require_extra, save_figure, write_json
-from seastar_gym.identify.fit import DOUBT, Estimate, identify
+from seastar_gym.identify.fit import Estimate, identify
 from seastar_gym.identify.measurement import ARM, ORIENTATION, Measurement
 from seastar_gym.scene import Numerics
 from seastar_gym.scene.scene import load_scene
@@ -73,9 +72,7 @@ def fit(options: argparse.Namespace) -> None:
     if options.out is not None:
         write_json(options.out, replace(estimate.scene, numerics=asked.numerics).to_dict())
     if options.intervals is not None:
-        ends = zip(estimate.names, estimate.lower.tolist(), estimate.upper.tolist(), strict=True)
-        found: dict[str, Any] = {name: [low, high] for name, low, high in ends}
-        write_json(options.intervals, found | ({DOUBT: round(estimate.ratio, 2)} if estimate.is_doubted else {}))
+        write_json(options.intervals, estimate.intervals())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -20,7 +20,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,8 +54,8 @@ TOLERANCE = 1e-7
 """Largest Newton tolerance of a fit: that of an ordinary run errs by more than a parameter's small change does."""
 NEAR_END = 0.99
 """Share of the largest delay above which the best one may lie beyond."""
-DOUBT = "residual over noise"
-"""Entry in a file of intervals whose fit is doubted."""
+DOUBT, UNSURE = "residual over noise", "cannot tell"
+"""Entries in a file of intervals: of a fit that is doubted, and names of parameters whose intervals mean nothing."""
 DELAY = "the delay"
 """Name of the delay in sentences."""
 
@@ -127,6 +127,19 @@ class Estimate(NamedTuple):
         return "\n".join(lines)
 
     @property
+    def unsure(self) -> tuple[str, ...]:
+        """Names of the parameters that are untold or at the end of the search."""
+        told = {*self.at_end, *(name for group in self.untold for name in group)}
+        return tuple(name for name in self.names if name in told)
+
+    def intervals(self) -> dict[str, Any]:
+        """Ends of the confidence intervals by name, where they are numbers, and what puts them in doubt."""
+        ends = zip(self.names, self.lower.tolist(), self.upper.tolist(), strict=True)
+        found: dict[str, Any] = {name: [low, high] for name, low, high in ends if math.isfinite(high)}
+        found |= {DOUBT: round(self.ratio, 2)} if self.is_doubted else {}
+        return found | ({UNSURE: list(self.unsure)} if self.unsure else {})
+
+    @property
     def is_doubted(self) -> bool:
         """Whether the residual is well above the noise of the track."""
         return self.ratio > SUSPICIOUS
@@ -134,7 +147,7 @@ class Estimate(NamedTuple):
     def _of_noise(self) -> str:
         """What the residuals are beside the noise of the track."""
         if not math.isfinite(self.ratio):
-            return ""
+            return "; too few pictures tell the noise of the track, so nothing tells whether the fit is right"
         told = f", {self.ratio:.2f} times the noise of the track"
         return told if not self.is_doubted else f"{told}: a wrong minimum, or the scene lacks something"
 
@@ -157,6 +170,8 @@ def identify(
     require_kind("measurement", measurement, Measurement, "a Measurement")
     if isinstance(parameters, str) or not isinstance(parameters, Sequence) or not parameters:
         raise ValueError(f"parameters must be names of numbers, such as fluid.density, not {shown(parameters)}.")
+    if twice := [name for name in parameters if list(parameters).count(name) > 1]:
+        raise ValueError(f"A parameter is fitted once, and {shown(twice[0])} is named twice.")
     if not is_finite_number(confidence) or not 0.0 < confidence < 1.0:
         raise ValueError(f"confidence must be between 0 and 1, not {shown(confidence)}.")
     if largest_delay is not None:
@@ -209,7 +224,7 @@ def estimate_of(found: Found, confidence: float) -> Estimate:
     names, guess, p = residuals.names, residuals.guess, len(residuals.names)
     freedom = residuals.seen.sum() - len(fit.x)
     times = residuals.measurement.time[np.nonzero(residuals.seen)[0]]
-    known = uncertainty_of(fit.jac, fit.fun, times)
+    known = uncertainty_of(fit.jac, fit.fun, times, found.least)
     off = np.full(residuals.seen.shape, np.nan)
     off[residuals.seen] = -fit.fun
     half = student.ppf(0.5 + 0.5 * confidence, freedom) * np.sqrt(np.diag(known.covariance))

@@ -185,13 +185,22 @@ def _read_commands(file: str | Path) -> tuple[Floats | None, Floats]:
     """Times [s] and commands of a file whose first line begins with "time"; None and commands of any other."""
     names, rows = read_table(file)
     if names[:1] != ("time",):
-        return None, np.array(read_numbers(file, "one number per limb, every line as many"))
+        if names and "time" in names[0].lower():
+            raise ValueError(f"{file}: the first line must be time,limb1,limb2,.. with the time in seconds.")
+        return None, _shares(file, np.array(read_numbers(file, "one number per limb, every line as many")))
     for row in rows:
         row.require_fields(len(names))
     if len(names) < 2 or not rows:
         raise ValueError(f"{file}: after time there must be one column per limb, and lines below the first.")
     numbers = np.array([row.numbers() for row in rows])
-    return numbers[:, 0], numbers[:, 1:][:, _order(file, names[1:])]
+    return numbers[:, 0], _shares(file, numbers[:, 1:][:, _order(file, names[1:])])
+
+
+def _shares(file: str | Path, commands: Floats) -> Floats:
+    """Commands of a file. ValueError for those that are no shares of a pulse."""
+    if (most := float(np.abs(commands).max())) > 1.0:
+        raise ValueError(f"{file}: commands are shares of a pulse, from -1 to 1, and one is {most:g}.")
+    return commands
 
 
 def _order(file: str | Path, names: Sequence[str]) -> NDArray[np.intp]:
@@ -275,15 +284,15 @@ class Uncertainty(NamedTuple):
     errors: Floats
 
 
-def uncertainty_of(jacobian: Floats, residuals: Floats, times: Floats) -> Uncertainty:
+def uncertainty_of(jacobian: Floats, residuals: Floats, times: Floats, least: float = 0.0) -> Uncertainty:
     """Uncertainty of p fitted parameters.
 
     jacobian: Derivative J of the residuals by the parameters, shape (n, p).
     residuals: Residuals r, shape (n,).
-    times: When each of them was measured, in order [s], shape (n,).
+    times: When each of them was measured, in order [s], shape (n,). least: Least error of each.
     """
     n, p = jacobian.shape
-    error = np.linalg.norm(residuals) / np.sqrt(n - p)
+    error = max(np.linalg.norm(residuals) / np.sqrt(n - p), least)
     left, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
     products = left * (residuals / max(error, SMALLEST))[:, None]
     pictures, first = np.unique(times, return_index=True)

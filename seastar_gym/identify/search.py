@@ -183,10 +183,11 @@ class Found(NamedTuple):
 def noise_of(positions: Floats, order: int = 4) -> float:
     """Noise of the coordinates of a track [m], from differences of this order; NaN for fewer pictures than these need.
 
-    It is the root mean square over coordinates, whose noises may differ: those of an orientation and a place do.
+    Differences of a coordinate are those of the pictures in which it was seen. The noise is the root mean square over
+    coordinates, whose noises may differ: those of an orientation and a place do.
     """
-    differences = np.abs(np.diff(positions, n=order, axis=0))
-    columns = [column[np.isfinite(column)] for column in differences.T.reshape(math.prod(positions.shape[1:]), -1)]
+    seen = [column[np.isfinite(column)] for column in positions.reshape(len(positions), -1).T]
+    columns = [np.abs(np.diff(column, n=order)) for column in seen]
     counts = [len(column) for column in columns]
     if not any(counts):
         return math.nan

@@ -10,7 +10,8 @@ from refusals import assert_refused
 from seastar_gym import Scene, Seastar, SmaPulse, Water
 from seastar_gym.identify import command as its_command
 from seastar_gym.identify import identify, synthetic, with_parameters
-from seastar_gym.identify.fit import DOUBT
+from seastar_gym.identify.fit import DOUBT, UNSURE
+from seastar_gym.identify.search import noise_of
 from slopes import rotated
 
 NAMES = ("fluid.drag_coefficient", "robot.youngs_modulus", "actuator.peak_angle")
@@ -35,6 +36,24 @@ def test_limbs_that_ring_have_their_modulus_found_from_afar(seed, n_strokes, fac
     assert found.values == pytest.approx(TRUE, rel=0.03) and not found.is_doubted and found.at_end == ()
     assert found.scene.numerics == scene.numerics  # though it was fitted with a smaller tolerance
     assert found.noise == pytest.approx(1e-3, rel=0.15)
+
+
+@pytest.mark.parametrize("every", [2, 3])
+def test_the_noise_of_a_track_with_empty_lines_is_that_of_the_lines_between(every):
+    """As of a tracker that looks at every n-th picture."""
+    seen = track()
+    between = seen.positions[::every].copy()
+    seen.positions[np.arange(len(seen.time)) % every > 0] = np.nan
+    assert noise_of(seen.positions) == noise_of(between) > 5e-4
+
+
+def test_an_exact_track_of_a_robot_that_does_not_move_tells_nothing():
+    """All limbs turn alike, so its hub stays. A residual of rounding does not make rounding a slope."""
+    swum, scene = synthetic(RINGING, dict(zip(NAMES, TRUE, strict=True)), 6, noise=0.0), RINGING
+    alike = replace(swum, commands=np.ones_like(swum.commands), nodes=(0,), positions=np.zeros((len(swum.time), 1, 2)))
+    found = identify(scene, NAMES, alike)
+    assert found.unsure == NAMES
+    assert set(found.intervals()) <= {*NAMES, UNSURE} and "Cannot tell" in found.report()
 
 
 @pytest.mark.parametrize("turn, shift", [(0.0, (0.0, 0.0)), (6e-3, (5e-4, -8e-4)), (-8e-3, (-7e-4, 0.0))])
@@ -78,6 +97,21 @@ def test_a_scene_that_lacks_something_is_told_and_its_intervals_are_not_trained_
         read_intervals(file)
     assert set(read_intervals(file, anyway=True).distributions) == set(some)
     assert Scene.from_dict(json.loads((tmp_path / "fitted.json").read_text())).numerics == RINGING.numerics
+
+
+WATER = "fluid.drag_coefficient", "fluid.density"
+"""Forces know their product alone."""
+
+
+def test_intervals_of_what_a_fit_cannot_tell_are_not_trained_on(tmp_path):
+    from agents.run import read_intervals
+
+    hub = track(n_strokes=2)
+    hub = replace(hub, positions=hub.positions[:, :1], nodes=hub.nodes[:1])
+    found, file = identify(with_parameters(RINGING, NAMES, TRUE), WATER, hub), tmp_path / "intervals.json"
+    file.write_text(json.dumps(found.intervals(), allow_nan=False))
+    with assert_refused(f"cannot tell {', '.join(WATER)}", "--intervals-anyway"):
+        read_intervals(file)
 
 
 @pytest.mark.parametrize(

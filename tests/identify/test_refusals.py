@@ -73,6 +73,7 @@ FITS = [
     *((called(Residuals, SCENE, ("fluid.density",), wrong), "those of a robot of 5 limbs and 16 nodes")
       for wrong in (replace(TWO, nodes=(16,)), replace(TWO, commands=np.zeros((1, 4))))),
     (fitted(commands=np.zeros((3, 4))), "Commands and nodes"),
+    (fitted((*TRUTH, *TRUTH)), "named twice"),
     (lambda measured: fitted(time=measured.time + 1.0)(measured), "beyond the last stroke"),
     # Drag along limbs must not exceed that across them, of which the Jacobian tries a smaller one.
     (fitted(BOTH_DRAGS, replace(SCENE, fluid=Water(1000.0, 1.0, 1.0))),
@@ -115,6 +116,8 @@ FILES = [
     (HEADER + ROW, "time,a,b\n0,1\n", "commands.csv, line 2: the line must have 3 fields"),
     (HEADER + ROW, "time,limb1,limb3\n0,1,1\n", "after time come limbs 1 to 2, each once, not limb1, limb3"),
     (HEADER + ROW, "time,limb1,more\n0,1,1\n", "after time come limbs 1 to 2, each once, not limb1, more"),
+    (HEADER + ROW, "Time (s),a\n0,1\n", "commands.csv: the first line must be time,limb1,limb2"),
+    (HEADER + ROW, "0,100,0,0,-100\n", "commands.csv: commands are shares of a pulse, from -1 to 1, and one is 100."),
     (HEADER + ROW, "time,a\n0,1\n0,1\n", "command_times must be 2 finite times that increase"),
 ]  # fmt: skip
 

@@ -257,6 +257,7 @@ REFUSED = [
     (read_table, "time,x,y\n0,1,2\n1,1e308,2\n", "In picture 2, the place of x is [1.e+308 2.e+000]"),
     (read_table, "time,x,y,theta\n0,1,2,-1e308\n", "the orientation of x is -1e+308: nothing is beyond 1e+06"),
     (read_motive, MOTIVE.replace("0.8660254", "1e200"), "the quaternion of Seastar is"),
+    (read_homography, "x,y,u [px],v\n0,0,0,0\n", "columns must be u,v,x,y, in this order"),
     (read_homography, "0,0,0,0\n1,0,1,0\n0,1,0,1\n1,1,1e200,1\n", "no pixel and no place is beyond 1e+06"),
     (lambda _: Track(np.zeros(1), {"a": np.array([[1.0, 1.0]])}, {}).mapped(HORIZON), "", "the place of a is [inf"),
     (read_motive, POSE, "has no types, names and Position"),

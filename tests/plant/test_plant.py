@@ -1,6 +1,7 @@
 """Plants: lines, guard, the environment around them and its logs; whatever is wrong is said, and wires are stopped."""
 
 import io
+import json
 import os
 import socket
 import subprocess
@@ -431,6 +432,15 @@ def test_logs_are_never_written_over(plant, tmp_path, capsys):
     (tmp_path / "out" / "poses.csv").write_text("somebody's")
     assert drive(tmp_path, "--yes", "--plant", plant) == 2
     assert capsys.readouterr().err == f"{tmp_path / 'out'} has the logs of another drive: give another --out.\n"
+
+
+def test_a_file_for_a_folder_and_another_number_of_limbs_are_refused_before_the_plan(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("seastar_gym.cli.drive.plan", lambda *_: pytest.fail("planned"))
+    (scene := tmp_path / "three.json").write_text(json.dumps(Scene(Seastar(n_limbs=3)).to_dict()))
+    assert drive(tmp_path, "--yes", "--plant", f"sim:{scene}") == 2
+    assert "has 3 limbs, the scene's robot 5." in capsys.readouterr().err
+    (tmp_path / "out").write_text("somebody's")
+    assert drive(tmp_path, "--yes") == 2 and "is no folder" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

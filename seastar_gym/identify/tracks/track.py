@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.files import UNITS, read_numbers
+from seastar_gym.files import UNITS, read_numbers, read_table
 from seastar_gym.identify.measurement import LATEST, ORIENTATION, Measurement, pointer, write_trajectory
 from seastar_gym.identify.search import require_rest
 from seastar_gym.scene import Scene
@@ -320,6 +320,9 @@ def _normalised(points: Floats) -> Floats:
 def read_homography(file: str | Path) -> Floats:
     """Homography from a file of points, one line `u,v,x,y` for each [pixel, pixel, m, m]."""
     lengths = [{}, {}, UNITS["length"], UNITS["length"]]
+    names = [name.split()[0].lower() for name in read_table(file)[0] if name.strip()]
+    if sorted(names) == sorted("uvxy") and names != [*"uvxy"]:
+        raise ValueError(f"{file}: columns must be u,v,x,y, in this order, not {','.join(names)}.")
     numbers = np.array(read_numbers(file, "a pixel u,v and its place x,y [m]", 4, units=lengths))
     try:
         if np.abs(numbers).max() > FARTHEST:
