@@ -174,9 +174,9 @@ def physics(scene: Scene) -> Scene:
     return resolved(scene, 10, Numerics())
 
 
-FORMAT = 3
+FORMAT = 4
 """Version of the file's form."""
-CLASSES_VERSION = 2
+CLASSES_VERSION = 3
 """Version of the classes of commands, see commands.py. Errors of another are of others: certificates lapse."""
 MOST_SAMPLES = 100_000
 """Most sequences of a class that can be asked for."""
@@ -194,8 +194,7 @@ class Certificate:
 
     scene: The scene; its nodes per limb, discretisation and numerics do not count.
     settings: Measured settings.
-    promised: Classes of commands over which `for_error` promises; the others are there to be read.
-    actions: Those of them that an environment's actions can make.
+    promised: Classes of commands over which `for_error` and `info` promise; the others are there to be read.
     samples: Sequences per class. With n of them, at most a share s of all sequences of a class errs by more than the
         largest that was measured, with the confidence 1 - (1 - s)^n, and fewer by more than is promised.
     limit_error: Largest error of the swims that stand for the continuum, estimated from half as many edges. All errors
@@ -209,7 +208,6 @@ class Certificate:
     scene: Scene
     settings: tuple[Setting, ...]
     promised: tuple[str, ...]
-    actions: tuple[str, ...]
     samples: int
     limit_error: float
     classes: int
@@ -227,11 +225,10 @@ class Certificate:
         known = set(self.settings[0].errors)
         if any(set(each.errors) != known for each in self.settings):
             raise ValueError("settings must have errors of the same classes of commands.")
-        for name in ("promised", "actions"):
-            some = getattr(self, name)
-            classes = [each for each in some if isinstance(each, str)] if isinstance(some, tuple | list) else []
-            if not classes or len(classes) != len(some) or not known.issuperset(classes):
-                raise ValueError(f"{name} must be some of {', '.join(sorted(known))}, not {shown(some)}.")
+        some = self.promised
+        classes = [each for each in some if isinstance(each, str)] if isinstance(some, tuple | list) else []
+        if not classes or len(classes) != len(some) or not known.issuperset(classes):
+            raise ValueError(f"promised must be some of {', '.join(sorted(known))}, not {shown(some)}.")
         require_count("samples", self.samples, 2, MOST_SAMPLES)
         require_measured("limit_error", self.limit_error)
         require_period(self.decision_period)
@@ -388,8 +385,7 @@ def _read(data: dict[str, Any]) -> dict[str, Any]:
     if data.pop("digest") != _digest(data):
         raise ValueError("its content was changed since it was measured, as its digest tells: certify the scene again")
     del data["format"]
-    found: dict[str, Any] = {"scene": Scene.from_dict(data.pop("scene"))}
-    found |= {name: tuple(data.pop(name)) for name in ("promised", "actions")}
+    found: dict[str, Any] = {"scene": Scene.from_dict(data.pop("scene")), "promised": tuple(data.pop("promised"))}
     return {**found, "settings": tuple(Setting(**each) for each in data.pop("settings")), **data}
 
 

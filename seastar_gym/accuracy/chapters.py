@@ -71,7 +71,7 @@ def scene_for(
     >>> scene_for(0.005).robot.nodes_per_limb
     14
     >>> scene_for(0.001, any_gait=True, decision_period=0.2).robot.nodes_per_limb
-    19
+    25
     >>> scene_for(1e-6)
     Traceback (most recent call last):
     ValueError: No measured setting keeps the path error below 0.0001 %: the best, ...
@@ -130,8 +130,8 @@ def errors_in_info(
     setting = None if known is None else known.of(scene)
     if known is None or setting is None:
         return dict.fromkeys(NAMES if decision_period is None else ERRORS, math.nan)
-    gaits = known.repeated(known.actions)
-    others = [name for name in known.actions if name not in gaits]
+    gaits = known.repeated(known.promised)
+    others = [name for name in known.promised if name not in gaits]
     found = {
         "path_error": setting.promise(others), "gait_error": setting.promise(gaits),
         "typical_error": setting.typical_error(others), "typical_gait_error": setting.typical_error(gaits),

@@ -19,6 +19,9 @@ repeated second         a second of random commands, repeated
 held                    commands of -1, 0 and 1 that change every 1, 2, 5 or 10 s
 on-off                  such a command for a second, then a second of rest
 repeated command        such a command for ten seconds
+held share              shares of pulses that change every 1, 2, 5 or 10 s: half of them from [-1, 1] for every limb,
+                        the others -1, 0 and 1 times one share
+repeated share          such a command for ten seconds
 
 Such paths may be short: errors are fractions of at least a tenth of a limb length per second.
 """
@@ -34,6 +37,8 @@ Draw = Callable[[np.random.Generator, int, int], Floats]
 """Commands of n sequences for a number of limbs, from a generator, shape (STROKES, n, n_limbs)."""
 
 STROKES = 10
+LEAST_SHARE = 0.05
+"""Least share of a pulse that all limbs of a command have."""
 SMALL_COMMANDS, SMALL = "small", 0.1
 """Class whose paths are so short that errors are large shares of them, and its share of the amplitude."""
 
@@ -48,6 +53,17 @@ def _ternary(rng: np.random.Generator, *shape: int) -> Floats:
 
 def _continuous(rng: np.random.Generator, *shape: int) -> Floats:
     return rng.uniform(-1.0, 1.0, shape)
+
+
+def _shares(rng: np.random.Generator, *shape: int) -> Floats:
+    """Commands in [-1, 1]; of every second sequence -1, 0 and 1 times one share, which is another in every command.
+
+    Pulses that end early end between two time steps, and all in the same way where their shares are one.
+    """
+    commands = _continuous(rng, *shape)
+    alike = rng.uniform(LEAST_SHARE, 1.0, (*shape[:-1], 1)) * _ternary(rng, *shape)
+    commands[..., ::2, :] = alike[..., ::2, :]
+    return commands
 
 
 def _each(draw: Callable[..., Floats], different: int) -> Draw:
@@ -83,8 +99,6 @@ CLASSES: dict[str, Draw] = {
     SMALL_COMMANDS: _small,
 }
 """Classes by name."""
-ACTIONS = ("random ternary", "repeated ternary", "alternating ternary", "opposed neighbours")
-"""Classes that an environment's actions can make."""
 
 
 SECONDS = 10
@@ -127,10 +141,15 @@ def _repeated_second(rng: np.random.Generator, n: int, n_limbs: int, period: flo
     return np.resize(a_second, (decisions(period), n, n_limbs))
 
 
-def _held(rng: np.random.Generator, n: int, n_limbs: int, period: float) -> Floats:
-    drawn = _ternary(rng, SECONDS, n, n_limbs)
+def _held(drawn: Floats, period: float) -> Floats:
+    """Commands of every second, shape (SECONDS, n, n_limbs), as decisions, which hold some of them for longer."""
     some = (drawn[:, k :: len(HELD)] for k in range(len(HELD)))
     return np.concatenate([_in_turn(each, every, period) for each, every in zip(some, HELD, strict=True)], axis=1)
+
+
+def _repeated(command: Floats, period: float) -> Floats:
+    """One command, shape (n, n_limbs), as decisions."""
+    return np.tile(command, (decisions(period), 1, 1))
 
 
 def _on_off(rng: np.random.Generator, n: int, n_limbs: int, period: float) -> Floats:
@@ -141,9 +160,11 @@ DECISIONS: dict[str, Callable[[np.random.Generator, int, int, float], Floats]] =
     "random": lambda rng, n, n_limbs, period: _any(rng, decisions(period), n, n_limbs),
     "pairs": _pairs,
     "repeated second": _repeated_second,
-    "held": _held,
+    "held": lambda rng, n, n_limbs, period: _held(_ternary(rng, SECONDS, n, n_limbs), period),
     "on-off": _on_off,
-    "repeated command": lambda rng, n, n_limbs, period: np.tile(_ternary(rng, n, n_limbs), (decisions(period), 1, 1)),
+    "repeated command": lambda rng, n, n_limbs, period: _repeated(_ternary(rng, n, n_limbs), period),
+    "held share": lambda rng, n, n_limbs, period: _held(_shares(rng, SECONDS, n, n_limbs), period),
+    "repeated share": lambda rng, n, n_limbs, period: _repeated(_shares(rng, n, n_limbs), period),
 }
 """Classes of decisions that are shorter than strokes, by name."""
 

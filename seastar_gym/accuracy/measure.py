@@ -32,7 +32,6 @@ import numpy as np
 
 from seastar_gym.accuracy.certificate import CLASSES_VERSION, MOST_SAMPLES, Certificate, Setting, at, physics
 from seastar_gym.accuracy.commands import (
-    ACTIONS,
     CLASSES,
     SECONDS,
     SLOWEST,
@@ -245,7 +244,7 @@ def certify(
     found, of_limit = measure_settings(scene, settings, limit, lambda *_: SHORT, [batch], progress, of_energy=settings)
     promised = tuple(name for name in batch.commands if name != SMALL_COMMANDS)
     return Certificate(
-        physics(scene), tuple(found), promised, ACTIONS if period is None else promised, samples, limit_error=of_limit,
+        physics(scene), tuple(found), promised, samples, limit_error=of_limit,
         classes=CLASSES_VERSION, version=__version__, machine=machine(), decision_period=period,
         measured_over={} if period is None else {"resonances": resonances(scene, period)},
     )  # fmt: skip

@@ -25,7 +25,7 @@ from seastar_gym.scene.scene import load_scene
 SMALL_ROBOT = Seastar(limb_length=0.08)
 SCENE = Scene(SMALL_ROBOT)
 WIRED = make_scene(None, "fast", 0.2)
-REPEATED = ("repeated ternary", "alternating ternary")
+REPEATED = tuple(f"{how} {what}" for how in ("repeated", "alternating") for what in ("ternary", "continuous"))
 """Classes of a certificate's commands that `gait_error` is of."""
 SAMPLES = 2
 BOTH = partial(gym.make, "SeastarSwim-v0"), partial(SeastarSwimVectorEnv, 2)
@@ -47,7 +47,7 @@ def made(certificate):
     """Certificate of two settings and three classes, with numbers that are easy to read."""
     coarse, _, fine, _ = (replace(each, **MADE) for each in certificate.settings)
     slow = replace(fine, speed=99.4, energy_growth=2.0, space_error=0.001)
-    return replace(certificate, settings=(slow, coarse), promised=("a", "b"), actions=("a",), limit_error=0.0005)
+    return replace(certificate, settings=(slow, coarse), promised=("a", "b"), limit_error=0.0005)
 
 
 @pytest.fixture
@@ -230,10 +230,10 @@ def test_the_environment_tells_the_errors_of_a_certified_scene(certificate, file
     for given in (certificate, file, str(file)):
         env = gym.make("SeastarSwim-v0", scene=certificate.at(setting), certificate=given)
         info = env.reset(seed=0)[1]
-        assert max(info["path_error"], info["gait_error"]) == setting.promise(certificate.actions)
+        assert max(info["path_error"], info["gait_error"]) == setting.promise(certificate.promised)
         assert info["gait_error"] == setting.promise(REPEATED)
         assert info["typical_gait_error"] == setting.typical_error(REPEATED)
-        assert info["typical_error"] == setting.typical_error(tuple({*certificate.actions} - {*REPEATED}))
+        assert info["typical_error"] == setting.typical_error(tuple({*certificate.promised} - {*REPEATED}))
         assert (info["space_error"], info["time_error"]) == (setting.space_error, setting.time_error)
         assert info["batch_real_time_factor"] == setting.speed
     envs = gym.make_vec("SeastarSwim-v0", 3, vectorization_mode="vector_entry_point",

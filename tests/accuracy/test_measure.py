@@ -46,7 +46,10 @@ def test_decisions_are_what_their_classes_say(n_limbs, period):
     most = np.array([math.ceil(commands.SECONDS / each) - 1 for each in commands.HELD])
     assert (changes <= most[:, None]).all() and (changes[0] == 0).all()
     assert (drawn["on-off"] == 0.0).all(axis=(1, 2)).mean() == pytest.approx(0.5, abs=0.05)
-    assert (drawn["repeated command"] == drawn["repeated command"][0]).all()
+    for name in ("repeated command", "repeated share"):
+        assert (drawn[name] == drawn[name][0]).all()
+    alike = np.sort(np.abs(drawn["repeated share"][0, ::2]), axis=-1)
+    assert ((alike == 0.0) | (alike == alike[:, -1:])).all() and 0.0 < alike[:, -1].min() < alike[:, -1].max() < 1.0
     numbers = batch.of_classes(np.arange(8 * len(drawn)))
     assert list(numbers) == list(drawn) and numbers["pairs"].tolist() == [*range(8, 16)]
 
