@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from threading import RLock
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -94,7 +94,10 @@ def gradient(
     """
     require_names(by)
     record_of_swim = record(scene, commands, state, duration)
-    value, slopes = objective(record_of_swim.swim)
+    told: Any = objective(record_of_swim.swim)
+    if not (isinstance(told, tuple) and len(told) == 2 and np.ndim(told[0]) == 0 and isinstance(told[1], Mapping)):
+        raise ValueError(f"objective must return a number and its slopes by name, not {shown(told)}.")
+    value, slopes = told
     found = record_of_swim.gradient(slopes, by)
     return Gradient(float(value), record_of_swim.swim, found, record_of_swim.status, record_of_swim.sentence)
 
@@ -194,6 +197,8 @@ class Record:
                 raise ValueError(
                     f"slopes in {name} must have shape {getattr(self.swim, name).shape}, not {value.shape}."
                 )
+            if not np.isfinite(value).all():
+                raise ValueError(f"slopes in {name} must be finite numbers.")
         return {name: given.get(name, np.zeros(getattr(self.swim, name).shape)) for name in QUANTITIES}
 
     def _through_rotations(self, unknowns: Sequence[Unknown], of_turns: list[Floats]) -> dict[str, Floats]:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.base import JUMP, Actuator, complete, stroke_at
 from seastar_gym.scene.actuators.wires import SmaWires
-from seastar_gym.scene.checks import as_floats, shown
+from seastar_gym.scene.checks import as_floats
 from seastar_gym.scene.number import column
 from seastar_gym.simulator.wires import contracted
 
@@ -270,7 +270,7 @@ def checked_commands(commands: ArrayLike, scene: Scene, strengths: Floats, name:
     if not np.maximum.reduce(shares, axis=None) <= 1.0:
         robot, limb = np.argwhere(~(shares <= 1.0))[0]
         raise ValueError(
-            f"{name} must be numbers in [-1, 1]; robot {robot} has {shown(array[robot, limb])} for limb {limb + 1}."
+            f"{name} must be numbers in [-1, 1]; robot {robot} has {array[robot, limb]:g} for limb {limb + 1}."
         )
     if scene.robot.hub_hinge == "turning":
         _check_turning_hub(strengths * array, scene)

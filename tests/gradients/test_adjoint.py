@@ -168,6 +168,7 @@ def test_a_swim_that_failed_has_no_gradient():
     [
         ({"hope": np.zeros(3)}, None, ("slopes has 'hope', which is none of hub, positions",)),
         ({"hub": np.zeros((3, 2))}, None, ("slopes in hub must have shape (4, 2), not (3, 2)",)),
+        ({"hub": np.full((4, 2), np.nan)}, None, ("slopes in hub must be finite numbers",)),
         ({"hub": np.ones((4, 2))}, 3, ("feedback must be a function, not 3.",)),
         *(({"hub": np.ones((4, 2))}, each, ("feedback must return slopes in", "of shape (21, 2) each"))
           for each in (lambda k, slope: (slope, slope), lambda k, slope: slope, lambda k, slope: None)),
@@ -176,6 +177,12 @@ def test_a_swim_that_failed_has_no_gradient():
 def test_refusals_are_sentences(slopes, feedback, words):
     with assert_refused(*words):
         record(SMALL, COMMANDS).gradient(slopes, ["commands"], feedback)
+
+
+@pytest.mark.parametrize("told", [1.0, (np.zeros(2), {}), (1.0, 2.0)])
+def test_an_objective_without_slopes_is_refused(told):
+    with assert_refused("objective must return a number and its slopes by name"):
+        gradient(SMALL, COMMANDS, lambda swim: told, ["commands"])
 
 
 @pytest.mark.parametrize("library", ["torch", "jax"])
