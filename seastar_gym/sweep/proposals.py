@@ -23,7 +23,7 @@ from seastar_gym.sweep.designs import Batch, Range, Sweep
 from seastar_gym.sweep.executors import Done, Work, outcomes, sentence_of
 from seastar_gym.sweep.run import (
     COUNTING,
-    UNWRITTEN,
+    IN_A_ROW,
     OnProgress,
     Progress,
     ResultFiles,
@@ -90,7 +90,7 @@ def explore(
 ) -> optuna.Study:  # fmt: skip
     """Propose and simulate until a study has results of so many designs. Every batch has `sweep.robots` at most.
 
-    ValueError if UNWRITTEN batches in a row have no result: the next ones would have none, either.
+    ValueError if IN_A_ROW batches in a row have no result: the next ones would have none, either.
 
     executor, work, at_once: As of `run`, but proposals depend on results: None means a batch for every processor.
     """
@@ -105,8 +105,8 @@ def explore(
             tally.count(outcome.task)
             in_a_row = 0
         proposals.tell(outcome)
-        if in_a_row == UNWRITTEN:
-            raise ValueError(f"{UNWRITTEN} batches in a row have no result, the last one so: {outcome.problem}")
+        if in_a_row == IN_A_ROW:
+            raise ValueError(f"{IN_A_ROW} batches in a row have no result, the last one so: {outcome.problem}")
         if progress is not None:
             progress(tally)
     return proposals.study

@@ -342,8 +342,9 @@ ATTEMPTS = 3
 """How often a batch is tried whose worker is lost."""
 MOST_LOST = 1000
 """Batches that wait for another attempt at most. With more, something is wrong with all of them."""
-UNWRITTEN = 10
-"""Parts in a row that the disk refuses at most. With more it is full for good, and what is simulated would be lost."""
+IN_A_ROW = 10
+"""Parts in a row that the disk refuses at most, and batches in a row of a search without result. With more, the next
+ones would be lost, too."""
 
 
 @dataclass
@@ -381,7 +382,7 @@ def run(
     """Run the batches that have no part in the folder; those that were lost again at the end.
 
     An interrupt, such as Ctrl-C, leaves the parts of all finished batches. A part that the disk refuses costs its
-    batch, which is lost; OSError if the disk refuses UNWRITTEN in a row.
+    batch, which is lost; OSError if the disk refuses IN_A_ROW in a row.
 
     executor: Any of `concurrent.futures`; None runs batches in this process, one after the other. A lost worker costs
         its batch alone, but where its executor is broken then, as ProcessPoolExecutor is: the same run goes on with
@@ -432,7 +433,7 @@ def _attempt(found: Iterator[Done], parts: ResultFiles, tally: Progress, progres
                 refused = 0
         except OSError as failure:
             refused += 1
-            if refused == UNWRITTEN:
+            if refused == IN_A_ROW:
                 raise
             outcome = Outcome(outcome.task, None, refused_by_disk(failure))
         _count(outcome, lost, tally)

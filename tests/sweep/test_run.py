@@ -156,7 +156,7 @@ def test_a_disk_that_is_full_for_good_ends_the_run(refused, tmp_path, sweep, mon
         write(self, name, part)
 
     monkeypatch.setattr(ResultFiles, "write", full)
-    monkeypatch.setattr("seastar_gym.sweep.run.UNWRITTEN", 2)
+    monkeypatch.setattr("seastar_gym.sweep.run.IN_A_ROW", 2)
     with pytest.raises(OSError, match="No space left") if len(refused) > 2 else contextlib.nullcontext():
         tally = run(sweep.batches(), tmp_path, None, work=works.named)
         assert tally.done == 4 and tally.losses == 2 and not tally.problems
