@@ -184,12 +184,20 @@ def _warn_of_long_rollouts(n_robots: int) -> None:
 
 
 def _one_per_robot(info: Info, n_robots: int) -> list[Info]:
-    """A batch's info as one per robot: plain numbers, and an array for a vector.
+    """A batch's info as one per robot: plain numbers, and an array for a vector. What is of no robot, all have.
 
-    Masks and final values, which the adapter uses itself, are left out.
+    Masks, and what the adapter makes itself, final values and statistics of episodes, are left out.
     """
-    names = [name for name in info if not name.startswith("_") and name not in ("final_obs", "final_info")]
+    own = "final_obs", "final_info", "episode"
+    names = [name for name in info if not name.startswith("_") and name not in own]
     if not names:
         return [{} for _ in range(n_robots)]
-    columns = [info[name].tolist() if info[name].ndim == 1 else list(info[name]) for name in names]
+    columns = [_column(info[name], n_robots) for name in names]
     return [dict(zip(names, values, strict=True)) for values in zip(*columns, strict=True)]
+
+
+def _column(values: Any, n_robots: int) -> list[Any]:
+    """What every robot has of an entry of a batch's info, which a wrapper may have put there."""
+    if not isinstance(values, list | tuple | np.ndarray) or np.shape(values)[:1] != (n_robots,):
+        return [values] * n_robots
+    return values.tolist() if isinstance(values, np.ndarray) and values.ndim == 1 else list(values)

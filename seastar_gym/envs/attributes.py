@@ -89,10 +89,14 @@ class RobotsEnv:
         return actions_of_one, seen
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if self._is_made and name in self._arguments:
+        if self._is_made and (name in self._arguments or name in self._numbers_of_task):
             self._ask(name, (value,) * self._robots.n_robots)
         else:
             super().__setattr__(name, value)
+
+    @property
+    def _numbers_of_task(self) -> set[str]:
+        return {one.name for one in fields(self.task)}  # type: ignore[arg-type]  # a dataclass
 
     def __getattr__(self, name: str) -> Any:
         """Arguments that are no attributes otherwise, those of robot 0."""

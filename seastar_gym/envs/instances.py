@@ -39,12 +39,19 @@ def numbers_of(asked: object, split: Split, n_robots: int) -> NDArray[np.int64]:
 def keep(kept: dict[str, NDArray[Any]], robot: int, n_robots: int, drawn: dict[str, Any]) -> None:
     """Keep what was drawn for a robot. Rows of different lengths stand side by side, behind the shorter ones 0.
 
+    Numbers are kept as floats, but for whole numbers of NumPy: a task may write fractions where it drew 0. ValueError
+    for what is no number.
+
     kept: Arrays by name, whose first axis are the robots; it is changed in place.
     """
     for name, value in drawn.items():
-        value = np.asarray(value)
+        is_typed, value = isinstance(value, np.ndarray | np.generic), np.asarray(value)
+        if value.dtype.kind not in "biuf":
+            raise ValueError(f"A task draws numbers, and its {name} is {shown(drawn[name])}.")
+        value = value if is_typed or value.dtype.kind in "bf" else value.astype(np.float64)
         if name not in kept:
             kept[name] = np.zeros((n_robots, *value.shape), value.dtype)
+        kept[name] = kept[name].astype(np.result_type(kept[name], value), copy=False)
         if value.ndim == 0:
             kept[name][robot] = value
             continue

@@ -245,6 +245,8 @@ PATH_HELP = (
 def load_path(name: str) -> Any:
     """Name of a path, or waypoints [m], shape (n, 2), of a text file."""
     if name in PATHS or not Path(name).is_file():
+        if Path(name).suffix and name not in PATHS:
+            raise FileNotFoundError(f"There is no file {name}, nor a path of that name.")
         make_path(name, np.random.default_rng(0))
         return name
     waypoints = read_numbers(name, "x and y [m] of a waypoint", 2, MOST_WAYPOINTS, [UNITS["length"]] * 2)

@@ -22,6 +22,7 @@ from seastar_gym.envs.commands import action_masks, can_be_masked, masked_limbs
 from seastar_gym.envs.delays import Lag, Piece, Tracker
 from seastar_gym.envs.instances import SIZES, Split, generator_of, keep, numbers_of
 from seastar_gym.envs.layout import N_STATIONS, Entry, Layout
+from seastar_gym.envs.layout import SIZES as SIZES_OF_ENTRIES
 from seastar_gym.envs.observation import axes_of, lengths_of, observed_rows, rows_on_device, to_float32
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.randomization import ACTION_DELAY, LIMB_STRENGTHS, DomainRandomization, drawn_scene
@@ -30,7 +31,7 @@ from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.sight import Lateness, Sees, Sight, bounds_of, entries_of, stations_seen
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.base import Mirror, complete
-from seastar_gym.scene.checks import require_choice
+from seastar_gym.scene.checks import require_choice, shown
 from seastar_gym.scene.number import check_numbers
 from seastar_gym.simulator import Simulator, StrokeReport
 from seastar_gym.simulator.report import report_of_pieces
@@ -113,11 +114,19 @@ class Task(ABC):
     """Fields that an environment may change from one episode to the next."""
 
     def __post_init__(self) -> None:
-        check_numbers(self, f"{type(self).__name__}.")
+        name, terms = type(self).__name__, getattr(self, "terms", None)
+        if not isinstance(terms, tuple) or not terms or not all(isinstance(term, str) for term in terms):
+            raise ValueError(
+                f'{name}.terms must name the terms of the reward, such as ("reward_a",), not {shown(terms)}.'
+            )
+        check_numbers(self, f"{name}.")
 
     @abstractmethod
     def draw(self, rng: np.random.Generator, scene: Scene) -> dict[str, Any]:
-        """What an episode of one robot of a scene is about, and what is kept of it: numbers or arrays by name."""
+        """What an episode of one robot of a scene is about, and what is kept of it: numbers or arrays by name.
+
+        They are kept as floats, but for whole numbers of NumPy, such as `np.int64(0)`, and flags.
+        """
 
     @abstractmethod
     def targets(self, robots: Robots) -> Floats:
@@ -135,7 +144,7 @@ class Task(ABC):
         return {}
 
     def observation(self, robots: Robots) -> Floats:
-        """Further entries of the observation, shape (n_robots, k), see `entries`."""
+        """Further entries of the observation, shape (n_robots, k), each of which `entries` names."""
         return np.zeros((robots.n_robots, 0))
 
     def scenery(self, robots: Robots, robot: int) -> Scenery:
@@ -280,6 +289,7 @@ class Robots:
 
     @functools.cached_property
     def _is_bare(self) -> bool:
+        self._further()  # refuses what entries do not name
         return self.layout == self._without_more
 
     def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
@@ -313,6 +323,31 @@ class Robots:
             self.tracker.begin(robots, generators, self.simulator)
         self.task.begin(self, robots)
 
+    @functools.cached_property
+    def _n_entries(self) -> int:
+        """Numbers that the task adds to an observation."""
+        return sum(SIZES_OF_ENTRIES[kind] for kind in self.task.entries)
+
+    def _further(self) -> Floats:
+        """What the task adds to an observation. ValueError unless its entries name as many numbers."""
+        found, wanted = self.task.observation(self), (self.n_robots, self._n_entries)
+        if np.shape(found) != wanted:
+            raise ValueError(
+                f"{type(self.task).__name__}.observation is of shape {np.shape(found)}, and its entries say {wanted}: "
+                'name every number in entries, such as ("scalar",).'
+            )
+        return found
+
+    def _targets(self) -> Floats:
+        """Targets of the task, shape (n_robots, 4), checked."""
+        found = np.asarray(self.task.targets(self), np.float64)
+        if found.shape != (self.n_robots, 4):
+            raise ValueError(
+                f"{type(self.task).__name__}.targets must have two points of every robot, shape {(self.n_robots, 4)}, "
+                f"not {found.shape}."
+            )
+        return found
+
     def _numbered(
         self, robots: Flags, generators: list[np.random.Generator], asked: object
     ) -> list[np.random.Generator]:
@@ -337,10 +372,8 @@ class Robots:
         found[:, at.actuators] = self._remembered()
         if at.shows_limbs:
             found[:, at.stations_and_hub] = tracker.of_limbs(lengths_of(self.simulator))
-        found[:, at.further] = np.concatenate(
-            [self.task.observation(self), tracker.entries(self.simulator.time)], axis=1
-        )
-        away = self.task.targets(self).reshape(-1, 2, 2) - tracker.hub[:, None]
+        found[:, at.further] = np.concatenate([self._further(), tracker.entries(self.simulator.time)], axis=1)
+        away = self._targets().reshape(-1, 2, 2) - tracker.hub[:, None]
         found[:, at.waypoints] = self.in_body_frame(away / lengths_of(self.simulator)[:, None, None]).reshape(-1, 4)
         return found
 
@@ -353,7 +386,7 @@ class Robots:
         """`observe` as a fresh array of the simulator's device. What a `Sight` shows is copied there."""
         if self.tracker is not None:
             return self.simulator.arrays.asarray(self.observe())
-        seen = to_float32(rows_on_device(self.simulator, self.task.targets(self)), self.n_robots)
+        seen = to_float32(rows_on_device(self.simulator, self._targets()), self.n_robots)
         return self._with_more(seen, self.simulator.arrays)
 
     def _with_more(self, seen: Any, arrays: ModuleType) -> Any:
@@ -366,7 +399,7 @@ class Robots:
         found[:, at.waypoints] = seen[:, self._without_more.waypoints]
         found[:, at.actuators] = arrays.asarray(self._remembered())
         if at.entries:
-            found[:, at.further] = arrays.asarray(self.task.observation(self))
+            found[:, at.further] = arrays.asarray(self._further())
         return found
 
     def privileged_observations(self) -> NDArray[np.float32]:
@@ -379,7 +412,7 @@ class Robots:
 
     def _seen_now(self) -> NDArray[np.float32]:
         """Observations of what the kernel fills, without delay, shape (n_robots, k)."""
-        return to_float32(observed_rows(self.simulator, self.task.targets(self)), self.n_robots)
+        return to_float32(observed_rows(self.simulator, self._targets()), self.n_robots)
 
     def seen_hub(self) -> Floats:
         """Hubs as robots are seen by who decides [m], shape (n_robots, 2), a copy."""
@@ -503,13 +536,43 @@ class Robots:
         self.energy += report.energy
         if self.tracker is not None:
             self.tracker.look(self.simulator.time)
-        score = self.task.score(self, hub, pulses_of(report.heating_time, followed))
-        if score.success is False or score.over is False:
-            success, over = (np.zeros(self.n_robots, bool) if flags is False else flags for flags in score[1:])
-            score = Score(score.terms, success, over)
+        score = self._checked(self.task.score(self, hub, pulses_of(report.heating_time, followed)))
         info = self._info(hub, score, commands, followed, report)
         reward = functools.reduce(operator.add, score.terms.values())
+        reward = reward.copy() if len(score.terms) == 1 else reward
         return Outcome(reward, score.over | (report.status != 0), info)
+
+    def _checked(self, score: Score) -> Score:
+        """A score whose terms and flags are arrays of their own, shape (n_robots,). ValueError for others."""
+        if {*score.terms} != {*self.task.terms}:
+            raise ValueError(
+                f"{type(self.task).__name__}.score has the terms {', '.join(map(str, score.terms))}, and its terms are "
+                f"{', '.join(self.task.terms)}."
+            )
+        terms = {name: self._of_robots(name, term, np.float64) for name, term in score.terms.items()}
+        success, over = (self._of_robots("success, over", flags, bool) for flags in score[1:])
+        return Score(terms, success, over)
+
+    def _of_robots(self, name: str, values: Any, kind: Any) -> NDArray[Any]:
+        """A task's numbers of all robots, or one for all, as a new array, shape (n_robots,)."""
+        found = np.array(values, kind)
+        if found.ndim == 0:
+            return np.full(self.n_robots, found)
+        if found.shape != (self.n_robots,):
+            raise ValueError(
+                f"{name} of {type(self.task).__name__}.score must be of shape {(self.n_robots,)}, not {found.shape}."
+            )
+        return found
+
+    def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
+        """Entries of info that belong to the task. ValueError for one that is no array over robots."""
+        found = self.task.info(self, hub)
+        for name, values in found.items():
+            if np.shape(values)[:1] != (self.n_robots,):
+                raise ValueError(
+                    f"{name} of {type(self.task).__name__}.info must be an array over {self.n_robots} robots."
+                )
+        return {name: np.asarray(values) for name, values in found.items()}
 
     def _info(
         self, hub: Floats | None, score: Score, commands: Floats, followed: Floats, report: StrokeReport
@@ -548,7 +611,7 @@ class Robots:
         return {
             "time": self.simulator.time,
             "hub_position": hub,
-            **self.task.info(self, hub),
+            **self._task_info(hub),
             **({"action_mask": self.action_masks().astype(np.int8)} if self.can_be_masked else {}),
             **(self._errors() if self.task.tells_errors else {}),
             **({"error_estimate": self.simulator.error_estimate} if self.options.error_bars else {}),

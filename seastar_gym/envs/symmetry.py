@@ -405,6 +405,22 @@ def symmetry_in(env: Any, reduced: bool = True) -> Symmetry:
     return Symmetry(symmetry_of(inner.scene), observed_mirror(inner), inner.layout, inner.actions)
 
 
+CHANGES: tuple[type[Any], ...] = (
+    gym.ObservationWrapper, gym.ActionWrapper, gym.wrappers.FrameStackObservation,
+    gym.vector.VectorObservationWrapper, gym.vector.VectorActionWrapper,
+)  # fmt: skip
+"""Kinds of wrappers that change observations or actions."""
+
+
+def require_plain(env: Any, who: str) -> None:
+    """ValueError for layers of an environment or a batch below which observations and actions are other ones."""
+    layer = env
+    while isinstance(layer, gym.Wrapper | gym.vector.VectorWrapper):
+        if isinstance(layer, (*CHANGES, SymmetryReduction, VectorSymmetryReduction)):
+            raise ValueError(f"{who} needs observations and actions as they are: put {type(layer).__name__} around it.")
+        layer = layer.env
+
+
 def observed_mirror(env: Any) -> Mirror:
     """What a mirror does to the numbers that are observed of every limb of an environment or a batch."""
     mirror = memory_mirror(env.scene.actuator) if env.observe_actuators else ()
@@ -440,6 +456,7 @@ class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstru
 
     def __init__(self, env: gym.Env[Any, Any]):
         require_kind("env", env, gym.Env, "an environment of one robot")
+        require_plain(env, type(self).__name__)
         gym.utils.RecordConstructorArgs.__init__(self)
         gym.Wrapper.__init__(self, env)
         self._symmetry = symmetry_in(env)
@@ -480,6 +497,7 @@ class VectorSymmetryReduction(_VectorWrapper):
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
         require_kind("env", env, gym.vector.VectorEnv, "a batch, as gym.make_vec gives it")
+        require_plain(env, type(self).__name__)
         super().__init__(env)
         self._symmetry = symmetry_in(env, self.symmetric)
         self.single_observation_space = ReducedBox.of(env.single_observation_space)

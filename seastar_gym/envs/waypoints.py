@@ -65,7 +65,7 @@ class Waypoints(Task):
         legs = length(np.diff(waypoints, axis=0))
         way_after = np.append(np.cumsum(legs[::-1])[::-1], 0.0)
         return {
-            "waypoints": waypoints, "n_waypoints": len(waypoints), "way_after": way_after,
+            "waypoints": waypoints, "n_waypoints": np.int64(len(waypoints)), "way_after": way_after,
             "radius": float(self.waypoint_radius), "aim": float(self.reward.aim * self.waypoint_radius),
             "weights": np.array(astuple(self.reward), np.float64),
             "way_to_go": 0.0, "way_at_reset": 0.0, "turn_to_go": 0.0,

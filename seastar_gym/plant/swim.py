@@ -31,7 +31,7 @@ from seastar_gym.envs.seastar_swim import Observation, OneRobotEnv, RenderMode
 from seastar_gym.envs.sight import Sight, bounds_of, stations_seen
 from seastar_gym.envs.waypoints import AlongPath
 from seastar_gym.files import LineFile
-from seastar_gym.plant.guard import NOISES, Guard, Heat, Limits
+from seastar_gym.plant.guard import NOISES, ROUNDING, Guard, Heat, Limits
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
 from seastar_gym.scene import Scene, Seastar
 from seastar_gym.scene.actuators.wires import ThermalSma
@@ -203,7 +203,7 @@ class PlantRobot(Robots):
         if self.logs is None:
             return seen
         until = self.guard.now() + REST
-        while (now := self.guard.now()) < until:
+        while until - (now := self.guard.now()) > ROUNDING:
             self.guard.wait_until(min(now + self.scene.numerics.step, until))
             newest = self.guard.newest
             if newest is not None and newest.captured_at > seen.captured_at:
@@ -408,7 +408,8 @@ class PlantSwim(OneRobotEnv):
         return observation, reward, terminated, truncated, info
 
     def close(self) -> None:
-        """Stop the plant, and close its logs and the window."""
+        """Stop the plant, and close its logs and the window. A step needs a reset again."""
+        self._batch.needs_reset[:] = True
         try:
             self._driven.guard.plant.stop()
         finally:

@@ -99,6 +99,25 @@ def test_seeds_and_options_of_the_next_reset_count_once():
         batch.reset()
 
 
+class Telling(gym.vector.VectorWrapper):
+    """Puts a number, a text for each robot and a dictionary into info."""
+
+    def step(self, actions):
+        *rest, info = super().step(actions)
+        return *rest, {**info, "number": 3, "names": ["a"] * self.num_envs, "stats": {"x": 1}}
+
+
+def test_wrappers_may_put_anything_into_info():
+    """Gymnasium's statistics of episodes, too, over the end of one."""
+    batch = gym.make_vec("SeastarSwim-v0", 2, vectorization_mode="vector_entry_point", fidelity="fast",
+                         max_episode_steps=2, autoreset_mode=AutoresetMode.SAME_STEP)  # fmt: skip
+    learner = adapter.BatchVecEnv(Telling(gym.wrappers.vector.RecordEpisodeStatistics(batch)))
+    learner.reset()
+    infos = [learner.step(np.zeros((2, 5), int))[3][1] for _ in range(3)]
+    assert all((info["number"], info["names"], info["stats"]) == (3, "a", {"x": 1}) for info in (infos[0], infos[2]))
+    assert infos[1]["TimeLimit.truncated"] and infos[1]["episode"]["l"] == 2
+
+
 @pytest.mark.parametrize(
     "call, words",
     [

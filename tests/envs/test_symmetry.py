@@ -4,6 +4,7 @@ import dataclasses
 import math
 from dataclasses import replace
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from hypothesis import given
@@ -291,6 +292,22 @@ def test_a_scene_that_is_not_symmetric_is_refused_with_its_reason(name):
         SymmetryReduction(SeastarSwimEnv(**arguments))
     with assert_refused("symmetry of the regular polygon", words):
         VectorSymmetryReduction(SeastarSwimVectorEnv(2, **arguments))
+
+
+@pytest.mark.parametrize(
+    "wrap, name",
+    [(gym.wrappers.ClipAction, "ClipAction"), (gym.wrappers.NormalizeObservation, "NormalizeObservation"),
+     (lambda env: gym.wrappers.FrameStackObservation(env, 3), "FrameStackObservation"),
+     (SymmetryReduction, "SymmetryReduction")],
+)  # fmt: skip
+def test_what_changes_observations_or_actions_belongs_around_the_reduction(wrap, name):
+    env = gym.make("SeastarSwimContinuous-v0", fidelity="fast")
+    with assert_refused(f"put {name} around it"):
+        SymmetryReduction(wrap(env))
+    if hasattr(gym.wrappers.vector, name):
+        batch = SeastarSwimVectorEnv(2, actions="continuous", fidelity="fast")
+        with assert_refused(f"put {name} around it"):
+            VectorSymmetryReduction(getattr(gym.wrappers.vector, name)(batch))
 
 
 def test_actuators_that_remember_say_what_a_mirror_does_and_every_robot_of_a_batch_has_to_be_symmetric():

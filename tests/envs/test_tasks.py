@@ -2,6 +2,7 @@
 
 import copy
 import itertools
+from dataclasses import dataclass
 
 import gymnasium as gym
 import numpy as np
@@ -12,6 +13,7 @@ from refusals import assert_refused
 from seastar_gym import FailBlind, Miswired, ObstTrap, Prey, Prizes, Sight, Station
 from seastar_gym.envs.group import limb_order, transform_commands
 from seastar_gym.envs.randomization import drawn_scene
+from seastar_gym.envs.robots import Score, Task
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import symmetry_in
 from seastar_gym.envs.tasks import NAMED
@@ -21,7 +23,7 @@ from seastar_gym.envs.tasks.prizes import best_round, distances, draw_prizes, gr
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.water import UniformCurrent
 
-IDS = tuple(seastar_gym.TASKS)
+SWIM, IDS = "SeastarSwim-v0", tuple(seastar_gym.TASKS)
 HIDDEN = {
     "miswired": ["wiring"],
     "prey": ["course"],
@@ -518,3 +520,63 @@ def test_greed_takes_worth_per_metre_while_there_is_way_and_costs_in_every_draw(
     assert greedy_round(first, between, worth, 0.36) == 9.0 and greedy_round(first, between, worth, 0.09) == 0.0
     assert greedy_round(first, between, np.array([4.0, 2.0, 1.0, 1.0]), 0.3) == 6.0  # all of the way
     assert distances(places)[0].tolist() == pytest.approx([0.0, 0.2, 0.4, np.hypot(0.1, 0.35)])
+
+
+# A task of one's own
+
+
+@dataclass(frozen=True)
+class Own(Task):
+    """Swims away from the start, which it remembers."""
+
+    terms = "reward_far", "reward_time"
+
+    def draw(self, rng, scene):
+        return {"far": 0, "number": np.int64(3)}
+
+    def begin(self, robots, begun):
+        robots.episode.far[begun] = 0.25
+
+    def targets(self, robots):
+        return [[0.1, 0.0, 0.2, 0.0]] * robots.n_robots
+
+    def score(self, robots, hub, pulses):
+        robots.episode.far += 1.0
+        return Score({"reward_far": robots.episode.far, "reward_time": -0.25}, over=[0] * robots.n_robots)
+
+
+@dataclass(frozen=True)
+class Priced(Own):
+    price: float = 0.5
+
+
+def test_a_task_may_say_one_number_for_all_robots_and_write_fractions_and_its_arrays_stay_its_own():
+    batch = gym.make_vec(SWIM, 2, vectorization_mode="vector_entry_point", task=Own(), fidelity="fast")
+    batch.reset(seed=0)
+    (_, first, over, _, told), (_, second, *_) = (batch.step(np.zeros((2, 5), int)) for _ in range(2))
+    assert first.tolist() == [1.0, 1.0] and second.tolist() == [2.0, 2.0] and over.dtype == bool
+    assert told["reward_far"].tolist() == [1.25, 1.25] and told["reward_time"].tolist() == [-0.25, -0.25]
+    with assert_refused("made with its price"):
+        gym.make(SWIM, task=Priced(), fidelity="fast").unwrapped.price = 1.0
+
+
+WRONG = {
+    "targets must have two points of every robot, shape (1, 4), not (1, 2)": {"targets": lambda *_: np.zeros((1, 2))},
+    "observation is of shape (1, 2), and its entries say (1, 0)": {"observation": lambda *_: np.zeros((1, 2))},
+    "score has the terms reward_a, and its terms are": {"score": lambda *_: Score({"reward_a": np.zeros(1)})},
+    "reward_far of Wrong.score must be of shape (1,), not (1, 1)": {
+        "score": lambda *_: Score({"reward_far": np.zeros((1, 1)), "reward_time": 0.0})
+    },
+    "more of Wrong.info must be an array over 1 robots": {"info": lambda *_: {"more": 2.0}},
+    "draws numbers, and its name is 'a'": {"draw": lambda *_: {"name": "a"}},
+    "Wrong.terms must name the terms of the reward": {"terms": "reward_far"},
+}  # fmt: skip
+"""Sentences, and what a task has in the place of what is right."""
+
+
+@pytest.mark.parametrize("sentence", WRONG)
+def test_a_task_of_another_form_is_refused(sentence):
+    with assert_refused(sentence):
+        env = gym.make(SWIM, task=type("Wrong", (Own,), WRONG[sentence])(), fidelity="fast")
+        env.reset(seed=0)
+        env.step(np.zeros(5, int))

@@ -338,6 +338,8 @@ def test_logs_tell_when_commands_were_given_and_what_the_robot_did(scene, nodes,
         plant.wait(late)
         env.step(action)
     env.close()
+    with pytest.raises(Exception, match="reset"):  # or wires were heated again
+        env.step(1)
     measured = Measurement.from_csv(tmp_path / "tracking.csv", tmp_path / "commands.csv")
     assert measured.nodes == nodes and measured.commands.shape == (5, scene.robot.n_limbs)
     assert measured.command_times == pytest.approx((0.5 + late) * np.arange(5), abs=1e-5)
@@ -345,6 +347,15 @@ def test_logs_tell_when_commands_were_given_and_what_the_robot_did(scene, nodes,
     assert np.abs(measured.positions - expected).max() < 1e-3 < np.abs(expected - expected[0]).max() / 10
     poses = np.loadtxt(tmp_path / "poses.csv", delimiter=",", skiprows=1)
     assert poses[0, 4] == pytest.approx(1.0, abs=1e-6) and (poses[:, 0] < poses[:, 1]).all() and len(poses) > 100
+
+
+def test_a_plant_with_logs_is_reset_again(tmp_path):
+    """At times whose sums are rounded: a reset waits, and has to end."""
+    env = PlantSwim(simulated(), logs=tmp_path, **OPTIONS)
+    for _ in range(4):
+        env.reset()
+        env.step(3)
+    env.close()
 
 
 @pytest.mark.parametrize("name", ["tracking", "commands", "poses"])

@@ -211,7 +211,7 @@ class Prey(Task):
         """Courses around the robot, from time 0 on; that of the present prey, its distance, and what was caught."""
         pursuit = Pursuit(self.robot_speed, self.catch_radius)
         drawn = [draw_course(rng, self.radius, self.speed, self.epicycle, pursuit) for _ in range(MOST_PREY)]
-        return {"drawn": drawn, "course": np.zeros(8), "distance": 0.0, "catches": 0}
+        return {"drawn": drawn, "course": np.zeros(8), "distance": 0.0, "catches": np.int64(0)}
 
     def begin(self, robots: Robots, begun: Flags) -> None:
         """Let the first prey go."""
