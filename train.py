@@ -57,9 +57,11 @@ try:
     from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
     from seastar_gym.command import ended_by_disk
     from seastar_gym.controllers.learned import load as load_policy
-    from seastar_gym.evaluation.report import Curve, Remarks, read_progress
+    from seastar_gym.evaluation.report import PENTAGON_WAYPOINTS, Curve, Remarks, read_progress
 except ModuleNotFoundError as missing:
     sys.exit(f'train.py needs {missing.name}: pip install "seastar-gym[train]".')
+except KeyboardInterrupt:
+    sys.exit(130)
 
 
 def training_env(options: Options, robot: Robot) -> BatchVecEnv:
@@ -111,8 +113,8 @@ def describe(options: Options, robot: Robot, folder: Path, trained: int, watch: 
     against = {None: "", "greedy": " against greedy"}.get(rival, " against scripted")
     sentences = [
         f"Swum by the robot of {options.scene}." if robot.scene else f'Swum at fidelity "{options.fidelity}".',
-        f"Trained for {trained} strokes, seed {options.seed}, by the first of these commands; the last three show the "
-        "logs, compare again, and train on.",
+        f"Trained for {trained} decisions, seed {options.seed}. Of these commands, the last three show the logs, "
+        "compare again, and train on; those before them trained.",
     ]
     if seconds := sum(watch.seconds.values()):
         shares = ", ".join(f"{name} {share:.0%}" for name, share in watch.shares().items())
@@ -129,7 +131,7 @@ def describe(options: Options, robot: Robot, folder: Path, trained: int, watch: 
             f"seastar evaluate {shlex.join(agents)} --report --video --out runs/evaluate",
             f"{resume_command(folder)} --strokes {2 * trained}",
         ],
-        curves=[Curve.of("learned", read_progress(folder))],
+        curves=[Curve.of("learned", read_progress(folder), watch.pentagon.decision_period)],
         tables=[watch.efficiency.table()],
     )
 
@@ -143,11 +145,13 @@ def run_seeds(options: Options, arguments: Sequence[str]) -> int:
             if left := shlex.join(map(str, options.seeds[place + 1 :])):
                 print(f"and train the others with the same options, --seeds {left} --out {shlex.quote(str(folder))}")
             return code
-    print("seed, strokes round the pentagon, strokes and seconds of training until they were 170")
+    print("seed, time round the pentagon [s], decisions and seconds of training until it was 170 s or less")
     for seed in options.seeds:
         its_own = folder / f"seed_{seed}"
-        found, (_, pentagon, _) = efficiency.read(its_own), recorded(its_own)[-1]
-        print(f"{seed}, {pentagon}, {found.strokes_to_target}, {found.seconds_to_target}")
+        found, (_, decisions, waypoints) = efficiency.read(its_own), recorded(its_own)[-1]
+        seconds = decisions * load_policy(its_own / "policy.safetensors").decision_period
+        lap = f"{seconds:.4g}" if waypoints == PENTAGON_WAYPOINTS else f"only {waypoints} waypoints"
+        print(f"{seed}, {lap}, {found.strokes_to_target or '-'}, {found.seconds_to_target or '-'}")
     return 0
 
 
@@ -185,7 +189,7 @@ def train_and_compare(options: Options, robot: Robot, folder: Path, film: Callab
     agents = {"learned": load_policy(folder / "policy.safetensors"), **others}
     remarks = describe(options, robot, folder, model.num_timesteps, watch)
     compare(agents, options, robot, remarks, folder, dict.fromkeys(others, film))
-    print(f"Logs:    tensorboard --logdir {folder}\n{watch.efficiency}")
+    print(f"Logs:    tensorboard --logdir {shlex.quote(str(folder))}\n{watch.efficiency}")
     return publish(options, folder) if options.publish else 0
 
 

@@ -103,7 +103,8 @@ class Options:
             raise ValueError("--for-camera makes a policy from a finished run: name that with --resume, alone.")
         if self.publish and not (self.scene is None and self.intervals is None):
             raise ValueError("--publish is for policies of the chapter's robot, without --scene and --intervals.")
-        make_path(self.path, np.random.default_rng(0))
+        if self.scene is None:  # whose file may register the path
+            make_path(self.path, np.random.default_rng(0))
 
     @property
     def length(self) -> int:
@@ -140,6 +141,10 @@ def read_options(arguments: Sequence[str]) -> Options:
     saved = replace(saved_options(options.resume), out=options.resume, resume=options.resume)
     options = tyro.cli(Options, prog="python train.py", args=arguments, default=saved)
     changed = {name for name in vars(saved) if getattr(options, name) != getattr(saved, name)}
+    if "quick" in changed and options.for_camera is None:
+        raise ValueError("--quick is for new runs, and for --for-camera: leave it out.")
+    if options.out is not None and options.resume is not None and options.out.resolve() != options.resume.resolve():
+        raise ValueError(f"A run continues in its own folder, {options.resume}: leave out --out, or copy the run.")
     if forbidden := sorted(changed - CHANGEABLE | (changed & {"strokes"} if options.for_camera else set())):
         raise ValueError(f"The run in {options.resume} cannot continue with another {', '.join(forbidden)}.")
     return replace(options, out=options.resume)

@@ -94,9 +94,9 @@ class Efficiency:
     def table(self) -> ResultsTable:
         """Figures as a table of the report."""
         columns = {
-            "strokes": "strokes trained",
+            "strokes": "decisions trained",
             "seconds": "training [s]",
-            "strokes_to_target": f"strokes until the pentagon takes {TARGET:g} s",
+            "strokes_to_target": f"decisions until the pentagon takes {TARGET:g} s",
             "seconds_to_target": f"training until the pentagon takes {TARGET:g} s [s]",
         }
         return ResultsTable("Sample efficiency", columns, [asdict(self)])
@@ -226,7 +226,8 @@ def is_unbegun(folder: Path) -> bool:
 def resume_command(folder: Path) -> str:
     """Command that continues the run in a folder."""
     own = ["--run-scene"] if (folder / OWN_SCENE).is_file() else []
-    return shlex.join(["python", "train.py", "--resume", str(folder), *own])
+    start = ["python", "train.py"] if Path("train.py").is_file() else ["seastar", "train"]
+    return shlex.join([*start, "--resume", str(folder), *own])
 
 
 SCENE, INTERVALS = "scene.json", "intervals.json"

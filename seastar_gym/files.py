@@ -103,6 +103,17 @@ def require_writable(folder: str | os.PathLike[str]) -> None:
     probe.unlink()
 
 
+def require_place(path: str | os.PathLike[str]) -> None:
+    """Make the folder of a file that is written later. OSError, now, where the disk or what is there refuses."""
+    _require_replaceable(Path(path))
+    require_writable(Path(path).parent)
+
+
+def _require_replaceable(path: Path) -> None:
+    if path.exists() and not path.is_file():
+        raise FileExistsError(f"{path} is no file that can be written over.")
+
+
 @contextmanager
 def beside(path: str | os.PathLike[str], ending: str = PART) -> Iterator[Path]:
     """An empty file beside `path`, to write to. It takes its place at the end, when it is on the disk.
@@ -113,8 +124,7 @@ def beside(path: str | os.PathLike[str], ending: str = PART) -> Iterator[Path]:
     ending: Of the name of the file beside, for libraries that choose a format by it.
     """
     path = Path(path)
-    if path.exists() and not path.is_file():
-        raise FileExistsError(f"{path} is no file that can be written over.")
+    _require_replaceable(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(part_name(path.name, ending))
     part.open("xb").close()  # a new file: what is there, a link too, is refused

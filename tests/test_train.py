@@ -175,6 +175,12 @@ def test_a_finished_run_can_be_trained_for_more_strokes(finished, tmp_path, caps
     for option in (["--seed", "5"], ["--learning-rate", "0.1"], ["--path", "pentagon"]):
         assert train.main(["--resume", str(folder), *option]) == 2
         assert "cannot continue with another" in capsys.readouterr().err
+    for more, words in (
+        (["--out", str(tmp_path / "new")], "leave out --out"),
+        (["--quick"], "--quick is for new runs"),
+    ):
+        assert train.main(["--resume", str(finished), *more]) == 2
+        assert words in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -455,7 +461,8 @@ def test_several_seeds_are_runs_of_their_own(tmp_path, capsys, short_swims):
     trained = [policies.load(tmp_path / f"seed_{seed}" / "policy.safetensors").training["seed"] for seed in (3, 4)]
     assert trained == [3, 4]
     table = capsys.readouterr().out.splitlines()[-3:]
-    assert table[0].startswith("seed, strokes round the pentagon") and [line[0] for line in table[1:]] == ["3", "4"]
+    assert table[0].startswith("seed, time round the pentagon [s]") and [line[0] for line in table[1:]] == ["3", "4"]
+    assert all(" waypoints, -, -" in line for line in table[1:])  # no lap was finished
     assert train.main(["--resume", str(tmp_path / "seed_3"), "--strokes", "256"]) == 0
     assert train.main(["--resume", str(tmp_path)]) == 2
     assert_told(capsys, f"such as {tmp_path / 'seed_3'}.")

@@ -22,7 +22,7 @@ from seastar_gym.accuracy.certificate import MARGIN, Certificate
 from seastar_gym.accuracy.measure import SAMPLES, Progress, certify
 from seastar_gym.accuracy.resonance import told as told_of
 from seastar_gym.command import DEFAULT, answered, command_parser
-from seastar_gym.files import require_extra, require_writable, save_figure, write_json
+from seastar_gym.files import require_extra, require_place, save_figure, write_json
 from seastar_gym.scene.checks import require_error
 from seastar_gym.scene.scene import load_scene
 
@@ -77,7 +77,7 @@ def require_file(option: str, file: Path | None) -> None:
         return
     if file.is_dir():
         raise ValueError(f"{file} is a folder: give --{option} a file.")
-    require_writable(file.parent)
+    require_place(file)
 
 
 @contextmanager

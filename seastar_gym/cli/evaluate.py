@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, NamedTuple, get_args
 
 from seastar_gym.command import DEFAULT, answered, command_parser
 from seastar_gym.controllers.contract import Policy
-from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.controllers.learned import LearnedPolicy, load
 from seastar_gym.controllers.registry import (
     DEFAULTS,
     HELP,
@@ -50,7 +50,7 @@ from seastar_gym.evaluation.rollout import require_task, task_ids
 from seastar_gym.evaluation.scores import Scores, measured, policies_of
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.evaluation.trials import SETS, as_text, trials
-from seastar_gym.files import require_extra, require_writable
+from seastar_gym.files import read_json, require_extra, require_place, require_writable
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_number, require_period
 from seastar_gym.scene.numerics import Fidelity
@@ -67,13 +67,12 @@ def parser() -> argparse.ArgumentParser:
     flag = argparse.BooleanOptionalAction
     found = command_parser("seastar evaluate", __doc__)
     found.add_argument(
-        "--agents",
-        nargs="+",
+        "--agents", nargs="+", action="extend",
         help=f"{HELP} {DEFAULTS}; others with --sets or --task",
-    )
+    )  # fmt: skip
     found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {DEFAULT}")
     found.add_argument(
-        "--fidelity", nargs="+", choices=get_args(Fidelity),
+        "--fidelity", nargs="+", action="extend", choices=get_args(Fidelity),
         help=f"{FIDELITY_HELP}, several with --sets (default: the scene's or task's own, otherwise balanced)",
     )  # fmt: skip
     found.add_argument(
@@ -87,28 +86,39 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--waypoint-radius", type=float, default=WAYPOINT_RADIUS, help=radius)
     found.add_argument("--random-heading", action=flag, default=False, help="turn the robot at random at the start")
     found.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn at random {DEFAULT}")
-    found.add_argument("--out", type=Path, help="folder for evaluation.csv and traces.png, or a file")
+    found.add_argument(
+        "--out", type=Path, help="folder for evaluation.csv and traces.png; with --sets or --task a file"
+    )
     found.add_argument("--video", action=flag, default=False, help="write a video of every agent")
     found.add_argument("--report", action=flag, default=False, help="write report.html, one page with all of it")
     found.add_argument(
         "--trajectory", action=flag, default=False, help="write trajectories.csv: time, hub and heat of every stroke"
     )
     report = found.add_argument_group("what the report shows, too")
-    report.add_argument("--runs", nargs="+", type=Path, default=[], help="trainings (default: those of learned agents)")
+    report.add_argument(
+        "--runs", nargs="+", action="extend", type=Path, default=[],
+        help="folders of trainings (default: those of learned agents)",
+    )  # fmt: skip
     report.add_argument("--trials", type=Path, help="CSV file that --sets wrote")
     many = found.add_argument_group("many swims")
-    many.add_argument("--sets", nargs="+", choices=SETS, help="named paths; random paths or the pentagon, disturbed")
+    many.add_argument(
+        "--sets", nargs="+", action="extend", choices=SETS,
+        help="named paths; random paths or the pentagon, disturbed",
+    )  # fmt: skip
     many.add_argument("--swims", type=int, default=1000, help=f"number of random paths of every set {DEFAULT}")
     tasks = found.add_argument_group("registered tasks")
-    tasks.add_argument("--task", nargs="+", metavar="ID", help="ids, module:id for one of your own, or all")
+    tasks.add_argument(
+        "--task", nargs="+", action="extend", metavar="ID", help="ids, module:id for one of your own, or all"
+    )
     tasks.add_argument("--seeds", type=int, default=10, help=f"number of held-out episodes {DEFAULT}")
     tasks.add_argument("--decisions", type=int, help="time limit [decisions] (default: that of the task); with "
                        f"--benchmark length of the trainings (default: {benchmark.BUDGETS[0]})")  # fmt: skip
     tasks.add_argument("--benchmark", nargs="?", const="test", choices=tuple(benchmark.FIRST),
                        help="the protocol of docs/benchmark.md; check: on its other 64 episodes")  # fmt: skip
     tasks.add_argument(
-        "--merge", nargs="+", type=Path, default=[], help="results of --benchmark to show as well, files or folders"
-    )
+        "--merge", nargs="+", action="extend", type=Path, default=[],
+        help="results of --benchmark to show as well, files or folders",
+    )  # fmt: skip
     many.add_argument("--num-threads", type=int, help="threads of the simulator (default: one for every processor)")
     return found
 
@@ -150,24 +160,32 @@ def robot_of(options: argparse.Namespace, fidelity: Fidelity | None) -> tuple[Sc
     return scene_at(scene, fidelity, "balanced"), period
 
 
+def require_folder(out: Path | None) -> None:
+    """ValueError for a name of a file where several files are written."""
+    if out is not None and out.suffix in benchmark.FORMS:
+        raise ValueError(f"Several files are written: --out is a folder for them, not {out.name}.")
+
+
 def compared(options: argparse.Namespace, command: str) -> int:
-    """Let the agents swim the path; returns the exit code, 2 where one that was named does not fit.
+    """Let the agents swim the path; returns the exit code, 2 where one that was named does not fit, or failed.
 
     command: What was typed.
     """
     require_sound(options)
-    fidelity, path = fidelities(options)[0], load_path(options.path)
+    require_folder(options.out)
+    fidelity = fidelities(options)[0]
     own, options.decision_period = robot_of(options, options.fidelity and fidelity)
+    path = load_path(options.path)  # now: a scene's file may register it
     agents, left_out = fitting_agents(options.agents, options.seed, fidelity, options.decision_period, own)
     print("".join(f"{sentence}\n" for sentence in left_out), end="", file=sys.stderr)
     limit = decisions_in(options.seconds, options.decision_period, own)
-    evaluate(
+    swims = evaluate(
         agents, path, seed=options.seed, max_strokes=limit, waypoint_radius=options.waypoint_radius, scene=own,
         decision_period=options.decision_period, out=options.out, video=options.video, trajectory=options.trajectory,
         report=remarks(agents, options, command, own) if options.report else None,
         fidelity=fidelity if own is None else None, random_heading=options.random_heading,
     )  # fmt: skip
-    return 2 if left_out and options.agents else 0
+    return 2 if (left_out and options.agents) or len(swims) < len(agents) else 0
 
 
 def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: str, own: Scene | None) -> "Remarks":
@@ -176,9 +194,16 @@ def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: 
     from seastar_gym.evaluation.report import Curve, Remarks, read_progress, trials_table
 
     trainings = {name: one.training for name, one in agents.items() if isinstance(one, LearnedPolicy)}
-    progress = {name: how["progress"] for name, how in trainings.items() if "progress" in how}
+    curves = [
+        Curve.of(name, how["progress"], agents[name].decision_period)  # type: ignore[attr-defined]
+        for name, how in trainings.items() if "progress" in how
+    ]  # fmt: skip
     if options.runs:
-        progress = {folder.name: read_progress(folder) for folder in options.runs}
+        named = [folder.name for folder in options.runs]
+        curves = [
+            Curve.of(str(run) if named.count(run.name) > 1 else run.name, read_progress(run), period_of(run))
+            for run in dict.fromkeys(options.runs)
+        ]
     commands = dict.fromkeys(command for how in trainings.values() for command in how.get("commands", ()))
     swum = f'Computed at fidelity "{fidelities(options)[0]}".'
     if own is not None:
@@ -187,15 +212,28 @@ def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: 
         title=f"Evaluation: {options.path}",
         sentences=[swum],
         commands=[*commands, command],
-        curves=[Curve.of(name, rows) for name, rows in progress.items()],
+        curves=curves,
         tables=[] if options.trials is None else [trials_table(options.trials)],
     )
 
 
+def period_of(folder: Path) -> float:
+    """Time between decisions [s] of the training in a folder; that of a stroke where neither file says one."""
+    if (policy := folder / "policy.safetensors").is_file():
+        return load(policy).decision_period
+    config = folder / "config.json"
+    try:
+        return float(read_json(config)["options"]["ppo"]["decision_period"] or 1.0)
+    except (OSError, KeyError, TypeError, ValueError):
+        return 1.0
+
+
 def swum_often(options: argparse.Namespace) -> int:
-    """Let the agents swim the sets; returns the exit code."""
+    """Let the agents swim the sets; returns the exit code, 2 where one failed."""
     require_sound(options)
-    rows, differences = list[Row](), dict[str, str]()
+    if options.out is not None:
+        require_place(options.out)
+    rows, differences, failed = list[Row](), dict[str, str](), list[str]()
     for typed in options.fidelity or [None]:
         fidelity: Fidelity = typed or "balanced"
         own, period = robot_of(options, typed)
@@ -205,14 +243,16 @@ def swum_often(options: argparse.Namespace) -> int:
         rows += trials(
             agents, options.sets, options.swims, fidelity=fidelity, seed=options.seed, decision_period=period,
             threads=options.num_threads, max_strokes=decisions_in(options.seconds, period, own), scene=own,
+            say=failed.append,
         )  # fmt: skip
         learned = {name: one for name, one in agents.items() if isinstance(one, LearnedPolicy)}
         differences |= {name: found for name, one in learned.items() if (found := one.differences(robot))}
     print(as_text(rows, period))
     print("".join(f"{name}: {found}\n" for name, found in differences.items()), end="")
+    print("".join(f"{sentence}\n" for sentence in failed), end="", file=sys.stderr)
     if options.out is not None:
         write_csv(rows, options.out)
-    return 0
+    return 2 if failed else 0
 
 
 def labelled(agents: Sequence[str]) -> dict[str, list[str]]:
@@ -235,6 +275,8 @@ def measured_on_tasks(options: argparse.Namespace) -> int:
     labelled(agents)
     for task in tasks:
         require_task(task)
+    if options.out is not None:
+        require_place(options.out)
     found, fidelity = list[Scores](), (options.fidelity or [None])[0]
     for task, agent in itertools.product(tasks, agents):
         try:
@@ -259,7 +301,7 @@ def measured_on_benchmark(options: argparse.Namespace) -> int:
     require_count("--decisions", decisions, 1, 10**9)
     if options.decisions is not None and not agents:
         raise ValueError("--decisions says how long --agents have learned: name them, or leave it out.")
-    cells = known_cells(options.merge, ids, options.out)
+    known = known_cells(options.merge, ids, options.out)
     if agents and options.decisions is None:
         print(f"Trainings of --agents count as of {decisions:,} decisions: --decisions says another length.")
     for id, (label, names) in itertools.product(ids, agents.items()):
@@ -269,9 +311,10 @@ def measured_on_benchmark(options: argparse.Namespace) -> int:
             print(f"{label} does not swim {id}: {unfit}", file=sys.stderr)
             left_out += 1
             continue
-        cells = benchmark.merged({"What is known": cells, f"--agents {label}": found})
+        known.setdefault(f"--agents {label}", []).extend(found)
         if options.out is not None:
-            benchmark.write_all(cells, options.out)
+            benchmark.write_all(benchmark.merged(known), options.out)
+    cells = benchmark.merged(known)
     shown = [cell for cell in cells if cell.id in ids and (options.benchmark != "check" or cell.first == first)]
     if not shown:
         raise ValueError("There is nothing to show: name --agents that fit, or files to --merge.")
@@ -281,20 +324,22 @@ def measured_on_benchmark(options: argparse.Namespace) -> int:
     return 2 if left_out else 0
 
 
-def known_cells(files: Sequence[Path], ids: Sequence[str], out: Path | None) -> list[Cell]:
-    """Cells of ids in files, and all that a folder of results has; the folder is made, and can be written to."""
+def known_cells(files: Sequence[Path], ids: Sequence[str], out: Path | None) -> dict[str, list[Cell]]:
+    """Cells of ids in files, and all that a folder of results has, by file; the folder is made, and can be written to.
+
+    ValueError where they do not merge.
+    """
+    require_folder(out)
     files = [file / benchmark.RESULTS if file.is_dir() else file for file in files]
     parts = {str(file): [cell for cell in benchmark.cells_in(file) if cell.id in ids] for file in files}
     if out is not None:
-        if out.suffix in benchmark.FORMS:
-            raise ValueError(f"The benchmark writes several files: --out is a folder for them, not {out.name}.")
         require_writable(out)
         if (kept := out / benchmark.RESULTS).exists():
             parts[str(kept)] = benchmark.cells_in(kept)
-    cells = benchmark.merged(parts)
+    benchmark.merged(parts)
     for source, own in parts.items():
         benchmark.require_current(own, source)
-    return cells
+    return parts
 
 
 class Mode(NamedTuple):
@@ -332,7 +377,7 @@ MODES = {
 
 def require_heeded(mode: Mode, given: Sequence[str]) -> None:
     """ValueError, with one sentence, where an option was typed that a mode would not heed."""
-    own, untyped = parser(), object()
+    own, untyped = parser(), list[str]()  # as options that are given several times are extended
     own.set_defaults(**dict.fromkeys(vars(own.parse_args([])), untyped))
     typed = {name for name, value in vars(own.parse_args(given)).items() if value is not untyped}
     if others := sorted(typed.difference(mode.heeds.split())):

@@ -88,7 +88,7 @@ def typed(text: str, n_limbs: int) -> Iterator[set[str]]:
     ValueError, with one sentence, for a key that means nothing.
     """
     for word in text.split():
-        keys, _, times = word.partition("*")
+        keys, _, times = word.lower().partition("*")
         held = {keys} if keys in ARROWS else set(keys) - {NOTHING}
         if unknown := held - known_keys(n_limbs):
             raise ValueError(f"There is no key {min(unknown)!r}: {', '.join(sorted(known_keys(n_limbs)))} are known.")

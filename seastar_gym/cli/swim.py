@@ -7,6 +7,7 @@ often as it decides, where options name none.
 """
 
 import argparse
+import math
 from pathlib import Path
 from typing import Any, get_args
 
@@ -89,11 +90,11 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
         asked |= camera._asdict()
     if options.action_delay is not None:
         asked["action_delay"] = options.action_delay
+    own = own_scene(options.scene)  # before the path, which its file may register
     if options.path is not None:
         asked["path"] = load_path(options.path)
     if options.random_heading:
         asked["random_heading"] = True
-    own = own_scene(options.scene)
     asked = trained_for(options) | {name: value for name, value in asked.items() if value is not None}
     if (scene := scene_at(own or asked.get("scene"), options.fidelity, "balanced")) is not None:
         asked |= {"scene": scene, "fidelity": None}
@@ -105,24 +106,32 @@ def make(options: argparse.Namespace, **more: Any) -> gym.Env[Any, Any]:
     task = "SeastarSwim-v0" if options.task is None else options.task
     arguments = {**arguments_of(options), **more}
     if (period := arguments.get("decision_period")) is not None:
-        arguments["max_episode_steps"] = decisions_in(TIME_LIMIT, period)
+        arguments.setdefault("max_episode_steps", decisions_in(TIME_LIMIT, period))
     return make_task(task, **arguments)
 
 
 def watch(options: argparse.Namespace) -> str:
     """Let the agent swim and show it; returns a sentence on how it went."""
-    plain: Any = make(options).unwrapped
+    made = make(options)
+    plain: Any = made.unwrapped
     policy = load_agent(options.agent, plain, options.seed)
     actions = require_seen(policy, plain)
     period = plain.decision_period
     number, fps = rate(options.film, period, options.speed)
-    env = make(options, actions=actions, render_mode="rgb_array_list", frames_per_stroke=number)
     limit = None if options.seconds is None else decisions_in(options.seconds, period, plain.scene)
+    longer = {} if limit is None or limit <= most_of(made) else {"max_episode_steps": limit}
+    env = make(options, actions=actions, render_mode="rgb_array_list", frames_per_stroke=number, **longer)
     with screen(options.film, fps) as show:
         info = show_episode(env, policy, show, options.seed, limit)
     env.close()
     written = "" if options.film is None else f" Written: {options.film}."
     return f"{options.agent}: {outcome(env.unwrapped, info)}.{written}"
+
+
+def most_of(env: gym.Env[Any, Any]) -> float:
+    """Most decisions of an episode."""
+    most = None if env.spec is None else env.spec.max_episode_steps
+    return math.inf if most is None else most
 
 
 def show_episode(

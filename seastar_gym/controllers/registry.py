@@ -21,6 +21,7 @@ import importlib.util
 import inspect
 import pickle
 import re
+import traceback
 import warnings
 import zipfile
 import zlib
@@ -33,6 +34,7 @@ from typing import Any, get_args
 
 import numpy as np
 
+import seastar_gym
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.contract import Policy, actions_of, answer_of, is_batched, require_fit
 from seastar_gym.controllers.learned import LearnedPolicy, reason_of
@@ -47,6 +49,7 @@ from seastar_gym.scene.checks import require_choice, require_kind, require_perio
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene import failure_in, find_modules_in
 
+PACKAGE = Path(seastar_gym.__file__).parent
 _FUNCTION = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 
@@ -73,9 +76,10 @@ def own_code(name: str) -> Iterator[None]:
     """Context in which an exception of the code of "module:function" becomes a ValueError with one sentence."""
     try:
         yield
-    except (ValueError, OSError):
-        raise  # a sentence already
     except Exception as wrong:  # the module is anybody's code
+        raised_in = Path(traceback.extract_tb(wrong.__traceback__)[-1].filename)
+        if isinstance(wrong, ValueError | OSError) and raised_in.is_relative_to(PACKAGE):
+            raise  # a sentence already
         raise ValueError(failure_in(module_file(name), wrong)) from wrong
 
 
@@ -141,7 +145,12 @@ class OwnPolicy:
     ) -> tuple[Any, Any]:
         """Action and state of one robot, or actions, shape (n, ...), and states of n robots."""
         with own_code(self._name):
-            if np.ndim(observation) == 1 or is_batched(self._policy):
+            is_alone = np.ndim(observation) == 1
+            if is_batched(self._policy):
+                seen = np.asarray(observation)[None] if is_alone else observation
+                action, state = answer_of(self._policy.predict(seen, state, episode_start, deterministic))
+                return (np.asarray(action)[0] if is_alone else action), state
+            if is_alone:
                 return answer_of(self._policy.predict(observation, state, episode_start, deterministic))
             return self._of_each(observation, state, episode_start, deterministic)
 
@@ -333,7 +342,8 @@ def load_agent(name: str, env: OneRobotEnv, seed: int = 0) -> Policy:
     require_kind("name", name, str, "the name of an agent")
     require_seed(seed)
     if not all(hasattr(env, known) for known in ("timed", "scene", "step")):
-        raise ValueError(f"env must be an environment of this package, not {shown(env)}.")
+        plain = ": give env.unwrapped" if env is not getattr(env, "unwrapped", env) else ""
+        raise ValueError(f"env must be an environment of this package, not {shown(env)}{plain}.")
     return _load_agent(name, seed, env.scene, env.timed, task_of(env), lambda: env)
 
 

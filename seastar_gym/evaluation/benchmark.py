@@ -209,8 +209,8 @@ def measured(
     require_ids([id])
     names = [names] if isinstance(names, str) else names
     env, cells = env_of(id, task=task_of(id), split="test", fidelity=FIDELITY), list[Cell]()
-    for seed, name in enumerate(names):
-        policy = load_agent(name, env)
+    policies = [load_agent(name, env) for name in names]  # all, before one swims
+    for seed, (name, policy) in enumerate(zip(names, policies, strict=True)):
         length = length_of(policy) if not (is_file(name) or is_function(name)) else decisions
         require_length(name, policy, length)
         batch = make(id, EPISODES, "test", threads, actions=require_seen(policy, env))
@@ -314,7 +314,8 @@ def merged(parts: Mapping[str, Iterable[Cell]]) -> list[Cell]:
             if (same.measure, same.returns, same.success) != (cell.measure, cell.returns, cell.success):
                 both = f"{source} has two" if whose == source else f"{whose} and {source} have different"
                 raise ValueError(
-                    f"{both} results of {cell.agent} in {cell.id}, seed {cell.seed}: name them apart by LABEL=FILES."
+                    f"{both} results of {cell.agent} in {cell.id}, seed {cell.seed}: name them apart by LABEL=FILES, "
+                    "whose seeds are their places, from 0."
                 )
     return [cell for cell, _ in found.values()]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
@@ -50,6 +51,8 @@ def evaluate(
 ) -> list[Swim]:
     """Let every agent swim the path and print the table; returns the swims in the order of the agents.
 
+    One of several that fails is left out with a sentence. ValueError, with that sentence, where none is left.
+
     agents: Policies by name, see `Policy`. Those that were trained for a camera swim as it sees them.
     path: Name of a path, or waypoints [m], shape (n, 2).
     seed, reset_options: Seed and options of every agent's `reset`.
@@ -80,14 +83,23 @@ def evaluate(
         "path": path, "waypoint_radius": waypoint_radius, "scene": scene, "decision_period": decision_period
     }  # fmt: skip
     episode = {"seed": seed, "reset_options": reset_options, "max_strokes": max_strokes}
-    swims, playbacks = list[Swim](), list[Playback]()
+    swims, playbacks, failures = list[Swim](), list[Playback](), list[ValueError]()
     for name, policy in agents.items():
         film_file = _without_film(videos.get(name), (filmed or {}).get(name))
-        swum, playback = _swim_once(name, policy, environment, episode, film_file, report is not None)
+        try:
+            swum, playback = _swim_once(name, policy, environment, episode, film_file, report is not None)
+        except ValueError as wrong:
+            failures.append(wrong)
+            videos.pop(name, None)
+            continue
         swims.append(swum)
         playbacks += [] if playback is None else [playback]
+    if failures and not swims:
+        raise failures[0]
     swum_in = scene or make_scene(None, None, decision_period)
     _tell(swims, agents, swum_in, say)
+    for failed in failures:
+        say(str(failed))
     if folder is not None:
         fluid = swum_in.of_robot(0).fluid
         current = None if fluid is None else fluid.current
@@ -108,7 +120,8 @@ def evaluate(
 def _tell(swims: list[Swim], agents: Mapping[str, Policy], scene: Scene, say: Callable[[str], None]) -> None:
     """Say how the agents swam, and why a solver gave up or how a policy's robot differs."""
     say(as_text(swims))
-    for done, policy in zip(swims, agents.values(), strict=True):
+    for done in swims:
+        policy = agents[done.agent]
         differences = policy.differences(scene) if isinstance(policy, LearnedPolicy) else None
         for remark in filter(None, (done.solver_message, differences)):
             say(f"{done.agent}: {remark}")
@@ -141,11 +154,14 @@ def _swim_once(
     if video is None and not record:
         return swum_by(SeastarSwimEnv(**environment)), None
     env = RecordingEnv(film=video is not None, frames_per_stroke=FRAMES_PER_STROKE, **environment)
-    with film(video, FPS) if video is not None else nullcontext(lambda picture: None) as add:
+    every, numbers = max(1, round(1.0 / env.decision_period)), itertools.count()
+    fps = FPS / (every * env.decision_period)
+    with film(video, fps) if video is not None else nullcontext(lambda picture: None) as add:
 
         def watch(env: OneRobotEnv) -> None:
             for picture in env.render() or ():
-                add(picture)
+                if next(numbers) % every == 0:
+                    add(picture)
 
         swum = swum_by(env, watch=watch)
     env.close()

@@ -3,14 +3,14 @@
 import os
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.files import beside, require_extra
+from seastar_gym.files import beside, require_extra, require_place
 from seastar_gym.scene.checks import require_file, require_number, shown
 
 Picture = NDArray[np.uint8]
@@ -18,6 +18,8 @@ Picture = NDArray[np.uint8]
 
 CLOSING_SECONDS = 1.5
 """How long a film rests on its last picture."""
+SHORTEST = 2
+"""Hundredths of a second that a picture of a GIF lasts at least: viewers slow down what is shorter."""
 SLOWEST, FASTEST = 0.01, 1000.0
 """Fewest and most pictures per second."""
 SCALE = 2
@@ -39,15 +41,17 @@ def film_format(file: Path) -> str:
 
 @contextmanager
 def film(file: str | os.PathLike[str], fps: float) -> Iterator[Callable[[Picture], None]]:
-    """Context that gives a function to add pictures with; the film rests on its last one.
+    """Context that gives a function to add pictures with; the film rests on its last one. Without any, none is written.
 
-    fps: Pictures per second. GIFs are shown for hundredths of a second, so theirs is rounded.
+    fps: Pictures per second. A picture of a GIF lasts two hundredths of a second or more: of more than 50, some are
+    left out.
     """
     require_file("file", file)
     require_number("fps", fps, "1/s")
     if not SLOWEST <= fps <= FASTEST:
         raise ValueError(f"fps must be from {SLOWEST:g} to {FASTEST:g} pictures per second, not {shown(fps)}.")
     file = Path(file)
+    require_place(file)
     write = _mp4 if film_format(file) == ".mp4" else _gif
     with write(file, fps) as add:
         last: list[Picture] = []
@@ -71,12 +75,19 @@ def _mp4(file: Path, fps: float) -> Iterator[Callable[[Picture], None]]:
     import imageio.v2 as imageio
 
     fast = ["-preset", "veryfast"]
-    with beside(file, ".mp4") as part:
-        movie: Any = imageio.get_writer(
-            part, format="FFMPEG", mode="I", fps=fps, codec="libx264", quality=7, output_params=fast
-        )
-        with movie:
-            yield movie.append_data
+    with ExitStack() as files:
+        movies: list[Any] = []
+
+        def add(picture: Picture) -> None:
+            if not movies:
+                part = files.enter_context(beside(file, ".mp4"))
+                movies.append(imageio.get_writer(
+                    part, format="FFMPEG", mode="I", fps=fps, codec="libx264", quality=7, output_params=fast
+                ))  # fmt: skip
+                files.enter_context(movies[0])
+            movies[0].append_data(picture)
+
+        yield add
 
 
 @contextmanager
@@ -110,16 +121,33 @@ def frequent_colours(picture: Picture, n: int) -> Picture:
     return np.stack([most >> 16, most >> 8 & 255, most & 255], axis=1).astype(np.uint8)
 
 
+def durations(number: int, fps: float) -> dict[int, int]:
+    """Pictures of a GIF that are shown, of a number of them, and for how many hundredths of a second each.
+
+    A picture begins at the hundredth next to its time; one that would not last SHORTEST is left out, unless it is the
+    first.
+    """
+    begins = {0: 0}
+    for k in range(1, number):
+        begin = round(100.0 * k / fps)
+        if begin - begins[max(begins)] >= SHORTEST:
+            begins[k] = begin
+    ends = [*list(begins.values())[1:], max(round(100.0 * number / fps), begins[max(begins)] + SHORTEST)]
+    return {k: end - begin for (k, begin), end in zip(begins.items(), ends, strict=True)}
+
+
 def write_gif(pictures: list[Picture], file: Path, fps: float) -> None:
     """Write an animated GIF whose pictures share one palette, made of some of them."""
     from PIL import Image
 
+    times = durations(len(pictures), fps)
+    pictures = [pictures[k] for k in times]
     some = np.unique(np.linspace(0, len(pictures) - 1, SAMPLE).round().astype(int))
     sample = np.concatenate([pictures[k] for k in some], axis=0)
     blends = Image.fromarray(sample).quantize(COLOURS // 2, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     palette = Image.new("P", (1, 1))
     palette.putpalette(frequent_colours(sample, COLOURS // 2).tobytes() + bytes(blends.getpalette() or ()))
     images = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
-    duration = 10 * max(2, round(100.0 / fps))  # viewers slow down what is shown for less than two hundredths
+    shown_for = [10 * time for time in times.values()]
     with beside(file) as part:
-        images[0].save(part, "GIF", save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)
+        images[0].save(part, "GIF", save_all=True, append_images=images[1:], duration=shown_for, loop=0, optimize=True)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FRAMES_PER_STROKE, FPS = 3, 30
-"""Frames of a video per stroke and per second: strokes of one second pass ten times as fast."""
+"""Frames of a video per stroke of a second, and per second: it passes ten times as fast."""
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8c6d1f", "#56b4e9", "#6a3d9a", "#e69f00")
 LINE_STYLES = ("-", "--", ":")
@@ -124,7 +124,8 @@ def _draw_trace(axes: Axes, swim: Swim, number: int) -> None:
     colour = COLOURS[number % len(COLOURS)]
     style = LINE_STYLES[number // len(COLOURS) % len(LINE_STYLES)]
     width, level = 1.4 + 0.4 * min(number, 4), 4.0 - 0.01 * number
-    label = f"{swim.agent}: {swim.result}".replace("$", r"\$")
+    name = f" {swim.agent}" if swim.agent.startswith("_") else swim.agent  # labels that begin with "_" are not shown
+    label = f"{name}: {swim.result}".replace("$", r"\$")
     axes.plot(*hub.T, color=colour, linestyle=style, linewidth=width, zorder=level, label=label)
     dots = hub[STROKES_PER_DOT::STROKES_PER_DOT]
     axes.plot(*dots.T, color=colour, linestyle="", marker="o", markersize=width + 2.0, zorder=level)

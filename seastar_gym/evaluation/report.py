@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.evaluation.pictures import COLOURS, FAINT_INK, FLOW, INK, MM, PLANNED, STROKES_PER_DOT, flow_in, view
 from seastar_gym.evaluation.playback import UNIT, Playback
-from seastar_gym.evaluation.results import COLUMNS, Row, in_words, number
+from seastar_gym.evaluation.results import Row, columns_of, in_words, number
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.evaluation.trials import COLUMNS as TRIALS
 from seastar_gym.evaluation.trials import as_shown, read_trials
@@ -117,21 +117,24 @@ class Curve:
 
     name: str
     trained: Floats
-    """Strokes trained, shape (n,)."""
+    """Decisions trained, shape (n,)."""
     pentagon: Floats
-    """Strokes round the pentagon, NaN where it was not finished, shape (n,)."""
+    """Simulated time round the pentagon [s], infinite where it was not finished, shape (n,)."""
 
     @classmethod
-    def of(cls, name: str, progress: Sequence[Sequence[float]]) -> "Curve":
-        """From rows of strokes trained, strokes round the pentagon, waypoints reached. ValueError for none."""
+    def of(cls, name: str, progress: Sequence[Sequence[float]], period: float = 1.0) -> "Curve":
+        """From rows of decisions trained, decisions round the pentagon, waypoints reached. ValueError for none.
+
+        period: Time between decisions [s].
+        """
         if not progress:
             raise ValueError(f"The training of {name} has no learning curve yet: it was stopped before a checkpoint.")
         trained, pentagon, waypoints = np.array(progress, dtype=float).T
-        return cls(name, trained, np.where(waypoints == PENTAGON_WAYPOINTS, pentagon, np.nan))
+        return cls(name, trained, np.where(waypoints == PENTAGON_WAYPOINTS, period * pentagon, np.inf))
 
 
 def read_progress(folder: Path) -> list[list[int]]:
-    """The rows of a training's progress.csv: strokes trained, strokes round the pentagon, waypoints reached."""
+    """The rows of a training's progress.csv: decisions trained, those round the pentagon, and waypoints reached."""
     rows = read_rows(folder / "progress.csv")
     for row in rows:
         if len(row.fields) != 3:
@@ -139,28 +142,27 @@ def read_progress(folder: Path) -> list[list[int]]:
     return [row.integers() for row in rows]
 
 
-def curves_figure(curves: Sequence[Curve], baselines: Mapping[str, int]) -> go.Figure:
-    """Strokes round the pentagon over the course of trainings; of several, with their median and range.
+def curves_figure(curves: Sequence[Curve], baselines: Mapping[str, float]) -> go.Figure:
+    """Time round the pentagon over the course of trainings; of several, with their median and range.
 
-    baselines: Strokes that other agents take.
+    baselines: Times of other agents [s].
     """
     figure = go.Figure()
     if len(curves) > 2:
         _add_band(figure, curves)
     for k, curve in enumerate(curves):
-        with_gaps = [None if np.isnan(strokes) else strokes for strokes in curve.pentagon.tolist()]
         figure.add_scatter(
-            x=curve.trained.tolist(), y=with_gaps, name=html.escape(curve.name), mode="lines+markers",
+            x=curve.trained.tolist(), y=_with_gaps(curve.pentagon), name=html.escape(curve.name), mode="lines+markers",
             line={"color": COLOURS[k % len(COLOURS)], "width": 1 if len(curves) > 2 else 2}, marker={"size": 5},
         )  # fmt: skip
     _add_unfinished(figure, curves)
-    for name, strokes in baselines.items():
+    for name, seconds in baselines.items():
         figure.add_hline(
-            y=strokes, line={"color": FAINT_INK, "dash": "dash"},
-            annotation_text=f"agent {html.escape(name)}: {strokes}", annotation_position="top left",
+            y=seconds, line={"color": FAINT_INK, "dash": "dash"},
+            annotation_text=f"agent {html.escape(name)}: {seconds:.4g} s", annotation_position="top left",
         )  # fmt: skip
     figure.update_layout(
-        xaxis={"title": "strokes trained", "rangemode": "tozero"}, yaxis={"title": "strokes round the pentagon"},
+        xaxis={"title": "decisions trained", "rangemode": "tozero"}, yaxis={"title": "time round the pentagon [s]"},
         legend_y=1.01, margin=MARGIN,
     )  # fmt: skip
     return figure
@@ -168,7 +170,7 @@ def curves_figure(curves: Sequence[Curve], baselines: Mapping[str, int]) -> go.F
 
 def _add_unfinished(figure: go.Figure, curves: Sequence[Curve]) -> None:
     """Crosses above the curves where a policy did not finish the pentagon yet: a training shows from its begin."""
-    early = [trained for curve in curves for trained in curve.trained[np.isnan(curve.pentagon)].tolist()]
+    early = [trained for curve in curves for trained in curve.trained[np.isinf(curve.pentagon)].tolist()]
     if not early:
         return
     finished = np.concatenate([curve.pentagon[np.isfinite(curve.pentagon)] for curve in curves])
@@ -179,20 +181,27 @@ def _add_unfinished(figure: go.Figure, curves: Sequence[Curve]) -> None:
     )  # fmt: skip
 
 
+def _with_gaps(values: Floats) -> list[float | None]:
+    """Numbers for a line that has gaps where they are infinite."""
+    return [value if np.isfinite(value) else None for value in values.tolist()]
+
+
 def _add_band(figure: go.Figure, curves: Sequence[Curve]) -> None:
-    """Median and range of the curves at the strokes that they have in common; one that did not finish is worst."""
+    """Median and range of the curves at the lengths that they have in common; one that did not finish is worst."""
     trained = sorted(set.intersection(*(set(curve.trained.tolist()) for curve in curves)))
-    worst = np.array([[_at(curve, one) for one in trained] for curve in curves])
-    known = np.isfinite(worst).all(axis=0)
-    x, values = np.array(trained)[known], worst[:, known]
-    band = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
-    figure.add_scatter(x=x.tolist(), y=values.min(axis=0).tolist(), showlegend=False, **band)
+    values = np.array([[_at(curve, one) for one in trained] for curve in curves]).reshape(len(curves), -1)
+    best, worst, median = values.min(axis=0), values.max(axis=0), np.median(values, axis=0)
+    finished = np.flatnonzero(np.isfinite(worst))
+    for part in np.split(finished, np.flatnonzero(np.diff(finished) > 1) + 1):  # no range spans what is not finished
+        band = {"x": [trained[k] for k in part], "mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
+        figure.add_scatter(y=best[part].tolist(), showlegend=False, **band)
+        figure.add_scatter(
+            y=worst[part].tolist(), name="range", legendgroup="range", showlegend=bool(part[:1] == finished[:1]),
+            fill="tonexty", fillcolor="#d9e6f2", **band,
+        )  # fmt: skip
     figure.add_scatter(
-        x=x.tolist(), y=values.max(axis=0).tolist(), name="range", fill="tonexty", fillcolor="#d9e6f2", **band
-    )
-    figure.add_scatter(
-        x=x.tolist(), y=np.median(values, axis=0).tolist(), name="median", mode="lines", line={"color": INK, "width": 3}
-    )
+        x=trained, y=_with_gaps(median), name="median", mode="lines", line={"color": INK, "width": 3}
+    )  # fmt: skip
 
 
 def _at(curve: Curve, trained: float) -> float:
@@ -233,14 +242,17 @@ def write_report(
     current: AnyCurrent | None = None,
     films: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
-    """Write the page. Beside the curves stand strokes of others round the pentagon.
+    """Write the page. Beside the curves stand times of others round the pentagon.
 
     waypoint_radius: [m]. current: Of the water. films: Files beside the page, by agent.
     """
-    table, curves = ResultsTable("Results", COLUMNS, in_words(swims)), {curve.name for curve in remarks.curves}
+    table, curves = (
+        ResultsTable("Results", columns_of(swims), in_words(swims)),
+        {curve.name for curve in remarks.curves},
+    )
     is_pentagon = isinstance(path, str) and path == "pentagon"
     finished = [done for done in swims if is_pentagon and done.finished and done.agent not in curves]
-    baselines = {done.agent: done.strokes for done in finished}
+    baselines = {done.agent: float(done.time[-1]) for done in finished}
     sections = [
         _section(table.title, table_html(table)),
         _section("Playback", PLAYER + _films(films)),
@@ -300,7 +312,7 @@ def trials_table(file: Path) -> ResultsTable:
 def _cell(row: Row, name: str) -> str:
     value, side = row[name], _side(name)
     text = html.escape(number(value))
-    if value is not None and {f"{name}_low", f"{name}_high"} <= set(row):
+    if value is not None and row.get(f"{name}_low") is not None:
         low, high = (html.escape(number(row[f"{name}_{end}"])) for end in ("low", "high"))
         text += f" <small>[{low}, {high}]</small>"
     if "error" in name and row.get("strokes_to_finish", name) is None:

@@ -24,7 +24,7 @@ FEWEST = 3
 
 
 class Estimate(NamedTuple):
-    """A mean, and the ends of its interval; NaN of no values, and the ends of a learner with fewer than FEWEST."""
+    """A mean, and the ends of its interval, NaN for one value, and for a learner with fewer than FEWEST trainings."""
 
     mean: float
     low: float
@@ -36,14 +36,14 @@ class Estimate(NamedTuple):
 
 
 def mean_with_interval(values: ArrayLike) -> Estimate:
-    """Mean of values and the ends of its bootstrap confidence interval; NaN where there are no values.
+    """Mean of values and the ends of its bootstrap confidence interval; NaN for no values, and ends of a single one.
 
     >>> print(mean_with_interval([150.0, 160.0, 155.0, 170.0]))
     158.8 [152.5, 166.2]
     """
     values = np.asarray(values, float)
-    if len(values) == 0:
-        return Estimate(np.nan, np.nan, np.nan)
+    if len(values) < 2:
+        return Estimate(float(values.mean()) if len(values) else np.nan, np.nan, np.nan)
     if np.ptp(values) == 0.0:
         return Estimate(*[float(values[0])] * 3)
     return Estimate(float(values.mean()), *_bootstrapped((values,), np.mean, batch=100))
@@ -213,10 +213,16 @@ def write_csv(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
         writer.writerows(rows)
 
 
+def columns_of(swims: Sequence[Swim]) -> dict[str, str]:
+    """`COLUMNS`, which count strokes if all swims do, otherwise decisions."""
+    if {done.counted_in for done in swims} == {"strokes"}:
+        return COLUMNS
+    return {name: title.replace("strokes", "decisions") for name, title in COLUMNS.items()}
+
+
 def as_text(swims: Sequence[Swim]) -> str:
     """Table of the results, for a terminal."""
-    unit = {done.counted_in for done in swims}
-    titles = [title if unit == {"strokes"} else title.replace("strokes", "decisions") for title in COLUMNS.values()]
+    titles = [*columns_of(swims).values()]
     return text_table(titles, [[number(row[name]) for name in COLUMNS] for row in in_words(swims)])
 
 

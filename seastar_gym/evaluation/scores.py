@@ -1,5 +1,7 @@
 """Agents on registered tasks: a score for every seed, and a table of their means with intervals."""
 
+import os
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -45,7 +47,7 @@ class Scores(NamedTuple):
         if self.trainings:
             each = over_trainings([np.mean(self.scores[k :: self.trainings]) for k in range(self.trainings)])
             return mean._replace(low=each.low, high=each.high)
-        return mean if len(self.seeds) > 1 else Estimate(mean.mean, float("nan"), float("nan"))
+        return mean
 
     def row(self) -> dict[str, Any]:
         """Row of the table, by the names of the CSV."""
@@ -57,14 +59,21 @@ class Scores(NamedTuple):
         }  # fmt: skip
 
 
+_BETWEEN = re.compile(r",(?!\d+[+-]\}?(?:,|$))")
+"""Comma between names of policies, not that of a pair of limbs such as 4+,1-."""
+
+
 def policies_of(agent: str) -> tuple[str, list[str]]:
-    """Label of an agent, and the names of its policies: LABEL=A,B,C are several, such as trainings, in one row."""
+    """Label of an agent, and the names of its policies: LABEL=A,B,C are several, such as trainings, in one row.
+
+    A file, and what has a folder before its "=", is no label.
+    """
     label, several, names = agent.partition("=")
-    if several and not (label.strip() and all(names.split(","))):
-        raise ValueError(f"{agent!r} lacks a label or a policy: write LABEL=A,B,C.")
-    if not several:
+    if not several or os.sep in label or Path(agent).is_file():
         return Path(agent).stem if len(Path(agent).parts) > 1 else agent, [agent]
-    policies = names.split(",")
+    policies = [names] if Path(names).is_file() else _BETWEEN.split(names)
+    if not (label.strip() and all(policies)):
+        raise ValueError(f"{agent!r} lacks a label or a policy: write LABEL=A,B,C.")
     places = [Path(name).resolve() if is_file(name) else name for name in policies]
     if twice := [name for k, name in enumerate(policies) if places[k] in places[:k]]:
         raise ValueError(f"{label} has {twice[0]} twice: every policy is a training of its own.")
@@ -91,7 +100,9 @@ def measured(
         rows = (column.tolist() for column in (measure.of(swum), swum.success, swum.returns, swum.decisions))
         found |= zip(own, zip(*rows, strict=True), strict=True)
     columns: Any = map(list, zip(*(found[seed] for seed in sorted(found)), strict=True))
-    trainings = sum(is_file(name) or learned_file(name) is not None for name in names[:seeds])
+    took_turns = names[:seeds]
+    one = is_file(names[0]) or learned_file(names[0]) is not None
+    trainings = len(took_turns) if len(names) > 1 else int(one)  # several are trainings, of functions too
     what = task, label, fidelity, measure.name, measure.unit, measure.better
     return Scores(*what, sorted(found), *columns)._replace(trainings=trainings)
 

@@ -3,7 +3,7 @@
 Random paths have random headings. The disturbed pentagon is there for the scripted gait, which knows no other path.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -54,8 +54,11 @@ def trials(
     threads: int | None = None,
     max_strokes: int | None = None,
     scene: Scene | None = None,
+    say: Callable[[str], None] = print,
 ) -> list[Row]:
     """Rows of the results, one for every set of swims and agent.
+
+    say: Function that is told of an agent that fails in a set. ValueError where all do.
 
     swims: Number of random paths of every set. seed: Of paths, headings and disturbances, the same for every agent.
     decision_period: Time between decisions [s]. None means a stroke. threads: Of the simulator; None means one for
@@ -63,17 +66,24 @@ def trials(
     means the chapter's at `fidelity`.
     """
     robot = make_scene(None, fidelity, decision_period) if scene is None else scene
-    named, rows = fidelity if scene is None else fidelity_of(scene), list[Row]()
+    named, rows, failed = fidelity if scene is None else fidelity_of(scene), list[Row](), list[str]()
     for path, label, n_swims in _sets(sets, swims, robot.robot.n_limbs):
         for agent, policy in agents.items():
-            found = swim_many(
-                agent, policy, path, n_swims, robot, DISTURBANCES[label], seed=seed, threads=threads,
-                decision_period=decision_period, max_strokes=max_strokes, **camera_of(policy),
-            )  # fmt: skip
+            try:
+                found = swim_many(
+                    agent, policy, path, n_swims, robot, DISTURBANCES[label], seed=seed, threads=threads,
+                    decision_period=decision_period, max_strokes=max_strokes, **camera_of(policy),
+                )  # fmt: skip
+            except ValueError as wrong:
+                failed.append(f"{agent} does not swim {path}, {label}: {wrong}")
+                say(failed[-1])
+                continue
             row: Row = {"path": path, "disturbance": label, "agent": agent, "fidelity": named, "swims": n_swims}
             for name, numbers in statistics(found).items():
                 row |= dict(zip((name, f"{name}_low", f"{name}_high"), numbers, strict=True))
             rows.append(row)
+    if failed and not rows:
+        raise ValueError(failed[0])
     return rows
 
 

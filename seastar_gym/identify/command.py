@@ -22,7 +22,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from seastar_gym.command import answered, command_parser
-from seastar_gym.files import require_extra, save_figure, write_json
+from seastar_gym.files import require_extra, require_place, save_figure, write_json
 from seastar_gym.identify.fit import Estimate, identify
 from seastar_gym.identify.measurement import ARM, ORIENTATION, Measurement
 from seastar_gym.scene import Numerics
@@ -64,8 +64,11 @@ def fit(options: argparse.Namespace) -> None:
     if options.step is not None or not scene.numerics.named:
         scene = replace(scene, numerics=Numerics("implicit-midpoint", options.step or STEP))
     measurement = Measurement.from_csv(options.trajectory, options.commands)
+    for file in (options.picture, options.out, options.intervals):
+        if file is not None:
+            require_place(file)
     begin = time.perf_counter()
-    estimate = identify(scene, options.fit, measurement, largest_delay=options.delay)
+    estimate = identify(scene, options.fit or FITTED, measurement, largest_delay=options.delay)
     print(estimate.report(), f"{time.perf_counter() - begin:.1f} s", sep="\n")
     if options.picture is not None:
         draw(estimate, measurement, options.picture)
@@ -83,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     delay = "fit how late the trajectory's clock is, too, up to this many seconds either way (default: not at all)"
     parser.add_argument("--delay", type=float, metavar="LARGEST", help=delay)
     names = f"names of the parameters to fit (default: {' '.join(FITTED)})"
-    parser.add_argument("--fit", nargs="+", default=FITTED, metavar="PARAMETER", help=names)
+    parser.add_argument("--fit", nargs="+", action="extend", metavar="PARAMETER", help=names)
     parser.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
     step = "time step of the implicit midpoint rule [s] (default: the scene's own numerics, or 0.005)"
     parser.add_argument("--step", type=float, help=step)

@@ -35,7 +35,7 @@ def folder(tmp_path, monkeypatch):
         "wrong.py": "import math\nscene = nothing\n",
     }.items():  # fmt: skip
         Path(name).write_text(content)
-    Path("runs").mkdir()
+    Path("runs").mkdir(), Path("folder.gif").mkdir()
     return tmp_path
 
 
@@ -141,7 +141,7 @@ REFUSED = [
     ("evaluate --agents own_agents:nothing", "is a int, which has no predict"),
     ("evaluate --agents own_agents:of_nothing", "a function of one argument, the environment: of_nothing(env)."),
     ("evaluate --agents own_agents:OfOneArgument", "needs predict(observation, state, episode_start, deterministic)."),
-    ("evaluate --agents greedy own_agents:Stateless", "own_agents:Stateless: predict must return an action"),
+    ("evaluate --agents own_agents:Stateless", "own_agents:Stateless: predict must return an action"),
     ("evaluate --agents own_agents:StatelessRobot", "predict must return an action and the state for its next call"),
     ("evaluate --path ragged.csv", "ragged.csv, line 2: every line must have x and y"),
     ("evaluate --seconds 0", "--seconds must be"),
@@ -151,6 +151,8 @@ REFUSED = [
     ("evaluate --runs .", "name --report, too"),
     ("evaluate --swims 4", "leave out --swims"),
     ("evaluate --sets nominal --path square", "leave out --path"),
+    ("evaluate --path none.csv", "There is no file none.csv"),
+    ("evaluate --out out.csv", "--out is a folder for them, not out.csv"),
     ("evaluate --task SeastarSwim-v0 --seconds 20", "leave out --seconds"),
     ("evaluate --sets nominal --swims 0", "--swims must be"),
     ("evaluate --report --out out --runs .", "progress.csv"),
@@ -191,6 +193,15 @@ def test_what_cannot_be_done_is_said_in_a_sentence_and_nothing_is_written(comman
         return
     assert printed.err.count("\n") == 1 and printed.err.endswith(".\n"), printed.err
     assert all(word in printed.err for word in words.split("|")), printed.err
+
+
+@pytest.mark.parametrize(
+    "command", ["evaluate --task SeastarSwim-v0 --out", "evaluate --sets nominal --out", "swim --film"]
+)
+def test_a_folder_in_the_place_of_a_file_is_refused_before_anything_swims(command, no_display, folder, monkeypatch):
+    monkeypatch.setattr("seastar_gym.simulator.Simulator.advance", None)
+    with pytest.raises(FileExistsError, match=r"^folder\.gif is no file that can be written over\.$"):
+        main([*command.split(), "folder.gif"])
 
 
 # Playing
@@ -243,7 +254,7 @@ def test_the_keyboard_plays_in_a_window(dummy_window, monkeypatch, capsys):
 
 def compared(capsys, *options, code=0):
     """Table of agents without its titles, as words, and what is said of those that are left out."""
-    assert main(["evaluate", *FAST, *options]) == code
+    assert main(["evaluate", *(FAST[:2] if "--fidelity" in options else FAST), *options]) == code
     said = capsys.readouterr()
     lines = said.out.splitlines()
     assert max(map(len, lines[:-1])) <= 80 and "of 1" in lines[3]
@@ -268,6 +279,32 @@ def test_agents_are_compared_in_a_table_and_files(folder, capsys):
     assert all(float(one[2]) < float(other[2]) for one, other in zip(whole, weak, strict=True))
 
 
+FAILS = """
+import numpy as np
+
+class Late:
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        if state == 2:
+            np.zeros(5) + np.zeros(4)
+        return np.zeros(5, int), (state or 0) + 1
+
+def make(env):
+    return Late()
+"""
+
+
+@pytest.mark.parametrize("more, file", [([], "out/evaluation.csv"), (["--sets", "nominal"], "out.csv")])
+def test_an_agent_that_fails_under_way_costs_the_others_nothing(more, file, folder, capsys, monkeypatch):
+    Path("fails.py").write_text(FAILS)
+    monkeypatch.syspath_prepend(folder)
+    words = [*more, "--seconds", "4", "--fidelity", "fast", "--out", file.removesuffix("/evaluation.csv")]
+    assert main(["evaluate", "--agents", "straight", "--agents", "fails:make", *words]) == 2
+    said = "".join(capsys.readouterr())
+    assert "fails:make" in said and "fails.py, line 7: ValueError: operands could not be broadcast" in said
+    assert "straight" in Path(file).read_text() and "fails" not in Path(file).read_text()
+    monkeypatch.delitem(sys.modules, "fails")
+
+
 def test_a_policy_of_a_file_brings_its_robot_and_how_often_it_decides(folder, no_display, capsys):
     numerics = Numerics("implicit-midpoint", 2.5e-3, damping=0.003)
     scene = Scene(Seastar(3, 7), actuator=SmaWires(), numerics=numerics)
@@ -288,13 +325,19 @@ def test_a_policy_of_a_file_brings_its_robot_and_how_often_it_decides(folder, no
 
 
 def test_a_report_has_the_curves_of_runs_and_how_it_was_made(folder, capsys):
-    (folder / "run").mkdir()
-    Path("run", "progress.csv").write_text("1000,200,5\n2000,190,5\n")
-    arguments = ["--agents", "learned", "straight", "--waypoint-radius", "0.5", "--report", "--runs", "run"]
+    """Runs of the same name in two folders; those of half a second are drawn in seconds, too."""
+    for place, period in (("a/run", 1.0), ("b/run", 0.5)):
+        Path(place).mkdir(parents=True)
+        Path(place, "progress.csv").write_text("1000,200,5\n2000,190,5\n")
+        Path(place, "config.json").write_text(json.dumps({"options": {"ppo": {"decision_period": period}}}))
+    arguments = ["--agents", "learned", "straight", "--waypoint-radius", "0.5", "--report"]
+    arguments += ["--runs", "a/run", "--runs", "b/run"]
     assert main(["evaluate", *arguments, "--fidelity", "fast", "--out", "out"]) == 0
     assert "report.html" in capsys.readouterr().out
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
-    assert '"name":"run"' in page and '"name":"learned"' not in page and "agent straight: 1" in page
+    names = '"name":"a\\u002frun"', '"name":"b\\u002frun"'
+    assert all(name in page for name in names) and '"name":"learned"' not in page and "agent straight: 1 s" in page
+    assert "[200.0,190.0]" in page and "[100.0,95.0]" in page
     assert "python train.py" in page and "seastar evaluate --agents learned straight" in page
 
 

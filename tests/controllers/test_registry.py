@@ -286,6 +286,17 @@ def test_a_robot_in_company_swims_as_alone(here):
         assert actions.tolist() == [(decision + 7 * (row[0] > 0)) % 21 for row in observation]
 
 
+def test_a_batched_policy_gets_all_observations_of_one_robot_too(here):
+    code = MINE.replace("ndim == 1", "ndim == 2").replace("np.int64((", "(np.zeros(len(observation), int) + (")
+    Path("mine_of_one.py").write_text(code.replace('actions = "pairs"', 'actions, batched = "pairs", True').replace(
+        "observation[0] > 0", "observation[:, 0] > 0"
+    ))  # fmt: skip
+    policy = call_function("mine_of_one:make", None)
+    observation = np.ones((2, 40), np.float32)
+    one, many = (policy.predict(seen, None, None)[0] for seen in (observation[0], observation))
+    assert np.shape(one) == () and np.shape(many) == (2,)
+
+
 @pytest.mark.parametrize("words", [("evaluate", "--task", "SeastarSwim-v0", "--seeds", "2", "--decisions", "3"),
                                    ("evaluate", "--seconds", "3")])  # fmt: skip
 def test_a_fresh_process_finds_it_in_the_current_folder(here, words):

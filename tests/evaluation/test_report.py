@@ -18,7 +18,7 @@ from seastar_gym.envs.rendering import Frame
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation import pictures, report
 from seastar_gym.evaluation.comparison import evaluate
-from seastar_gym.evaluation.films import CLOSING_SECONDS, film, shrunk
+from seastar_gym.evaluation.films import CLOSING_SECONDS, durations, film, shrunk
 from seastar_gym.evaluation.playback import UNIT, Playback, RecordingEnv
 from seastar_gym.evaluation.report import Curve, Remarks, ResultsTable
 from seastar_gym.evaluation.results import COLUMNS, as_text, results, statistics, time_series, write_csv
@@ -293,6 +293,20 @@ def test_a_gif_shows_every_picture_and_rests_on_the_last(tmp_path, fps):
                 np.testing.assert_allclose(np.asarray(frames.convert("RGB")), shrunk(shown[number]), atol=12)
     assert times[:2] == [round(1000 / fps)] * 2
     assert sum(times[2:]) == pytest.approx(1000 * (1 / fps + CLOSING_SECONDS), rel=0.1)
-    with film(tmp_path / "empty.gif", fps):
+
+
+@pytest.mark.parametrize("name", ["film.gif", "film.mp4"])
+def test_a_film_without_pictures_or_that_fails_leaves_what_was_there(name, tmp_path):
+    (tmp_path / name).write_text("before")
+    with film(tmp_path / name, 10.0):
         pass
-    assert not (tmp_path / "empty.gif").exists()
+    with pytest.raises(ValueError, match="A picture must be"), film(tmp_path / name, 10.0) as add:
+        (add(picture(BLUE, 0)), add("no picture"))
+    assert {file.name: file.read_text() for file in tmp_path.iterdir()} == {name: "before"}
+
+
+@pytest.mark.parametrize("fps", [0.5, 7.0, 30.0, 40.0, 66.0, 200.0, 1000.0])
+def test_a_gif_is_as_long_as_its_pictures_and_none_is_too_short_to_be_shown(fps):
+    shown = durations(100, fps)
+    assert sum(shown.values()) == pytest.approx(10000.0 / fps, abs=2.0) and min(shown.values()) >= 2
+    assert min(shown) == 0 and (fps > 40.0 or len(shown) == 100)

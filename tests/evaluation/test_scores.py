@@ -13,7 +13,7 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.rollout import MEASURES, SECONDS, make_batch, measure_of, swim_episodes, task_ids
-from seastar_gym.evaluation.scores import Scores
+from seastar_gym.evaluation.scores import Scores, measured, policies_of
 
 SWIM, SHORT, OTHER = "SeastarSwim-v0", "SeastarShort-v0", "SeastarDrift-v0"
 
@@ -76,6 +76,32 @@ def test_a_task_of_another_measure_without_a_batch_is_swum_on_its_held_out_split
 
 def of(*scores, seeds=4):
     return Scores(SWIM, "a", None, "time", "s", "less", list(range(seeds)), list(scores), [True] * seeds, [], [])
+
+
+@pytest.mark.parametrize(
+    "agent, label, policies",
+    [
+        ("greedy", "greedy", ["greedy"]), ("runs/a.zip", "a", ["runs/a.zip"]), ("mine=a,b", "mine", ["a", "b"]),
+        ("pair=4+,1-,{2+,3-},rest", "pair", ["4+,1-", "{2+,3-}", "rest"]), ("x=1.zip", "x=1.zip", ["x=1.zip"]),
+        ("runs/lr=0.1/a.zip", "a", ["runs/lr=0.1/a.zip"]), ("mine=a,b.zip", "mine", ["a,b.zip"]),
+    ],
+)  # fmt: skip
+def test_a_label_stands_before_policies_and_not_within_the_name_of_a_file(
+    agent, label, policies, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    for name in ("x=1.zip", "a,b.zip"):
+        (tmp_path / name).touch()
+    assert policies_of(agent) == (label, policies)
+
+
+def test_functions_that_take_turns_are_trainings(tasks, tmp_path, monkeypatch):
+    (tmp_path / "turns.py").write_text("from seastar_gym.controllers import scripted\n" + "".join(
+        f"def seed{k}(env):\n    return scripted({name!r})\n" for k, name in enumerate(("rest", "straight", "4+,1-"))
+    ))  # fmt: skip
+    monkeypatch.syspath_prepend(tmp_path)
+    found = measured(SHORT, "mine=turns:seed0,turns:seed1,turns:seed2", 6, max_decisions=4)
+    assert found.trainings == 3 and not np.isnan(found.mean.low)
 
 
 def test_a_failure_counts_in_the_mean_and_one_seed_has_no_interval():

@@ -121,7 +121,7 @@ def test_swims_of_a_batch_are_those_of_one_robot(agent, path, period, strokes):
     "options, sets, words",
     [
         (["--agents", "rest", "--sets", "nominal", "--fidelity", "fast", "balanced", "--seconds", "20"], 2 * 4,
-         ("path", "fidelity", "success", "0.0 [0.0, 0.0]")),
+         ("path", "fidelity", "success", "0.0")),
         (["--agents", "rest", "--sets", "nominal", "--fidelity", "fast", "--seconds", "2", "--decision-period", "0.5"],
          4, ("decisions", "of 0.5 s")),
         (["--agents", "straight", "--sets", "nominal", "--scene", "robot.json", "--seconds", "2"], 4, ("its own",)),
@@ -151,6 +151,7 @@ def test_means_and_intervals_are_as_kept(golden):
     found = {
         "of a mean": statistics.mean_with_interval(rng.normal(size=400)),
         "of a constant": statistics.mean_with_interval(np.full(5, 3.0)),
+        "of one": statistics.mean_with_interval([3.0]),
         "of nothing": statistics.mean_with_interval(np.zeros(0)),
     }  # fmt: skip
     golden("statistics.txt", "\n".join(f"{name}: {np.round(value, 4).tolist()}" for name, value in found.items()))

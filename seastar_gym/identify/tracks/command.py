@@ -62,7 +62,7 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--from", dest="format", choices=FORMATS, required=True, help="format of the file")
     found.add_argument("--out", type=Path, required=True, help="CSV file for the trajectory")
     nodes = "points that are kept and their nodes: hub, tip1, tip2, .. or a number (default: the only one is the hub)"
-    found.add_argument("--nodes", nargs="+", metavar="POINT=NODE", help=nodes)
+    found.add_argument("--nodes", nargs="+", action="extend", metavar="POINT=NODE", help=nodes)
     found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
     found.add_argument("--metres-per-pixel", type=float, help="size of a pixel; y of pictures points down")
     found.add_argument("--homography", type=Path, help="CSV file with u,v,x,y of four points or more")
@@ -84,15 +84,19 @@ def parser() -> argparse.ArgumentParser:
     table = found.add_argument_group("options of tables, columns by their names")
     table.add_argument("--time", help="time, or with --rate the number of the picture (default: time)")
     table.add_argument("--time-unit", choices=UNITS["time"], help="(default: that of the name, or s)")
-    table.add_argument("--x", nargs="+", metavar="COLUMN", help="x of one point or more (default: x)")
-    table.add_argument("--y", nargs="+", metavar="COLUMN", help="y of as many (default: y)")
+    table.add_argument("--x", nargs="+", action="extend", metavar="COLUMN", help="x of one point or more (default: x)")
+    table.add_argument("--y", nargs="+", action="extend", metavar="COLUMN", help="y of as many (default: y)")
     table.add_argument("--unit", choices=LENGTHS, help="unit of x and y (default: that of the name, or m)")
     table.add_argument("--y-down", action="store_true", default=None, help="y points down, though not in pixels")
     theta = "orientation of the first point, or x y z w of its quaternion (default: theta, if there is one)"
-    table.add_argument("--theta", nargs="+", metavar="COLUMN", help=theta)
+    table.add_argument("--theta", nargs="+", action="extend", metavar="COLUMN", help=theta)
     table.add_argument("--degrees", action="store_true", default=None, help="theta is in degrees")
-    table.add_argument("--score", nargs="+", metavar="COLUMN", help="scores of the points, for --likelihood")
-    table.add_argument("--only", nargs="+", metavar="COLUMN=TEXT", help="lines that count (default: all)")
+    table.add_argument(
+        "--score", nargs="+", action="extend", metavar="COLUMN", help="scores of the points, for --likelihood"
+    )
+    table.add_argument(
+        "--only", nargs="+", action="extend", metavar="COLUMN=TEXT", help="lines that count (default: all)"
+    )
     table.add_argument("--skip", type=int, help="lines above the names (default: 0)")
     table.add_argument("--headers", type=int, help="lines of names, which are joined by points (default: 1)")
     return found
