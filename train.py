@@ -165,7 +165,7 @@ def run(options: Options, arguments: Sequence[str]) -> int:
     if robot != Robot():
         training_env(options, robot).close()  # refuses what cannot be trained before there is a folder
     with held(folder, options.resume is None):
-        keep(robot, folder, options.scene)
+        keep(robot, folder, options.scene, options.path)
         write_config(options, arguments, folder)
         print(f"The run is in {folder}.", flush=True)
         robot = robot_of(options, folder)

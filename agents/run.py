@@ -37,6 +37,7 @@ from agents.ppo import policy_of
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.learned import save as save_policy
 from seastar_gym.envs.options import own_scene, scene_at
+from seastar_gym.envs.paths import PATHS_OF_PACKAGE
 from seastar_gym.envs.randomization import DomainRandomization, Uniform
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.report import ResultsTable, read_progress
@@ -112,7 +113,7 @@ def read(folder: Path) -> Efficiency:
 
 
 OWN_SCENE = "scene.py"
-"""File in a run's folder of a scene with classes of its own, which JSON alone does not bring."""
+"""File in a run's folder of a scene with classes or a path of its own, which JSON alone does not bring."""
 
 
 def write_config(options: Options, arguments: Sequence[str], folder: Path) -> None:
@@ -285,11 +286,14 @@ def read_intervals(file: Path, anyway: bool = False) -> DomainRandomization:
     return DomainRandomization({name: Uniform(low, high) for name, (low, high) in ends.items()})
 
 
-def keep(robot: Robot, folder: Path, file: Path | None) -> None:
-    """Write the robot, whose scene is that of a file, into the folder of its run; nothing for the chapter's."""
+def keep(robot: Robot, folder: Path, file: Path | None, path: str) -> None:
+    """Write the robot, whose scene is that of a file, into the folder of its run; nothing for the chapter's.
+
+    path: To train on, which that file may have registered.
+    """
     if robot.scene is not None and file is not None:
         write_json(folder / SCENE, robot.scene.to_dict())
-        if has_own_kinds(robot.scene):
+        if has_own_kinds(robot.scene) or path not in PATHS_OF_PACKAGE:
             write_atomically(folder / OWN_SCENE, file.read_text(encoding="utf-8"))
     if robot.draws is not None:
         write_json(folder / INTERVALS, {name: each.bounds for name, each in robot.draws.distributions.items()})

@@ -26,9 +26,11 @@ import pytest
 from later import Later
 from refusals import assert_told
 from seastar_gym import DomainRandomization, Numerics, Scene, Seastar, SmaWires, Uniform
+from seastar_gym.cli.main import main as seastar
 from seastar_gym.controllers import learned as policies
 from seastar_gym.controllers.contract import actions_of, require_fit
 from seastar_gym.controllers.learned import load
+from seastar_gym.envs.paths import PATHS
 from seastar_gym.files import part_name
 
 train = Later("train")
@@ -88,6 +90,31 @@ def test_a_robot_of_a_file_is_trained_compared_and_continued(tmp_path, capsys, s
     (folder / "scene.json").unlink()
     assert train.main(["--resume", str(folder), "--strokes", "512"]) == 2
     assert capsys.readouterr().err.endswith("scene.json is no file.\n")
+
+
+OWN_PATH = """
+from seastar_gym.envs.paths import register_path
+
+@register_path("bent")
+def bent(rng):
+    return [[0.1, 0.1], [0.2, 0.0]]
+"""
+
+
+def test_a_path_of_ones_own_comes_with_the_file_of_the_scene(tmp_path, capsys, short_swims):
+    file, folder = tmp_path / "own.py", tmp_path / "run"
+    file.write_text(OWN_ROBOT + OWN_PATH)
+    assert train.main([*TINY, "--scene", str(file), "--path", "bent", "--strokes", "128", "--out", str(folder)]) == 0
+    file.unlink()
+    del PATHS["bent"]
+    again = "--resume", str(folder), "--strokes", "256"
+    assert train.main([*again]) == 2 and "with --run-scene only" in capsys.readouterr().err
+    assert train.main([*again, "--run-scene"]) == 0
+    del PATHS["bent"]
+    file.write_text(OWN_ROBOT + OWN_PATH)
+    words = ["evaluate", "--path", "bent", "--agents", "straight", "--seconds", "2", "--fidelity", "fast", "--scene"]
+    assert seastar([*words, str(file)]) == 0
+    del PATHS["bent"]
 
 
 @pytest.mark.parametrize(

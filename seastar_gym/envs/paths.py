@@ -63,7 +63,8 @@ def register_path(name: str) -> Callable[[MakePath], MakePath]:
     """Decorator that gives a path a name.
 
     The decorated function gets the episode's random generator and returns the waypoints [m], shape (n, 2). ValueError:
-    another path has the name. The same function of a module, or of a notebook's cell, that runs again is taken instead.
+    another path has the name. The same function of a module, of its copy or of a notebook's cell, that runs again is
+    taken instead.
     """
 
     if not isinstance(name, str) or not name:
@@ -72,12 +73,19 @@ def register_path(name: str) -> Callable[[MakePath], MakePath]:
     def register(make: MakePath) -> MakePath:
         require_callable("A path", make)
         known = PATHS.get(name, make)
-        if known is not make and (_place(known) != _place(make) or "<lambda>" in _place(make)):
+        is_same = known is make or _code(known) == _code(make)
+        if not is_same and (_place(known) != _place(make) or "<lambda>" in _place(make)):
             raise ValueError(f"There is a path of the name {name!r} already: give this one another name.")
         PATHS[name] = make
         return make
 
     return register
+
+
+def _code(function: MakePath) -> Any:
+    """What a function does; itself where it does not say."""
+    code = getattr(function, "__code__", None)
+    return function if code is None else (code.co_code, code.co_consts, code.co_names)
 
 
 def _place(function: MakePath) -> str:
@@ -236,6 +244,8 @@ def _walk(legs: NDArray[np.float64], headings: NDArray[np.float64]) -> NDArray[n
 
 # Paths that command lines ask for
 
+PATHS_OF_PACKAGE = tuple(PATHS)
+"""Names that need no code of somebody's."""
 PATH_HELP = (
     f"Name of a path ({', '.join(PATHS)}), or a text file with x and y of one waypoint per line "
     "[m, unless the first line names a unit: x (mm)]."
