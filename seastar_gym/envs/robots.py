@@ -203,6 +203,7 @@ class Robots:
         self.task, self.options, self.split = task, options, split
         self.per_episode = task.per_episode
         """Fields of the task that may change from one episode to the next, see `ask`."""
+        self._terms = frozenset(task.terms)
         self.tasks = [task] * n_robots
         """Task of every robot's next episode."""
         self.episode = SimpleNamespace()
@@ -544,7 +545,7 @@ class Robots:
 
     def _checked(self, score: Score) -> Score:
         """A score whose terms and flags are arrays of their own, shape (n_robots,). ValueError for others."""
-        if {*score.terms} != {*self.task.terms}:
+        if score.terms.keys() != self._terms:
             raise ValueError(
                 f"{type(self.task).__name__}.score has the terms {', '.join(map(str, score.terms))}, and its terms are "
                 f"{', '.join(self.task.terms)}."
@@ -555,6 +556,8 @@ class Robots:
 
     def _of_robots(self, name: str, values: Any, kind: Any) -> NDArray[Any]:
         """A task's numbers of all robots, or one for all, as a new array, shape (n_robots,)."""
+        if type(values) is np.ndarray and values.dtype == kind and values.shape == (self.n_robots,):
+            return values.copy()  # as nearly all are
         found = np.array(values, kind)
         if found.ndim == 0:
             return np.full(self.n_robots, found)
@@ -568,11 +571,11 @@ class Robots:
         """Entries of info that belong to the task. ValueError for one that is no array over robots."""
         found = self.task.info(self, hub)
         for name, values in found.items():
-            if np.shape(values)[:1] != (self.n_robots,):
+            if not isinstance(values, np.ndarray) or values.shape[:1] != (self.n_robots,):
                 raise ValueError(
                     f"{name} of {type(self.task).__name__}.info must be an array over {self.n_robots} robots."
                 )
-        return {name: np.asarray(values) for name, values in found.items()}
+        return found
 
     def _info(
         self, hub: Floats | None, score: Score, commands: Floats, followed: Floats, report: StrokeReport
