@@ -119,7 +119,7 @@ def describe(options: Options, robot: Robot, folder: Path, trained: int, watch: 
     if seconds := sum(watch.seconds.values()):
         shares = ", ".join(f"{name} {share:.0%}" for name, share in watch.shares().items())
         sentences.append(
-            f"The last session took {seconds:.0f} s, {watch.strokes / seconds:.0f} strokes per second: {shares}."
+            f"The last session took {seconds:.0f} s, {watch.strokes / seconds:.0f} decisions per second: {shares}."
         )
     agents = ["--agents", str(folder / "policy.safetensors"), *filter(None, [rival]), *physics(options, folder)]
     return Remarks(

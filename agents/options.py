@@ -60,7 +60,7 @@ class Options:
     device: Literal["cpu", "cuda", "auto"] = "cpu"
     """Device of the network, which is so small that a GPU is no faster."""
     save_freq: int = 8_192
-    """Interval between checkpoints [strokes]."""
+    """Interval between checkpoints [strokes, or decisions]."""
     video: bool = True
     """Write videos of the swims of the comparison."""
     out: Path | None = None

@@ -96,6 +96,7 @@ class BatchVecEnv(VecEnv):
             for robot in np.flatnonzero(dones).tolist():
                 self.reset_infos[robot] = infos[robot]
                 infos[robot] = {
+                    **infos[robot],  # what a wrapper tells, as far as the batch's own last info has it not
                     **final_infos[robot],
                     "terminal_observation": info["final_obs"][robot],
                     "episode": self._end_episode(robot),
@@ -198,6 +199,8 @@ def _one_per_robot(info: Info, n_robots: int) -> list[Info]:
 
 def _column(values: Any, n_robots: int) -> list[Any]:
     """What every robot has of an entry of a batch's info, which a wrapper may have put there."""
-    if not isinstance(values, list | tuple | np.ndarray) or np.shape(values)[:1] != (n_robots,):
-        return [values] * n_robots
-    return values.tolist() if isinstance(values, np.ndarray) and values.ndim == 1 else list(values)
+    if isinstance(values, np.ndarray) and values.ndim == 1 and len(values) == n_robots:
+        found: list[Any] = values.tolist()
+        return found
+    has_all = isinstance(values, list | tuple) or (isinstance(values, np.ndarray) and values.ndim > 1)
+    return list(values) if has_all and len(values) == n_robots else [values] * n_robots

@@ -33,7 +33,7 @@ from seastar_gym.envs.sight import FOR_CAMERA, Sight, told
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.rollout import require_seen
 from seastar_gym.evaluation.swim import Swim, swim
-from seastar_gym.files import write_atomically
+from seastar_gym.files import require_place, write_atomically
 from seastar_gym.plant.guard import Limits
 from seastar_gym.plant.lines import LinePlant, open_serial
 from seastar_gym.plant.plant import Plant, PlantError, SimulatedPlant, with_wires
@@ -205,7 +205,8 @@ def drive(options: argparse.Namespace) -> int:
         with opened(options, arguments, robot) as plant:  # which heats nothing
             require_limbs(plant, arguments["scene"])
     policy, planned, actions = plan(options, arguments)
-    options.out.mkdir(parents=True, exist_ok=True)
+    for name in ("plan.png", "driven.png", "report.md"):
+        require_place(options.out / name)
     picture = options.out / "plan.png"
     fluid = arguments["scene"].fluid
     current = None if fluid is None else fluid.current

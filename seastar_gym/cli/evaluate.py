@@ -162,7 +162,7 @@ def robot_of(options: argparse.Namespace, fidelity: Fidelity | None) -> tuple[Sc
 
 def require_folder(out: Path | None) -> None:
     """ValueError for a name of a file where several files are written."""
-    if out is not None and out.suffix in benchmark.FORMS:
+    if out is not None and out.suffix in (*benchmark.FORMS, ".gif", ".html", ".mp4", ".png"):
         raise ValueError(f"Several files are written: --out is a folder for them, not {out.name}.")
 
 
@@ -218,7 +218,7 @@ def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: 
 
 
 def period_of(folder: Path) -> float:
-    """Time between decisions [s] of the training in a folder; that of a stroke where neither file says one."""
+    """Time between decisions [s] of the training in a folder; a second where neither of its files says one."""
     if (policy := folder / "policy.safetensors").is_file():
         return load(policy).decision_period
     config = folder / "config.json"
@@ -240,18 +240,22 @@ def swum_often(options: argparse.Namespace) -> int:
         robot = own or make_scene(None, fidelity, period)
         names = options.agents or (OF_TRIALS if own is None else default_agents(own))
         agents = load_agents(names, options.seed, fidelity, period, own)
-        rows += trials(
-            agents, options.sets, options.swims, fidelity=fidelity, seed=options.seed, decision_period=period,
-            threads=options.num_threads, max_strokes=decisions_in(options.seconds, period, own), scene=own,
-            say=failed.append,
-        )  # fmt: skip
+        try:
+            rows += trials(
+                agents, options.sets, options.swims, fidelity=fidelity, seed=options.seed, decision_period=period,
+                threads=options.num_threads, max_strokes=decisions_in(options.seconds, period, own), scene=own,
+                say=failed.append,
+            )  # fmt: skip
+        except ValueError:
+            if not (failed and rows):
+                raise
+        if options.out is not None:
+            write_csv(rows, options.out)  # now: the next fidelity may take hours
         learned = {name: one for name, one in agents.items() if isinstance(one, LearnedPolicy)}
         differences |= {name: found for name, one in learned.items() if (found := one.differences(robot))}
     print(as_text(rows, period))
     print("".join(f"{name}: {found}\n" for name, found in differences.items()), end="")
     print("".join(f"{sentence}\n" for sentence in failed), end="", file=sys.stderr)
-    if options.out is not None:
-        write_csv(rows, options.out)
     return 2 if failed else 0
 
 

@@ -21,7 +21,6 @@ import importlib.util
 import inspect
 import pickle
 import re
-import traceback
 import warnings
 import zipfile
 import zlib
@@ -34,7 +33,6 @@ from typing import Any, get_args
 
 import numpy as np
 
-import seastar_gym
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.contract import Policy, actions_of, answer_of, is_batched, require_fit
 from seastar_gym.controllers.learned import LearnedPolicy, reason_of
@@ -47,9 +45,8 @@ from seastar_gym.envs.tasks import name_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, require_kind, require_period, require_seed, require_texts, shown
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene import failure_in, find_modules_in
+from seastar_gym.scene.scene import failure_in, find_modules_in, is_ours
 
-PACKAGE = Path(seastar_gym.__file__).parent
 _FUNCTION = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 
@@ -77,8 +74,7 @@ def own_code(name: str) -> Iterator[None]:
     try:
         yield
     except Exception as wrong:  # the module is anybody's code
-        raised_in = Path(traceback.extract_tb(wrong.__traceback__)[-1].filename)
-        if isinstance(wrong, ValueError | OSError) and raised_in.is_relative_to(PACKAGE):
+        if isinstance(wrong, ValueError | OSError) and is_ours(wrong):
             raise  # a sentence already
         raise ValueError(failure_in(module_file(name), wrong)) from wrong
 

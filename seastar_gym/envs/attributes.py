@@ -49,6 +49,8 @@ class RobotsEnv:
     _arguments: frozenset[str] = frozenset()
     """Names of the constructor's arguments, which are attributes, too. Once the environment is made, setting one holds
     from the next episode on, or is refused, see `Robots.ask`."""
+    _of_task: frozenset[str] = frozenset()
+    """Names of the numbers of the task, which hold as long as the environment."""
     _is_made = False
     _spec: EnvSpec | None = None
 
@@ -81,6 +83,7 @@ class RobotsEnv:
         """Take the robots; returns the spaces of one robot's actions and observations."""
         n_limbs = robots.scene.robot.n_limbs
         self._robots, self.actions = robots, robots.options.actions
+        self._of_task = frozenset(getattr(robots.task, "__dataclass_fields__", ()))
         actions_of_one = action_space(self.actions, n_limbs)
         has_table = isinstance(actions_of_one, spaces.Discrete)
         self.command_table = command_table(self.actions, n_limbs) if has_table else None
@@ -89,14 +92,10 @@ class RobotsEnv:
         return actions_of_one, seen
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if self._is_made and (name in self._arguments or name in self._numbers_of_task):
+        if self._is_made and (name in self._arguments or name in self._of_task):
             self._ask(name, (value,) * self._robots.n_robots)
         else:
             super().__setattr__(name, value)
-
-    @property
-    def _numbers_of_task(self) -> set[str]:
-        return {one.name for one in fields(self.task)}  # type: ignore[arg-type]  # a dataclass
 
     def __getattr__(self, name: str) -> Any:
         """Arguments that are no attributes otherwise, those of robot 0."""

@@ -558,14 +558,13 @@ class Robots:
         """A task's numbers of all robots, or one for all, as a new array, shape (n_robots,)."""
         if type(values) is np.ndarray and values.dtype == kind and values.shape == (self.n_robots,):
             return values.copy()  # as nearly all are
-        found = np.array(values, kind)
-        if found.ndim == 0:
-            return np.full(self.n_robots, found)
-        if found.shape != (self.n_robots,):
+        found = np.asarray(values)
+        if found.shape not in ((), (self.n_robots,)) or found.dtype.kind not in "biuf":
             raise ValueError(
-                f"{name} of {type(self.task).__name__}.score must be of shape {(self.n_robots,)}, not {found.shape}."
+                f"{name} of {type(self.task).__name__}.score must be numbers of shape {(self.n_robots,)}, not "
+                f"{shown(values)}."
             )
-        return found
+        return np.full(self.n_robots, found, kind)
 
     def _task_info(self, hub: Floats) -> dict[str, NDArray[Any]]:
         """Entries of info that belong to the task. ValueError for one that is no array over robots."""

@@ -410,13 +410,19 @@ CHANGES: tuple[type[Any], ...] = (
     gym.vector.VectorObservationWrapper, gym.vector.VectorActionWrapper,
 )  # fmt: skip
 """Kinds of wrappers that change observations or actions."""
+MAY_BE_SAME: tuple[type[Any], ...] = (
+    gym.wrappers.DtypeObservation, gym.wrappers.FlattenObservation,
+    gym.wrappers.vector.DtypeObservation, gym.wrappers.vector.FlattenObservation,
+)  # fmt: skip
+"""Those that change nothing but the type or the shape, if that."""
 
 
 def require_plain(env: Any, who: str) -> None:
     """ValueError for layers of an environment or a batch below which observations and actions are other ones."""
     layer = env
     while isinstance(layer, gym.Wrapper | gym.vector.VectorWrapper):
-        if isinstance(layer, (*CHANGES, SymmetryReduction, VectorSymmetryReduction)):
+        is_same = isinstance(layer, MAY_BE_SAME) and layer.observation_space == layer.env.observation_space
+        if not is_same and isinstance(layer, (*CHANGES, SymmetryReduction, VectorSymmetryReduction)):
             raise ValueError(f"{who} needs observations and actions as they are: put {type(layer).__name__} around it.")
         layer = layer.env
 
@@ -497,7 +503,8 @@ class VectorSymmetryReduction(_VectorWrapper):
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
         require_kind("env", env, gym.vector.VectorEnv, "a batch, as gym.make_vec gives it")
-        require_plain(env, type(self).__name__)
+        if self.symmetric:
+            require_plain(env, type(self).__name__)
         super().__init__(env)
         self._symmetry = symmetry_in(env, self.symmetric)
         self.single_observation_space = ReducedBox.of(env.single_observation_space)

@@ -362,7 +362,7 @@ class ManyRobotsEnv(RobotsEnv, gym.vector.VectorEnv[Observations, Any, Any]):
             setattr(self, name, values)
         elif name in self._robots.per_episode:
             self._ask(name, values)
-        elif not hasattr(self, name) and name not in self._numbers_of_task:
+        elif not hasattr(self, name) and name not in self._of_task:
             self._own_attributes[name] = values
         elif all(value is values[0] or np.all(value == values[0]) for value in values):
             setattr(self, name, values[0])

@@ -209,11 +209,14 @@ def measured(
     require_ids([id])
     names = [names] if isinstance(names, str) else names
     env, cells = env_of(id, task=task_of(id), split="test", fidelity=FIDELITY), list[Cell]()
-    policies = [load_agent(name, env) for name in names]  # all, before one swims
-    for seed, (name, policy) in enumerate(zip(names, policies, strict=True)):
+    ready = list[tuple[Policy, int | None, Any]]()
+    for name in names:  # all, before one swims
+        policy = load_agent(name, env)
         length = length_of(policy) if not (is_file(name) or is_function(name)) else decisions
         require_length(name, policy, length)
-        batch = make(id, EPISODES, "test", threads, actions=require_seen(policy, env))
+        ready.append((policy, length, require_seen(policy, env)))
+    for seed, (policy, length, actions) in enumerate(ready):
+        batch = make(id, EPISODES, "test", threads, actions=actions)
         reached = swum(batch, policy, first)
         cells.append(Cell(agent, track_of(policy), id, seed, contract(id), first, **reached, decisions=length))
     env.close()

@@ -21,7 +21,7 @@ from seastar_gym.evaluation.playback import Playback, RecordingEnv
 from seastar_gym.evaluation.results import as_text, results, time_series, write_csv
 from seastar_gym.evaluation.rollout import MOST_DECISIONS
 from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, swim
-from seastar_gym.files import require_extra, write_atomically
+from seastar_gym.files import require_extra, require_place, write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_kind
 from seastar_gym.scene.serial import read
@@ -78,7 +78,13 @@ def evaluate(
     videos = {} if folder is None or not video else _video_files(agents, folder)
     if folder is not None:
         require_extra("Pictures", "studies", "matplotlib")
-        folder.mkdir(parents=True, exist_ok=True)
+        for name in (
+            "evaluation.csv",
+            "traces.png",
+            *["trajectories.csv"] * trajectory,
+            *["report.html"] * bool(report),
+        ):
+            require_place(folder / name)
     environment |= {
         "path": path, "waypoint_radius": waypoint_radius, "scene": scene, "decision_period": decision_period
     }  # fmt: skip

@@ -127,12 +127,12 @@ def durations(number: int, fps: float) -> dict[int, int]:
     A picture begins at the hundredth next to its time; one that would not last SHORTEST is left out, unless it is the
     first.
     """
-    begins = {0: 0}
+    begins, last = {0: 0}, 0
     for k in range(1, number):
         begin = round(100.0 * k / fps)
-        if begin - begins[max(begins)] >= SHORTEST:
-            begins[k] = begin
-    ends = [*list(begins.values())[1:], max(round(100.0 * number / fps), begins[max(begins)] + SHORTEST)]
+        if begin - last >= SHORTEST:
+            begins[k] = last = begin
+    ends = [*list(begins.values())[1:], max(round(100.0 * number / fps), last + SHORTEST)]
     return {k: end - begin for (k, begin), end in zip(begins.items(), ends, strict=True)}
 
 

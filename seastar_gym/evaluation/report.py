@@ -138,7 +138,7 @@ def read_progress(folder: Path) -> list[list[int]]:
     rows = read_rows(folder / "progress.csv")
     for row in rows:
         if len(row.fields) != 3:
-            raise row.refused("every line must have strokes trained, strokes round the pentagon, waypoints reached")
+            raise row.refused("every line must have decisions trained, decisions round the pentagon, waypoints reached")
     return [row.integers() for row in rows]
 
 
@@ -192,11 +192,12 @@ def _add_band(figure: go.Figure, curves: Sequence[Curve]) -> None:
     values = np.array([[_at(curve, one) for one in trained] for curve in curves]).reshape(len(curves), -1)
     best, worst, median = values.min(axis=0), values.max(axis=0), np.median(values, axis=0)
     finished = np.flatnonzero(np.isfinite(worst))
-    for part in np.split(finished, np.flatnonzero(np.diff(finished) > 1) + 1):  # no range spans what is not finished
+    parts = np.split(finished, np.flatnonzero(np.diff(finished) > 1) + 1)  # no range spans what is not finished
+    for part in parts if finished.size else []:
         band = {"x": [trained[k] for k in part], "mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
         figure.add_scatter(y=best[part].tolist(), showlegend=False, **band)
         figure.add_scatter(
-            y=worst[part].tolist(), name="range", legendgroup="range", showlegend=bool(part[:1] == finished[:1]),
+            y=worst[part].tolist(), name="range", legendgroup="range", showlegend=bool(part[0] == finished[0]),
             fill="tonexty", fillcolor="#d9e6f2", **band,
         )  # fmt: skip
     figure.add_scatter(

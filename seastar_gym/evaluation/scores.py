@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seastar_gym.controllers.registry import is_file, learned_file, load_agent
+from seastar_gym.controllers.registry import is_file, is_function, learned_file, load_agent
 from seastar_gym.evaluation.results import Estimate, mean_with_interval, number, over_trainings, text_table, write_csv
 from seastar_gym.evaluation.rollout import env_of, held_out, measure_of, swim_episodes
 from seastar_gym.evaluation.swim import HELD_OUT_SEED
@@ -59,19 +59,19 @@ class Scores(NamedTuple):
         }  # fmt: skip
 
 
-_BETWEEN = re.compile(r",(?!\d+[+-]\}?(?:,|$))")
-"""Comma between names of policies, not that of a pair of limbs such as 4+,1-."""
+_NAMES = re.compile(r"(?:^|,)(\{?\d+[+-],\d+[+-]\}?(?=,|$)|[^,]*)")
+"""Name of a policy, between commas; pairs of limbs such as 4+,1- have one."""
 
 
 def policies_of(agent: str) -> tuple[str, list[str]]:
     """Label of an agent, and the names of its policies: LABEL=A,B,C are several, such as trainings, in one row.
 
-    A file, and what has a folder before its "=", is no label.
+    What is before "=" in the name of a file, or of one in a folder that is there, is no label.
     """
     label, several, names = agent.partition("=")
-    if not several or os.sep in label or Path(agent).is_file():
+    if not several or Path(agent).is_file() or (os.sep in label and Path(agent).parent.is_dir()):
         return Path(agent).stem if len(Path(agent).parts) > 1 else agent, [agent]
-    policies = [names] if Path(names).is_file() else _BETWEEN.split(names)
+    policies = [names] if Path(names).is_file() else _NAMES.findall(names)
     if not (label.strip() and all(policies)):
         raise ValueError(f"{agent!r} lacks a label or a policy: write LABEL=A,B,C.")
     places = [Path(name).resolve() if is_file(name) else name for name in policies]
@@ -93,16 +93,16 @@ def measured(
     label, names = policies_of(agent)
     env = env_of(task, **held_out(task, fidelity))
     measure, found = measure_of(env), dict[int, tuple[Any, ...]]()
-    for turn, name in enumerate(names[:seeds]):
+    took_turns = names[:seeds]
+    policies = [load_agent(name, env, HELD_OUT_SEED + turn) for turn, name in enumerate(took_turns)]  # before one swims
+    for turn, policy in enumerate(policies):
         own = list(range(HELD_OUT_SEED, HELD_OUT_SEED + seeds))[turn :: len(names)]
-        policy = load_agent(name, env, own[0])
         swum = swim_episodes(task, policy, own, fidelity=fidelity, max_decisions=max_decisions, threads=threads)
         rows = (column.tolist() for column in (measure.of(swum), swum.success, swum.returns, swum.decisions))
         found |= zip(own, zip(*rows, strict=True), strict=True)
     columns: Any = map(list, zip(*(found[seed] for seed in sorted(found)), strict=True))
-    took_turns = names[:seeds]
-    one = is_file(names[0]) or learned_file(names[0]) is not None
-    trainings = len(took_turns) if len(names) > 1 else int(one)  # several are trainings, of functions too
+    learns = [is_file(one) or learned_file(one) is not None or (is_function(one) and len(names) > 1) for one in names]
+    trainings = len(took_turns) if any(learns) else 0
     what = task, label, fidelity, measure.name, measure.unit, measure.better
     return Scores(*what, sorted(found), *columns)._replace(trainings=trainings)
 

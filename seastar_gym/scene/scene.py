@@ -455,9 +455,9 @@ def load_scene(file: str | PathLike[str] | None) -> Scene:
         found = _run(file).get("scene")
     except SyntaxError as wrong:
         raise ValueError(f"{file}, line {wrong.lineno}, is not Python: {wrong.msg}.") from wrong
-    except ValueError:
-        raise  # a sentence of ours, as of a robot without limbs
     except Exception as wrong:  # the file is anybody's code
+        if isinstance(wrong, ValueError) and is_ours(wrong):
+            raise  # a sentence, as of a robot without limbs
         raise ValueError(failure_in(file, wrong)) from wrong
     if not isinstance(found, Scene):
         raise ValueError(f"{file} must define `scene`, a Scene.")
@@ -492,6 +492,14 @@ def find_modules_in(*folders: Path) -> None:
         if folder not in sys.path:
             sys.path.append(folder)
             importlib.invalidate_caches()
+
+
+PACKAGE = Path(__file__).parents[1]
+
+
+def is_ours(wrong: Exception) -> bool:
+    """Whether this package raised an exception, so that it is a sentence, and not a library below somebody's code."""
+    return Path(traceback.extract_tb(wrong.__traceback__)[-1].filename).is_relative_to(PACKAGE)
 
 
 def failure_in(file: Path, wrong: Exception) -> str:

@@ -100,11 +100,11 @@ def test_seeds_and_options_of_the_next_reset_count_once():
 
 
 class Telling(gym.vector.VectorWrapper):
-    """Puts a number, a text for each robot and a dictionary into info."""
+    """Puts a number, rows of two lengths and a dictionary into info."""
 
     def step(self, actions):
         *rest, info = super().step(actions)
-        return *rest, {**info, "number": 3, "names": ["a"] * self.num_envs, "stats": {"x": 1}}
+        return *rest, {**info, "number": 3, "rows": [[1], [2, 3]], "stats": {"x": 1}}
 
 
 def test_wrappers_may_put_anything_into_info():
@@ -114,7 +114,7 @@ def test_wrappers_may_put_anything_into_info():
     learner = adapter.BatchVecEnv(Telling(gym.wrappers.vector.RecordEpisodeStatistics(batch)))
     learner.reset()
     infos = [learner.step(np.zeros((2, 5), int))[3][1] for _ in range(3)]
-    assert all((info["number"], info["names"], info["stats"]) == (3, "a", {"x": 1}) for info in (infos[0], infos[2]))
+    assert all((info["number"], info["rows"], info["stats"]) == (3, [2, 3], {"x": 1}) for info in infos)
     assert infos[1]["TimeLimit.truncated"] and infos[1]["episode"]["l"] == 2
 
 

@@ -301,6 +301,8 @@ def test_a_scene_that_is_not_symmetric_is_refused_with_its_reason(name):
      (SymmetryReduction, "SymmetryReduction")],
 )  # fmt: skip
 def test_what_changes_observations_or_actions_belongs_around_the_reduction(wrap, name):
+    """What has no effect may be below it."""
+    SymmetryReduction(gym.wrappers.FlattenObservation(SeastarSwimEnv(fidelity="fast")))
     env = gym.make("SeastarSwimContinuous-v0", fidelity="fast")
     with assert_refused(f"put {name} around it"):
         SymmetryReduction(wrap(env))

@@ -564,7 +564,7 @@ WRONG = {
     "targets must have two points of every robot, shape (1, 4), not (1, 2)": {"targets": lambda *_: np.zeros((1, 2))},
     "observation is of shape (1, 2), and its entries say (1, 0)": {"observation": lambda *_: np.zeros((1, 2))},
     "score has the terms reward_a, and its terms are": {"score": lambda *_: Score({"reward_a": np.zeros(1)})},
-    "reward_far of Wrong.score must be of shape (1,), not (1, 1)": {
+    "reward_far of Wrong.score must be numbers of shape (1,), not array(": {
         "score": lambda *_: Score({"reward_far": np.zeros((1, 1)), "reward_time": 0.0})
     },
     "more of Wrong.info must be an array over 1 robots": {"info": lambda *_: {"more": 2.0}},

@@ -159,6 +159,23 @@ def test_damaged_files_of_a_report_are_refused(name, text, words, tmp_path):
         READ[name](tmp_path / name)
 
 
+def test_a_band_of_trainings_is_where_all_have_finished():
+    """Also nowhere, and in two parts."""
+    laps = {"a": [9, 8, 7, 6], "b": [9, None, 8, 7], "c": [8, 7, 6, 5]}
+    curves = [
+        Curve.of(name, [[k, lap or 400, 5 if lap else 3] for k, lap in enumerate(each)], 0.5)
+        for name, each in laps.items()
+    ]  # fmt: skip
+    ranges = [trace for trace in report.curves_figure(curves, {}).data if trace.name == "range"]
+    assert [(list(one.x), list(one.y), one.showlegend) for one in ranges] == [
+        ([0.0], [4.5], True), ([2.0, 3.0], [4.0, 3.5], False)
+    ]  # fmt: skip
+    never = [Curve.of(name, [[k, 400, 0] for k in range(3)]) for name in laps]
+    apart = [Curve.of(name, [[k, 9, 5]]) for k, name in enumerate(laps)]
+    for others in (never, apart):
+        assert "range" not in {trace.name for trace in report.curves_figure(others, {}).data}
+
+
 # Recording, and the page in a browser
 
 

@@ -82,14 +82,17 @@ def of(*scores, seeds=4):
     "agent, label, policies",
     [
         ("greedy", "greedy", ["greedy"]), ("runs/a.zip", "a", ["runs/a.zip"]), ("mine=a,b", "mine", ["a", "b"]),
-        ("pair=4+,1-,{2+,3-},rest", "pair", ["4+,1-", "{2+,3-}", "rest"]), ("x=1.zip", "x=1.zip", ["x=1.zip"]),
+        ("pair=rest,4+,1-,{2+,3-},2-,3+", "pair", ["rest", "4+,1-", "{2+,3-}", "2-,3+"]),
+        ("x=1.zip", "x=1.zip", ["x=1.zip"]),
         ("runs/lr=0.1/a.zip", "a", ["runs/lr=0.1/a.zip"]), ("mine=a,b.zip", "mine", ["a,b.zip"]),
+        ("w/ noise=a,b", "w/ noise", ["a", "b"]),
     ],
 )  # fmt: skip
 def test_a_label_stands_before_policies_and_not_within_the_name_of_a_file(
     agent, label, policies, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs" / "lr=0.1").mkdir(parents=True)
     for name in ("x=1.zip", "a,b.zip"):
         (tmp_path / name).touch()
     assert policies_of(agent) == (label, policies)
