@@ -12,6 +12,7 @@ import os
 import platform
 import shlex
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -227,8 +228,8 @@ def is_unbegun(folder: Path) -> bool:
 def resume_command(folder: Path) -> str:
     """Command that continues the run in a folder."""
     own = ["--run-scene"] if (folder / OWN_SCENE).is_file() else []
-    start = ["python", "train.py"] if Path("train.py").is_file() else ["seastar", "train"]
-    return shlex.join([*start, "--resume", str(folder), *own])
+    script = sys.argv[0] if Path(sys.argv[0]).name == "train.py" else "train.py"  # wherever it is started from
+    return shlex.join(["python", script, "--resume", str(folder), *own])
 
 
 SCENE, INTERVALS = "scene.json", "intervals.json"

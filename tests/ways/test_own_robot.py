@@ -29,7 +29,7 @@ def test_a_robot_of_ones_own_is_trained_compared_filmed_played_and_published(sto
     # It is trained; Ctrl-C stops it after the first checkpoint, and the command that it names goes on.
     train = f"{command('docs/own_robot.md', 'train.py --scene')} {SHORT} {options} --out runs/mine"
     story.types(train, ends=130, stop=lambda: any(checkpoint.glob("*.zip")))
-    (goes_on,) = re.findall("python train.py --resume .*", story.told)
+    (goes_on,) = re.findall(r"python \S*train.py --resume .*", story.told)
     story.types(goes_on)
     assert (run / "evaluation/report.html").is_file()
     assert (run / "evaluation/learned.mp4").is_file() == (not options.endswith("--no-video"))
