@@ -410,6 +410,6 @@ def test_a_key_that_is_held_swims_the_lagged_gait_from_its_beginning_and_words_a
     assert held == [np.roll(gait[k % 5], 1).tolist() for k in range(7)]
     assert steering.command(set(), STAR).tolist() == [0] * 5
     assert steering.command({"s"}, STAR).tolist() == held[0]
-    assert list(typed("a*2 1w . up", 5)) == [{"a"}, {"a"}, {"1", "w"}, set(), {"up"}]
+    assert list(typed("A*2 1w . up", 5)) == [{"a"}, {"a"}, {"1", "w"}, set(), {"up"}]
     assert len(known_keys(8)) == 3 * 8 + 4
     assert {"z", "f1", "escape"}.isdisjoint(known_keys(8))
