@@ -103,8 +103,10 @@ def require_writable(folder: str | os.PathLike[str]) -> None:
     probe.unlink()
 
 
-def require_place(path: str | os.PathLike[str]) -> None:
-    """Make the folder of a file that is written later. OSError, now, where the disk or what is there refuses."""
+def require_place(path: str | os.PathLike[str] | None) -> None:
+    """Make the folder of a file that is written later, None for none. OSError, now, where it could not be written."""
+    if path is None:
+        return
     _require_replaceable(Path(path))
     require_writable(Path(path).parent)
 

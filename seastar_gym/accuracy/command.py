@@ -70,16 +70,6 @@ def draw(certificate: Certificate, file: Path) -> None:
     plt.close(figure)
 
 
-def require_file(option: str, file: Path | None) -> None:
-    """Make the folder of a file that an option names, if it does. ValueError where it is a folder itself, OSError
-    where the disk refuses."""
-    if file is None:
-        return
-    if file.is_dir():
-        raise ValueError(f"{file} is a folder: give --{option} a file.")
-    require_place(file)
-
-
 @contextmanager
 def progress_bar(what: str = "") -> Iterator[Progress]:
     """Bar of the share of some work that is done."""
@@ -105,7 +95,7 @@ def certify_as_asked(options: argparse.Namespace) -> None:
     if options.chosen is not None and options.error is None:
         raise ValueError("--chosen writes the scene that --error chooses: give both.")
     for name in ("out", "chosen"):
-        require_file(name, getattr(options, name))
+        require_place(getattr(options, name))
     if options.out.suffix == ".png":
         raise ValueError(f"{options.out} is where the picture goes: give --out a file such as certificate.json.")
     if options.chosen is not None and options.chosen.exists():

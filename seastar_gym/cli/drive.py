@@ -204,9 +204,9 @@ def drive(options: argparse.Namespace) -> int:
     if not options.dry and (devices or robot is not None):
         with opened(options, arguments, robot) as plant:  # which heats nothing
             require_limbs(plant, arguments["scene"])
-    policy, planned, actions = plan(options, arguments)
     for name in ("plan.png", "driven.png", "report.md"):
         require_place(options.out / name)
+    policy, planned, actions = plan(options, arguments)
     picture = options.out / "plan.png"
     fluid = arguments["scene"].fluid
     current = None if fluid is None else fluid.current

@@ -231,8 +231,7 @@ def period_of(folder: Path) -> float:
 def swum_often(options: argparse.Namespace) -> int:
     """Let the agents swim the sets; returns the exit code, 2 where one failed."""
     require_sound(options)
-    if options.out is not None:
-        require_place(options.out)
+    require_place(options.out)
     rows, differences, failed = list[Row](), dict[str, str](), list[str]()
     for typed in options.fidelity or [None]:
         fidelity: Fidelity = typed or "balanced"
@@ -279,8 +278,7 @@ def measured_on_tasks(options: argparse.Namespace) -> int:
     labelled(agents)
     for task in tasks:
         require_task(task)
-    if options.out is not None:
-        require_place(options.out)
+    require_place(options.out)
     found, fidelity = list[Scores](), (options.fidelity or [None])[0]
     for task, agent in itertools.product(tasks, agents):
         try:

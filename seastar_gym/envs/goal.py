@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import gymnasium as gym
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from seastar_gym.envs.headings import wrapped
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import heading_of
-from seastar_gym.envs.symmetry import SymmetryReduction
+from seastar_gym.envs.symmetry import OF_OBSERVATIONS, require_plain
 from seastar_gym.scene.checks import as_floats, require_kind
 
 Floats = NDArray[np.float64]
@@ -58,9 +57,7 @@ class GoalForm(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
             raise ValueError(f"In {swim} waypoints are not all that counts: GoalForm serves {', '.join(SERVED)}.")
         if swim.sight is not None:
             raise ValueError("GoalForm tells where the hub is, which no camera knows: leave out sight.")
-        for layer in _layers(env):
-            if isinstance(layer, gym.ObservationWrapper | SymmetryReduction):
-                raise ValueError(f"GoalForm needs observations as they are: put {type(layer).__name__} around it.")
+        require_plain(env, "GoalForm", OF_OBSERVATIONS)
         self._swim = swim
         self._length = float(swim.scene.robot.limb_length)
         at, places = swim.layout, np.arange(swim.layout.size)
@@ -118,11 +115,3 @@ class GoalForm(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
 
 def _direction(angle: float) -> Floats:
     return np.array([np.cos(angle), np.sin(angle)])
-
-
-def _layers(env: gym.Env[Any, Any]) -> Iterator[gym.Env[Any, Any]]:
-    """The environment and what it wraps, outermost first."""
-    yield env
-    while isinstance(env, gym.Wrapper):
-        env = env.env
-        yield env

@@ -405,11 +405,11 @@ def symmetry_in(env: Any, reduced: bool = True) -> Symmetry:
     return Symmetry(symmetry_of(inner.scene), observed_mirror(inner), inner.layout, inner.actions)
 
 
-CHANGES: tuple[type[Any], ...] = (
-    gym.ObservationWrapper, gym.ActionWrapper, gym.wrappers.FrameStackObservation,
-    gym.vector.VectorObservationWrapper, gym.vector.VectorActionWrapper,
+OF_OBSERVATIONS: tuple[type[Any], ...] = (
+    gym.ObservationWrapper, gym.wrappers.FrameStackObservation, gym.vector.VectorObservationWrapper
 )  # fmt: skip
-"""Kinds of wrappers that change observations or actions."""
+OF_ACTIONS: tuple[type[Any], ...] = gym.ActionWrapper, gym.vector.VectorActionWrapper
+"""Kinds of wrappers that change observations, and actions."""
 MAY_BE_SAME: tuple[type[Any], ...] = (
     gym.wrappers.DtypeObservation, gym.wrappers.FlattenObservation,
     gym.wrappers.vector.DtypeObservation, gym.wrappers.vector.FlattenObservation,
@@ -417,13 +417,17 @@ MAY_BE_SAME: tuple[type[Any], ...] = (
 """Those that change nothing but the type or the shape, if that."""
 
 
-def require_plain(env: Any, who: str) -> None:
-    """ValueError for layers of an environment or a batch below which observations and actions are other ones."""
+def require_plain(env: Any, who: str, kinds: tuple[type[Any], ...] = OF_OBSERVATIONS + OF_ACTIONS) -> None:
+    """ValueError for a layer of an environment or a batch that changes what a wrapper needs as it is.
+
+    who: Name of the wrapper. kinds: Of layers, besides reductions, which change both.
+    """
     layer = env
     while isinstance(layer, gym.Wrapper | gym.vector.VectorWrapper):
         is_same = isinstance(layer, MAY_BE_SAME) and layer.observation_space == layer.env.observation_space
-        if not is_same and isinstance(layer, (*CHANGES, SymmetryReduction, VectorSymmetryReduction)):
-            raise ValueError(f"{who} needs observations and actions as they are: put {type(layer).__name__} around it.")
+        if not is_same and isinstance(layer, (*kinds, SymmetryReduction, VectorSymmetryReduction)):
+            name = type(layer).__name__
+            raise ValueError(f"{name} changes what {who} needs as it is: put {name} around it.")
         layer = layer.env
 
 

@@ -78,30 +78,23 @@ def evaluate(
     videos = {} if folder is None or not video else _video_files(agents, folder)
     if folder is not None:
         require_extra("Pictures", "studies", "matplotlib")
-        for name in (
-            "evaluation.csv",
-            "traces.png",
-            *["trajectories.csv"] * trajectory,
-            *["report.html"] * bool(report),
-        ):
+        for name in ("evaluation.csv", "traces.png", "trajectories.csv", "report.html"):
             require_place(folder / name)
     environment |= {
         "path": path, "waypoint_radius": waypoint_radius, "scene": scene, "decision_period": decision_period
     }  # fmt: skip
     episode = {"seed": seed, "reset_options": reset_options, "max_strokes": max_strokes}
-    swims, playbacks, failures = list[Swim](), list[Playback](), list[ValueError]()
+    found, failures = dict[str, tuple[Swim, Playback | None]](), list[ValueError]()
     for name, policy in agents.items():
         film_file = _without_film(videos.get(name), (filmed or {}).get(name))
         try:
-            swum, playback = _swim_once(name, policy, environment, episode, film_file, report is not None)
+            found[name] = _swim_once(name, policy, environment, episode, film_file, report is not None)
         except ValueError as wrong:
             failures.append(wrong)
-            videos.pop(name, None)
-            continue
-        swims.append(swum)
-        playbacks += [] if playback is None else [playback]
-    if failures and not swims:
+    if failures and not found:
         raise failures[0]
+    swims = [swum for swum, _ in found.values()]
+    videos = {name: file for name, file in videos.items() if name in found}
     swum_in = scene or make_scene(None, None, decision_period)
     _tell(swims, agents, swum_in, say)
     for failed in failures:
@@ -115,6 +108,7 @@ def evaluate(
             from seastar_gym.evaluation.report import write_report
 
             films = {name: file.name for name, file in videos.items()}
+            playbacks = [playback for _, playback in found.values() if playback is not None]
             write_report(
                 folder / "report.html", path, swims, playbacks, waypoint_radius, report, current=current, films=films
             )

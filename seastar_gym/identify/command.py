@@ -65,8 +65,7 @@ def fit(options: argparse.Namespace) -> None:
         scene = replace(scene, numerics=Numerics("implicit-midpoint", options.step or STEP))
     measurement = Measurement.from_csv(options.trajectory, options.commands)
     for file in (options.picture, options.out, options.intervals):
-        if file is not None:
-            require_place(file)
+        require_place(file)
     begin = time.perf_counter()
     estimate = identify(scene, options.fit or FITTED, measurement, largest_delay=options.delay)
     print(estimate.report(), f"{time.perf_counter() - begin:.1f} s", sep="\n")

@@ -323,9 +323,7 @@ FILES = {"three.py": "scene = 3\n", "own.py": OWN, "open.py": "scene = Scene(\n"
         (["open.json"], "open.json is no scene: "),
         (["folder"], "is no file."),
         (["--error", "0"], "positive, finite share"),
-        (["--out", "folder"], "is a folder"),
         (["--out", "mine.png"], "where the picture goes"),
-        (["--error", "0.1", "--chosen", "folder"], "is a folder"),
         (["--chosen", "chosen.json"], "give both"),
     ],
 )
@@ -337,6 +335,9 @@ def test_what_cannot_be_certified_is_refused_before_it_is_measured(arguments, wo
     (tmp_path / "folder").mkdir()
     assert command.main(arguments) == 2
     assert_told(capsys, words)
+    for place in (["--out", "folder"], ["--error", "0.1", "--chosen", "folder"]):
+        with pytest.raises(FileExistsError, match="folder is no file that can be written over"):
+            command.main(place)
 
 
 def test_the_table_and_the_picture_of_a_certificate(made, golden, monkeypatch):
